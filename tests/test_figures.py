@@ -125,7 +125,7 @@ def summary():
 
 
 def springs_of_the_taper():
-    return taper.taper(run_taper(TaperConfig()).result())
+    return taper.figures(run_taper(TaperConfig()))["taper"]
 
 
 def cable():

@@ -25,7 +25,12 @@ Row = tuple[int, list[str]]
 
 
 def csv_rows(
-    path: Path, data: bytes, needed: Sequence[str], error: type[BadInputError], cure: str = ""
+    path: Path,
+    data: bytes,
+    needed: Sequence[str],
+    error: type[BadInputError],
+    cure: str = "",
+    ended: bool = False,
 ) -> Iterator[Row]:
     """The rows of a file that are not empty, the names of the columns first; any line ends.
 
@@ -35,6 +40,7 @@ def csv_rows(
         needed: Columns that have to be there.
         error: What is raised.
         cure: What is said if a column is missing.
+        ended: Whether the last row must end with a line break, or else was cut off.
 
     Raises:
         BadInputError: Of the given type: it is no CSV, or lacks a column.
@@ -50,6 +56,11 @@ def csv_rows(
     try:
         header = [name.strip() for name in next(reader, [])]
         _check_header(path, header, needed, error, cure)
+        if ended and not data.endswith((b"\n", b"\r")):
+            raise error(
+                f"{path}: row {len(data.splitlines())}: expected a line break at its end, found "
+                "none (truncated); delete the last row, or add the line break if it is whole"
+            )
         yield reader.line_num, header
         for cells in reader:
             if cells:

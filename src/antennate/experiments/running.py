@@ -209,13 +209,6 @@ def write_films(
 ) -> None:
     """Run one trial of each condition once more, and write its film into the run directory.
 
-    Args:
-        experiment: What is filmed.
-        config: Its configuration.
-        trial: Number of the trial.
-        directory: The directory of the run.
-        on_step: Called with how many of how many parts are done, as for `run`.
-
     Raises:
         AntennateError: A trial failed, or a film cannot be drawn or written.
     """

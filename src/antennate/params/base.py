@@ -109,6 +109,16 @@ def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
     return tuple(found)
 
 
+def require_default(config: Params, why: str, *paths: str) -> None:
+    """Check that dotted parameters which nothing reads have their defaults.
+
+    Raises:
+        ValueError: One has not.
+    """
+    for path, *_ in changes(config, paths):
+        raise ValueError(f"{path}: expected the default, as {why}, found another")
+
+
 def require_different(name: str, values: Sequence[Any]) -> None:
     """Check that no value stands twice in a list.
 

@@ -18,35 +18,17 @@ from antennate.types import Floats
 _BINS = 12
 
 
-def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    s = outcome.recording.samples
-    loop = branches(s, Pushes.of(s))
-    return {"calibrate": calibrate(outcome.result(), s, outcome.levels(), loop)}
-
-
 @style.styled
-def calibrate(
-    result: Mapping[str, Any],
-    samples: Samples,
-    level: Floats,
-    loop: tuple[Floats, Floats, Floats],
-) -> Figure:
-    """Readings against bends with the curve, residuals, both directions, and rival curves.
-
-    Args:
-        result: The content of result.json.
-        samples: Readings, bends and speeds.
-        level: What the curve makes of the readings, shape (n,).
-        loop: Bends (g,), and readings of loading and of unloading (pushes, g) [counts].
-    """
+def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
+    """Readings against bends with the curve, residuals, both directions, and rival curves."""
+    result, samples = outcome.result(), outcome.recording.samples
     known = result["assessment"]
     drawn = [part for part in ("hysteresis", "rivals") if _has(known, part)]
     heights = (5.2, 2.6 * len(drawn))[: 1 + bool(drawn)]
     figure = style.canvas(style.WIDTH, sum(heights))
     upper, *lower = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     above, below = upper.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    _draw_speeds(above, below, samples, level)
+    _draw_speeds(above, below, samples, outcome.levels())
     _draw_curve(above, result["calibration"])
     if known["new_push"] is not None:
         ends = known["new_push"]["error_95"]
@@ -58,10 +40,10 @@ def calibrate(
         panels = lower[0].subplots(len(drawn), 1, squeeze=False)[:, 0]
         for panel, part in zip(panels, drawn, strict=True):
             if part == "hysteresis":
-                _draw_loop(panel, known[part], loop)
+                _draw_loop(panel, known[part], samples)
             else:
                 _draw_rivals(panel, known)
-    return figure
+    return {"calibrate": figure}
 
 
 def _has(known: Mapping[str, Any], part: str) -> bool:
@@ -98,8 +80,8 @@ def _draw_curve(panel: Axes, found: Mapping[str, Any]) -> None:
     panel.legend(fontsize=8)
 
 
-def _draw_loop(panel: Axes, found: Mapping[str, Any], loop: tuple[Floats, Floats, Floats]) -> None:
-    bend, *ways = loop
+def _draw_loop(panel: Axes, found: Mapping[str, Any], samples: Samples) -> None:
+    bend, *ways = branches(samples, Pushes.of(samples))
     for name, counts, colour in zip(("loading", "unloading"), ways, style.series(2), strict=True):
         there = np.isfinite(counts).any(axis=0)
         panel.plot(bend[there], np.nanmean(counts[:, there], axis=0), color=colour, label=name)

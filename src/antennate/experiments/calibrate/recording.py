@@ -126,14 +126,8 @@ def _rows(
     needed = [params.time_column] * (rate is None) + [params.counts_column, params.bend_column]
     cure = "; name yours with --columns.*-column"
     cure += ", or give --rate if there is no time" if rate is None else ""
-    lines = csv_rows(path, data, needed, CalibrationError, cure)
+    lines = csv_rows(path, data, needed, CalibrationError, cure, ended=True)
     _, header = next(lines)
-    if not data.endswith((b"\n", b"\r")):
-        last = len(data.splitlines())
-        raise CalibrationError(
-            f"{path}: row {last}: expected a line break at its end, found none (truncated); "
-            "delete the last row, or add the line break if it is whole"
-        )
     if rate is not None and column(header, params.time_column) is not None:
         raise CalibrationError(
             f"{path}: row 1: expected no column {params.time_column} beside --rate, found one; "

@@ -46,9 +46,6 @@ class Push:
     """One push of the rig.
 
     Attributes:
-        physics: Numerics.
-        antenna: The antenna.
-        rig: The rig.
         factors: What the stiffness of each spring is multiplied with, shape (n,).
         speed: Speed of the rod [m/s].
         gap: Its distance from the antenna at the start [m].

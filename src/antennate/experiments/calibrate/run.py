@@ -25,7 +25,7 @@ from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.experiments.reading import mean_since
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
@@ -87,14 +87,10 @@ class CalibrateConfig(Params):
     @model_validator(mode="after")
     def _rig_or_recording(self) -> CalibrateConfig:
         """A recording needs no rig, and the rig no columns."""
-        names = ("columns", "rate") if self.recording is None else _OF_THE_RIG
-        for name in names:
-            if getattr(self, name) != type(self).model_fields[name].default:
-                without = "without" if self.recording is None else "with"
-                raise ValueError(
-                    f"{name}: expected the default, as {without} a recording it is not "
-                    "read, found another"
-                )
+        if self.recording is None:
+            require_default(self, "without a recording it is not read", "columns", "rate")
+        else:
+            require_default(self, "with a recording it is not read", *_OF_THE_RIG)
         named = {"time_column", "time_unit"} & self.columns.model_fields_set
         if self.rate is not None and named:
             raise ValueError(
@@ -123,10 +119,8 @@ class CalibrateOutcome(Outcome):
     """A calibration and its data.
 
     Attributes:
-        config: What was asked.
         recording: The data, averaged as asked, with each push as a trial of its own.
         raw: The same before averaging.
-        calibration: The curve.
     """
 
     config: CalibrateConfig

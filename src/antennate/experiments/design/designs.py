@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from antennate.experiments.design.config import DesignConfig, Objective
@@ -15,34 +15,32 @@ from antennate.studies.plan import Point
 State = Literal["ok", "failed", "refused", "unfinished"]
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Design:
-    """One design.
+    """One design, as result.json tells it.
 
     Attributes:
-        number: Its number in the order of the run.
+        design: Its number in the order of the run.
         name: That of a reference, else the number.
-        reference: Whether it is one.
-        point: Its parameters.
         state: Whether it was judged (ok), had too few trials that are ok (failed), could not be
             configured (refused), or the run was interrupted (unfinished).
         reason: Why it was refused.
-        worth: Value of each objective by name, None if it was not judged.
+        front: Whether no other design is better.
+        objectives: Value of each objective by name, None if it was not judged.
         fresh: The same on fresh seeds, None if it was not validated.
-        on_front: Whether no other design is better.
-        on_fresh_front: Whether of those that were validated none is better on fresh seeds.
+        fresh_front: Whether of those that were validated none is better on fresh seeds.
     """
 
-    number: int
+    design: int
     name: str
     reference: bool
-    point: Point
     state: State = "unfinished"
     reason: str = ""
-    worth: dict[str, Value] | None = None
+    values: Point
+    front: bool = False
+    objectives: dict[str, Value] | None = None
     fresh: dict[str, Value] | None = None
-    on_front: bool = False
-    on_fresh_front: bool = False
+    fresh_front: bool = False
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,6 @@ class DesignOutcome:
     """All designs and all rows, in order.
 
     Attributes:
-        config: What was run.
         designs: The references, then the proposals.
         rows: One for each trial, all with the same keys.
         proposed: How many designs were proposed, those among them that came again.
@@ -81,21 +78,7 @@ class DesignOutcome:
             "repeated": self.repeated,
             "trials": len(self.rows),
             "statuses": {name: statuses.count(name) for name in sorted(set(statuses))},
-            "designs": [
-                {
-                    "design": each.number,
-                    "name": each.name,
-                    "reference": each.reference,
-                    "state": each.state,
-                    "reason": each.reason,
-                    "values": dict(each.point),
-                    "front": each.on_front,
-                    "objectives": each.worth,
-                    "fresh": each.fresh,
-                    "fresh_front": each.on_fresh_front,
-                }
-                for each in self.designs
-            ],
+            "designs": [asdict(each) for each in self.designs],
         }
 
     def _told(self, objective: Objective) -> dict[str, Any]:

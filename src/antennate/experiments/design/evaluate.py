@@ -40,11 +40,7 @@ class Task(NamedTuple):
 
     Attributes:
         place: Its place among those of its batch.
-        design: Number of the design.
-        label: Label of the evaluation.
-        experiment: What is run.
         judged: Columns that must be finite numbers.
-        config: Its configuration.
         trial: Its condition and its number.
     """
 
@@ -66,7 +62,6 @@ class Evaluator:
         names: Names of all parameters of a design.
 
     Attributes:
-        label: The label.
         judged: Columns that objectives are made of.
         reads: Names among those that are parameters of this experiment.
 

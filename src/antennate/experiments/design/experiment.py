@@ -7,8 +7,9 @@ from typing import Any
 
 from antennate.experiments.design import run as design
 from antennate.experiments.design.config import DesignConfig
+from antennate.experiments.study import labels
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Table, shown
+from antennate.studies.measures import NONE, Table, shown
 
 _MOST = 40
 """Most lines of a table."""
@@ -27,7 +28,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         (
             f"{each['name']}{' *' if each['front'] else ''}",
             [
-                *(value_text(each["values"].get(axis)) for axis in result["axes"]),
+                *(labels.text(each["values"].get(axis, NONE)) for axis in result["axes"]),
                 *(_worth(each, "objectives", objective) for objective in objectives),
             ],
         )
@@ -64,13 +65,6 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     return [table for table in found if table.rows]
 
 
-def value_text(value: Any) -> str:
-    """A value of a design as tables show it; a list as its entries."""
-    if isinstance(value, list | tuple):
-        return " ".join(map(value_text, value))
-    return f"{value:.4g}" if isinstance(value, float) else shown(value, "")
-
-
 def _title(objective: Each) -> str:
     """The label of an evaluation, and what is measured there with its unit."""
     return f"{objective['name'].partition('.')[0]}: {objective['title']}"
@@ -105,9 +99,7 @@ def sentence(result: Mapping[str, Any]) -> str:
         best = [_best(known, part, objective, first) for objective in result["objectives"]]
         seeds = "fresh seeds" if again else "the seeds of the search, which flatter"
         text += f". Best of each objective on {seeds} (95 % interval): {'; '.join(best)}"
-    bad = {name: n for name, n in result["statuses"].items() if name != "ok"}
-    told = ", ".join(f"{n} {name}" for name, n in bad.items())
-    text += f". Trials that say nothing: {told}; trials.csv has why" if bad else ""
+    text += labels.silent(result["statuses"])
     lost = sum(each["state"] in ("failed", "refused") for each in designs)
     return text + (f". Designs that could not be judged: {lost}." if lost else ".")
 

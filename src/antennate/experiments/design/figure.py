@@ -35,8 +35,7 @@ def tradeoff(result: Mapping[str, Any]) -> Figure:
     panels = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for panel, (x, y) in zip(panels, pairs, strict=True):
         _panel(panel, result["designs"], x, y)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 

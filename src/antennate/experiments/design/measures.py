@@ -24,12 +24,7 @@ value is None if it is that of successes and there are none."""
 
 
 def measure_of(objective: Objective, experiment: str) -> Measure:
-    """What an objective is called, and its unit.
-
-    Args:
-        objective: The objective.
-        experiment: What measures it.
-    """
+    """What an objective is called, and its unit."""
     found = labels.measure_of(experiment, objective.column)
     label = found.label + (" (successes only)" if objective.of_successes else "")
     return dataclasses.replace(found, label=label)

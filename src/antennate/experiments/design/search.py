@@ -14,7 +14,7 @@ from antennate.experiments.design.config import DesignConfig, Goal
 from antennate.experiments.design.designs import Design, DesignOutcome
 from antennate.experiments.design.evaluate import OF_DESIGN, Row, Task, evaluators, run_tasks
 from antennate.experiments.design.propose import Drawn, Told, package, point_of, propose
-from antennate.experiments.study.run import REASON, STATUS, cells
+from antennate.experiments.study.run import REASON, STATUS, aligned, cells
 from antennate.experiments.study.subject import columns_in
 from antennate.studies.experiment import OnRow, OnStep
 from antennate.studies.plan import Point
@@ -84,10 +84,10 @@ class Search:
             return
 
         def choose() -> list[int]:
-            places = [d.number for d in self.designs if d.on_front and not d.reference]
+            places = [d.design for d in self.designs if d.front and not d.reference]
             first = self.objectives[:1]
-            places.sort(key=lambda n: (*measures.small(self.designs[n].worth or {}, first), n))
-            references = [d.number for d in self.designs if d.reference and d.worth]
+            places.sort(key=lambda n: (*measures.small(self.designs[n].objectives or {}, first), n))
+            references = [d.design for d in self.designs if d.reference and d.objectives]
             return [*references, *measures.spread(places, self.config.validated)]
 
         chosen = [self.designs[number] for number in self._kept("validated", choose)]
@@ -96,34 +96,36 @@ class Search:
     def outcome(self, interrupted: bool) -> DesignOutcome:
         """What has been found."""
         self._find_front()
-        columns = dict.fromkeys(
-            name for row in self.rows for name in row if name not in (STATUS, REASON)
-        )
-        rows = [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in self.rows]
         repeated = len(self.asked) - sum(not design.reference for design in self.designs)
         counts = (len(self.asked), repeated)
         version = package().__version__
-        return DesignOutcome(self.config, self.designs, rows, *counts, version, interrupted)
+        return DesignOutcome(
+            self.config, self.designs, aligned(self.rows), *counts, version, interrupted
+        )
 
     def _design(self, point: Point, name: str, reference: bool) -> Design:
-        design = Design(len(self.designs), name, reference, dict(point))
+        design = Design(
+            design=len(self.designs), name=name, reference=reference, values=dict(point)
+        )
         self.designs.append(design)
         self.known.setdefault(_key(point), design)
         return design
 
     def _values(self, design: Design) -> list[float | None] | None:
         """What the sampler is told of a design."""
-        return None if design.worth is None else [v["value"] for v in design.worth.values()]
+        return (
+            None if design.objectives is None else [v["value"] for v in design.objectives.values()]
+        )
 
     def _find_front(self) -> None:
-        judged = [(each, each.worth) for each in self.designs if each.worth is not None]
+        judged = [(each, each.objectives) for each in self.designs if each.objectives is not None]
         again = [(each, each.fresh) for each in self.designs if each.fresh is not None]
         best = measures.front_of([worth for _, worth in judged], self.objectives)
         for (design, _), on_front in zip(judged, best, strict=True):
-            design.on_front = on_front
+            design.front = on_front
         best = measures.front_of([worth for _, worth in again], self.objectives)
         for (design, _), on_front in zip(again, best, strict=True):
-            design.on_fresh_front = on_front
+            design.fresh_front = on_front
 
     def _kept(self, key: str, make: Callable[[], Any]) -> Any:
         """What was decided before, or else is decided now: read back, it stays as it was."""
@@ -176,31 +178,31 @@ class Search:
         fresh = phase == VALIDATION
         times = self.config.validation_factor if fresh else 1
         try:
-            every = [(e, e.trials(design.point, times, fresh)) for e in self.evaluators]
+            every = [(e, e.trials(design.values, times, fresh)) for e in self.evaluators]
         except ConfigError as error:
             design.state, design.reason = "refused", str(error)
             return []
         return [
-            Task(0, design.number, e.label, e.name, e.judged, config, trial)
+            Task(0, design.design, e.label, e.name, e.judged, config, trial)
             for e, trials in every
             for config, trial in trials
         ]
 
     def _labelled(self, task: Task, phase: str, row: Row) -> Row:
         design = self.designs[task.design]
-        what = {"design": design.number, "name": design.name, "phase": phase}
-        values = cells({name: design.point.get(name) for name in self.config.search})
+        what = {"design": design.design, "name": design.name, "phase": phase}
+        values = cells({name: design.values.get(name) for name in self.config.search})
         return {**what, "evaluation": task.label, **values, **row}
 
     def _judge(self, design: Design, phase: str) -> None:
         if design.state == "refused":
             return
-        mine = [r for r in self.rows if r["design"] == design.number and r["phase"] == phase]
+        mine = [r for r in self.rows if r["design"] == design.design and r["phase"] == phase]
         worth = measures.worth(mine, self.objectives, self.config.least_ok)
         if phase == VALIDATION:
             design.fresh = worth
         else:
-            design.worth, design.state = worth, "failed" if worth is None else "ok"
+            design.objectives, design.state = worth, "failed" if worth is None else "ok"
 
     def _check_columns(self) -> None:
         """Find an objective that nothing measures, as soon as there is a row."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -15,24 +15,17 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.force.experiment import PARTS, tested
 from antennate.experiments.force.loads import Points
-from antennate.experiments.force.run import ForceOutcome, ProfileOutcome
+from antennate.experiments.force.run import ForceOutcome
 from antennate.studies.measures import Measure
 
 
-def figures(outcome: ForceOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"force": study(outcome.result(), outcome.profiles)}
-
-
 @style.styled
-def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figure:
+def figures(outcome: ForceOutcome) -> dict[str, Figure]:
     """Force over flex at rest and on the move, and the share of force explained.
 
-    Args:
-        result: The content of result.json.
-        profiles: The points of every profile; those of `descending`, or of the first, are drawn.
+    The points are those of `descending`, or of the first profile.
     """
-    figure = style.canvas(style.WIDTH, 12.0)
+    figure, result, profiles = style.canvas(style.WIDTH, 12.0), outcome.result(), outcome.profiles
     rest, move, ranges, shares = figure.subplots(4, 1)
     shown = next((p for p in profiles if p.profile == "descending"), profiles[0])
     scale = ScalarMappable(Normalize(result["from_place"], 1.0), "viridis")
@@ -44,7 +37,7 @@ def study(result: Mapping[str, Any], profiles: Sequence[ProfileOutcome]) -> Figu
     figure.colorbar(scale, ax=[rest, move], label=label, **style.above(figure))
     _draw_ranges(ranges, result)
     _draw_shares(shares, result)
-    return figure
+    return {"force": figure}
 
 
 def _scatter(

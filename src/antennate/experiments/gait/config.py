@@ -10,7 +10,14 @@ from pydantic import model_validator
 from antennate.control.readers import unread_lift
 from antennate.errors import ConfigError
 from antennate.experiments.gait.unknown import Unknown, changed
-from antennate.params.base import GATHERED, Params, number, require_different, require_whole_steps
+from antennate.params.base import (
+    GATHERED,
+    Params,
+    number,
+    require_default,
+    require_different,
+    require_whole_steps,
+)
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.readers import HARDWARE_ALONE, unused
@@ -75,9 +82,8 @@ class GaitStudyConfig(Params):
     @model_validator(mode="after")
     def _agree(self) -> GaitStudyConfig:
         require_whole_steps("rate", self.rate, self.physics.timestep)
-        for name in () if self.unknown else _OF_UNKNOWN:
-            if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f"{name}: expected the default, as all is known, found another")
+        if not self.unknown:
+            require_default(self, "all is known", *_OF_UNKNOWN)
         unknowns = self.unknowns
         require_different("unknown", [one.name for one in unknowns])
         for one in unknowns:

@@ -25,12 +25,7 @@ def figures(outcome: GaitOutcome) -> dict[str, Figure]:
 
 @style.styled
 def study(result: Mapping[str, Any], walks: Mapping[str, Walk]) -> Figure:
-    """The sweep over the lead of the body wave, and the maneuvers from above.
-
-    Args:
-        result: The content of result.json.
-        walks: The four maneuvers by name.
-    """
+    """The sweep over the lead of the body wave, and the maneuvers from above."""
     figure = style.canvas(style.WIDTH, 7.2)
     sweep, plan = figure.subplots(2, 1)
     _draw_sweep(sweep, result)
@@ -94,11 +89,7 @@ def _draw_plan(panel: Axes, result: Mapping[str, Any], walks: Mapping[str, Walk]
 
 @style.styled
 def unknown(result: Mapping[str, Any]) -> Figure:
-    """FORWARD over all draws of the unknown numbers, and over each of them alone.
-
-    Args:
-        result: The content of result.json.
-    """
+    """FORWARD over all draws of the unknown numbers, and over each of them alone."""
     heights = 2.8, 0.36 * len(result["unknown"]["parameters"]) + 1.2
     figure = style.canvas(style.WIDTH, sum(heights))
     draws, alone = figure.subplots(2, 1, height_ratios=heights)

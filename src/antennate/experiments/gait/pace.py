@@ -23,7 +23,6 @@ class Walk:
 
     Attributes:
         name: A maneuver in small letters, `wave_off`, or `sweep` and its number.
-        gait: The gait that was walked.
         t: Times of the ticks [s], shape (n,).
         head: Plan positions of the head [m], shape (n, 2).
         centre: Mean of the links [m], shape (n, 2).

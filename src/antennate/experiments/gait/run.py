@@ -180,15 +180,7 @@ def walk_flat(
     watch: Watch = lambda world, frame: None,
     logs: Path | None = None,
 ) -> Walk:
-    """Walk one maneuver on the flat floor from a straight start.
-
-    Args:
-        config: The study.
-        name: Name of the walk.
-        gait: The gait.
-        maneuver: The maneuver.
-        watch: Takes world and frame after each tick.
-        logs: Folder for its log, None for no log.
+    """Walk one maneuver on the flat floor from a straight start; its log goes to a folder `logs`.
 
     Raises:
         SimulationError: The physics became invalid.

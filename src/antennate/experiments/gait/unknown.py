@@ -27,8 +27,6 @@ class Unknown:
 
     Attributes:
         name: The parameter, dotted.
-        low: Lower end.
-        high: Upper end.
     """
 
     name: str

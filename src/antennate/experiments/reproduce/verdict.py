@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from antennate.studies.statistics import wilson95
 
 Verdict = Literal["reproduced", "conditional", "not_reproduced", "undecided"]
-VERDICTS: Mapping[Verdict, str] = {
-    "reproduced": "reproduced",
-    "conditional": "conditional",
-    "not_reproduced": "not reproduced",
-    "undecided": "undecided",
-}
+VERDICTS: Mapping[Verdict, str] = {name: name.replace("_", " ") for name in get_args(Verdict)}
 """Verdicts and what people read."""
 
 
@@ -78,7 +73,6 @@ class Bar:
 
     Attributes:
         label: Whose number it is.
-        value: The number.
         interval: Its 95 % interval, None without one.
     """
 
@@ -93,7 +87,6 @@ class Finding:
 
     Attributes:
         ours: Our numbers, in words.
-        verdict: The verdict.
         reason: Why, and for `conditional` under which condition.
         bars: The paper's numbers and ours, in the claim's unit; the paper's first.
     """
@@ -126,6 +119,18 @@ class Claim:
     experiment: str
     unit: str
     judge: Callable[[Mapping[str, Any]], Finding]
+
+
+def claim(
+    experiment: str, unit: str, paper: str, rule: str
+) -> Callable[[Callable[[Mapping[str, Any]], Finding]], Claim]:
+    """Make a function that judges the claim which its docstring states; the claim has its name."""
+
+    def made(judge: Callable[[Mapping[str, Any]], Finding]) -> Claim:
+        text = (judge.__doc__ or "").removesuffix(".")
+        return Claim(judge.__name__, text, paper, rule, experiment, unit, judge)
+
+    return made
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,9 @@ from typing import Any
 
 from antennate.experiments.reproduce.verdict import (
     Bar,
-    Claim,
     Finding,
     above,
+    claim,
     counted,
     judged,
     share_of,
@@ -39,7 +39,15 @@ def _lead(pair: Mapping[str, Any]) -> tuple[float, float]:
     return 100 * max(first - second - half, -1.0), 100 * min(first - second + half, 1.0)
 
 
-def _stiff(result: Mapping[str, Any]) -> Finding:
+@claim(
+    "wall",
+    "% of trials that jam",
+    "jams",
+    "Conditional if most trials jam; no more, as we chose the base angle. Undecided if the "
+    "95 % interval of the share reaches to both sides of 50 %.",
+)
+def stiff_jams(result: Mapping[str, Any]) -> Finding:
+    """A stiff antenna jams at a wall of boulders."""
     row = result["profiles"]["stiff"]
     share, interval = share_of(row, "jams")
     return Finding(
@@ -50,7 +58,15 @@ def _stiff(result: Mapping[str, Any]) -> Finding:
     )
 
 
-def _soft(result: Mapping[str, Any]) -> Finding:
+@claim(
+    "wall",
+    "% of trials that slip",
+    "slips",
+    "Conditional if most trials slip; no more, as we chose the base angle. Undecided if the "
+    "95 % interval of the share reaches to both sides of 50 %.",
+)
+def soft_slips(result: Mapping[str, Any]) -> Finding:
+    """A soft antenna slips at a wall of boulders."""
     row = result["profiles"]["compliant"]
     share, interval = share_of(row, "slips")
     return Finding(
@@ -65,7 +81,15 @@ def _soft(result: Mapping[str, Any]) -> Finding:
     )
 
 
-def _descending(result: Mapping[str, Any]) -> Finding:
+@claim(
+    "wall",
+    "% of trials that pass",
+    "passes",
+    "Conditional if more than 80 % pass; no more, as we chose the base angle. Undecided if the "
+    "95 % interval of the share reaches to both sides of 80 %.",
+)
+def descending_passes(result: Mapping[str, Any]) -> Finding:
+    """An antenna stiff at the base and soft at the tip passes a wall of boulders."""
     row = result["profiles"]["descending"]
     share, interval = share_of(row)
     return Finding(
@@ -76,7 +100,16 @@ def _descending(result: Mapping[str, Any]) -> Finding:
     )
 
 
-def _taper(result: Mapping[str, Any]) -> Finding:
+@claim(
+    "wall",
+    "% of trials that pass",
+    "no controls",
+    "Conditional if its share that passes is more than 50 points above that of each control; "
+    "no more, as we chose the angle. Undecided if the 95 % interval of the smaller difference, "
+    "of trials on the same walls, reaches to both sides of 50 points.",
+)
+def taper_decides(result: Mapping[str, Any]) -> Finding:
+    """It is the descending stiffness that lets it pass."""
     names = ("descending", "matched_uniform", "ascending")
     ours, uniform, ascending = rows = [result["profiles"][name] for name in names]
     leads = [_lead(result["paired"].get(f"descending-{name}", _NO_PAIR)) for name in names[1:]]
@@ -89,7 +122,15 @@ def _taper(result: Mapping[str, Any]) -> Finding:
     )
 
 
-def _bend(result: Mapping[str, Any]) -> Finding:
+@claim(
+    "wall",
+    "deg, one spring",
+    "below 30°",
+    "Conditional if no spring of the antenna that passes, the descending one, reaches 30° in "
+    "any trial; no more, as we chose the base angle.",
+)
+def bend(result: Mapping[str, Any]) -> Finding:
+    """Springs bend by less than 30° in use."""
     rows = result["profiles"]
     angles = {
         n: row["hinge_max_deg"] for n, row in rows.items() if row["hinge_max_deg"] is not None
@@ -108,56 +149,4 @@ def _bend(result: Mapping[str, Any]) -> Finding:
     )
 
 
-WALL = (
-    Claim(
-        "stiff_jams",
-        "A stiff antenna jams at a wall of boulders",
-        "jams",
-        "Conditional if most trials jam; no more, as we chose the base angle. Undecided if the "
-        "95 % interval of the share reaches to both sides of 50 %.",
-        "wall",
-        "% of trials that jam",
-        _stiff,
-    ),
-    Claim(
-        "soft_slips",
-        "A soft antenna slips at a wall of boulders",
-        "slips",
-        "Conditional if most trials slip; no more, as we chose the base angle. Undecided if the "
-        "95 % interval of the share reaches to both sides of 50 %.",
-        "wall",
-        "% of trials that slip",
-        _soft,
-    ),
-    Claim(
-        "descending_passes",
-        "An antenna stiff at the base and soft at the tip passes a wall of boulders",
-        "passes",
-        "Conditional if more than 80 % pass; no more, as we chose the base angle. Undecided if the "
-        "95 % interval of the share reaches to both sides of 80 %.",
-        "wall",
-        "% of trials that pass",
-        _descending,
-    ),
-    Claim(
-        "taper_decides",
-        "It is the descending stiffness that lets it pass",
-        "no controls",
-        "Conditional if its share that passes is more than 50 points above that of each control; "
-        "no more, as we chose the angle. Undecided if the 95 % interval of the smaller difference, "
-        "of trials on the same walls, reaches to both sides of 50 points.",
-        "wall",
-        "% of trials that pass",
-        _taper,
-    ),
-    Claim(
-        "bend",
-        "Springs bend by less than 30° in use",
-        "below 30°",
-        "Conditional if no spring of the antenna that passes, the descending one, reaches 30° in "
-        "any trial; no more, as we chose the base angle.",
-        "wall",
-        "deg, one spring",
-        _bend,
-    ),
-)
+WALL = (stiff_jams, soft_slips, descending_passes, taper_decides, bend)

@@ -14,26 +14,15 @@ from antennate.experiments.ringdown.run import ANIMAL_CYCLE, REJECTED, RingdownO
 from antennate.types import Floats
 
 
-def figures(outcome: RingdownOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"ringdown": ringdown(outcome.result(), outcome.t, outcome.tip)}
-
-
 @style.styled
-def ringdown(result: Mapping[str, Any], t: Floats, tip: Floats) -> Figure:
-    """Three panels of one antenna.
-
-    Args:
-        result: The content of result.json.
-        t: Times [s], shape (m,).
-        tip: Place of the tip over that at the start, shape (m,).
-    """
-    figure = style.canvas(style.WIDTH, 9.6)
+def figures(outcome: RingdownOutcome) -> dict[str, Figure]:
+    """Three panels of one antenna."""
+    figure, result = style.canvas(style.WIDTH, 9.6), outcome.result()
     swing, beside, cones = figure.subplots(3, 1)
-    _draw_swing(swing, result, t, tip)
+    _draw_swing(swing, result, outcome.t, outcome.tip)
     _draw_animals(beside, result)
     _draw_cones(cones, result)
-    return figure
+    return {"ringdown": figure}
 
 
 def _draw_swing(panel: Axes, result: Mapping[str, Any], t: Floats, tip: Floats) -> None:

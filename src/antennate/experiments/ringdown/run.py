@@ -36,7 +36,6 @@ class Animal:
     """What was measured on an animal's antenna or whisker.
 
     Attributes:
-        name: Which.
         source: Where it was read.
         natural_hz: Lowest and highest frequency [Hz], None where no number was published.
         damping: Lowest and highest damping ratio, None where no number was published.
@@ -112,7 +111,6 @@ class RingdownOutcome(Outcome):
     """A ring-down and its modes.
 
     Attributes:
-        config: What was asked.
         t: Times [s], shape (m,).
         tip: Sideways place of the tip over that at the start, shape (m,).
         engine: First mode fitted to the engine's ring-down.
@@ -165,10 +163,6 @@ def _mode(mode: Mode) -> dict[str, float]:
 
 def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
     """Bend the compiled antenna as a load on its tip does, let it go and record it.
-
-    Args:
-        config: What is run.
-        watch: Looks at the bench before each physics step.
 
     Raises:
         ConfigError: A file of another antenna cannot be used.

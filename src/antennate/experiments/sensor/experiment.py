@@ -50,7 +50,6 @@ class SensorOutcome(Outcome):
     """What the sensor says.
 
     Attributes:
-        config: What was asked.
         flex: Bends of the static curve [rad], shape (n,).
         loop: Bend [rad] and reading without noise [counts] over one loop after one, shape (k, 2).
         hold: Time [s], reading [counts] with noise and without, bend held from 0 on, shape (m, 3).

@@ -14,31 +14,15 @@ from antennate.experiments.sensor.experiment import SensorOutcome
 from antennate.types import Floats
 
 
-def figures(outcome: SensorOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    found = (outcome.loop, outcome.hold, outcome.resistors, outcome.spread)
-    return {"sensor": sensor(outcome.result(), *found)}
-
-
 @style.styled
-def sensor(
-    result: Mapping[str, Any], loop: Floats, hold: Floats, resistors: Floats, spread: Floats
-) -> Figure:
-    """Three panels of one sensor.
-
-    Args:
-        result: The content of result.json.
-        loop: Bend [rad] and reading [counts] over a loop, shape (k, 2).
-        hold: Time [s], reading with noise and without [counts], shape (m, 3).
-        resistors: Fixed resistors [Ohm], shape (r,).
-        spread: Spread of readings with each [counts], shape (r,).
-    """
-    figure = style.canvas(style.WIDTH, 8.7)
+def figures(outcome: SensorOutcome) -> dict[str, Figure]:
+    """Three panels of one sensor."""
+    figure, result = style.canvas(style.WIDTH, 8.7), outcome.result()
     curve, held, choice = figure.subplots(3, 1)
-    _draw_curve(curve, result, loop)
-    _draw_hold(held, hold)
-    _draw_choice(choice, result, resistors, spread)
-    return figure
+    _draw_curve(curve, result, outcome.loop)
+    _draw_hold(held, outcome.hold)
+    _draw_choice(choice, result, outcome.resistors, outcome.spread)
+    return {"sensor": figure}
 
 
 def _draw_curve(panel: Axes, result: Mapping[str, Any], loop: Floats) -> None:

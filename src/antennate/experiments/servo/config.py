@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, require_default
 from antennate.robots.servos import ServoName, ServoParams, ServosParams
 
 
@@ -41,10 +41,6 @@ class ServoConfig(Params):
 
     @model_validator(mode="after")
     def _agree(self) -> ServoConfig:
-        for name, field in ServosParams.model_fields.items():
-            if name != self.servo and getattr(self.servos, name) != field.default:
-                raise ValueError(
-                    f"servos.{name}: expected the default, as the servo is {self.servo}, found "
-                    "another"
-                )
+        others = (f"servos.{name}" for name in ServosParams.model_fields if name != self.servo)
+        require_default(self, f"the servo is {self.servo}", *others)
         return self

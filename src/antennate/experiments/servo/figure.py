@@ -15,13 +15,8 @@ _MOST = 8
 """Recordings drawn."""
 
 
-def figures(outcome: ServoOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"servo": servo(outcome)}
-
-
 @style.styled
-def servo(outcome: ServoOutcome) -> Figure:
+def figures(outcome: ServoOutcome) -> dict[str, Figure]:
     """Each recording with two models, the simplest and that of the simulation or of its form."""
     count = min(_MOST, len(outcome.recordings))
     figure = style.canvas(style.WIDTH, 1.0 + 1.6 * count)
@@ -30,9 +25,8 @@ def servo(outcome: ServoOutcome) -> Figure:
     for i, panel in enumerate(panels):
         _draw(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
-    return figure
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return {"servo": figure}
 
 
 def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:

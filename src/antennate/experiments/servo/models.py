@@ -24,7 +24,6 @@ class Model:
     """A servo model: where its parameters begin, and which of them are fitted.
 
     Attributes:
-        name: What it is called.
         values: Parameters, shape (6,).
         free: Names of those that are fitted.
     """
@@ -39,17 +38,8 @@ class Model:
         return np.array([name in self.free for name in NAMES])
 
 
-@dataclass(frozen=True)
-class Held:
-    """A part that a fit did not see.
-
-    Attributes:
-        name: What was left out.
-        parts: Its pieces, shape (F, K).
-    """
-
-    name: str
-    parts: Bools
+Held = tuple[str, Bools]
+"""A part that a fit did not see: what was left out, and its pieces, shape (F, K)."""
 
 
 def told_divisor(recordings: list[Recording]) -> float | None:
@@ -104,16 +94,14 @@ def splits(recordings: list[Recording], parts: Bools) -> list[Held]:
     """
     gains = np.array([each.p_gain for each in recordings])
     if len(np.unique(gains)) > 1:
-        return [
-            Held(f"gain {gain:g}", parts & (gains == gain)[:, None]) for gain in np.unique(gains)
-        ]
+        return [(f"gain {gain:g}", parts & (gains == gain)[:, None]) for gain in np.unique(gains)]
     if len(recordings) > 1:
         own = np.eye(len(recordings), dtype=bool)
-        return [Held(each.name, parts & own[i][:, None]) for i, each in enumerate(recordings)]
+        return [(each.name, parts & own[i][:, None]) for i, each in enumerate(recordings)]
     if parts.sum() < 2:
         return []
     late = np.arange(parts.shape[1]) >= parts.sum() / 2
-    return [Held("first half", parts & ~late), Held("second half", parts & late)]
+    return [("first half", parts & ~late), ("second half", parts & late)]
 
 
 def with_told(row: Model, told: float | None) -> Model:

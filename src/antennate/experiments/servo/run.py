@@ -31,8 +31,6 @@ class ServoOutcome(Outcome):
     """What the models made of the recordings.
 
     Attributes:
-        config: What was asked.
-        recordings: The recordings.
         data: The same on one grid of times.
         models: Rows of the table, simple ones first; the last is the whole model.
         fitted: Parameters of each from all recordings, shape (M, 6).
@@ -74,7 +72,7 @@ class ServoOutcome(Outcome):
                     "error_deg": float(np.degrees(self.errors[i])),
                     "held_out_deg": dict(
                         zip(
-                            [held.name for held in self.held],
+                            [name for name, _ in self.held],
                             np.degrees(self.held_errors[i]).tolist(),
                             strict=True,
                         )
@@ -135,7 +133,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     parts, loaded = data.parts(), any(each.mass * each.length > 0 for each in recordings)
     rows = models(config, told_divisor(recordings), loaded)
     held = splits(recordings, parts) if config.fit else []
-    seen = [parts, *(parts & ~each.parts for each in held)]
+    seen = [parts, *(parts & ~out for _, out in held)]
     total = len(seen) + bool(held)
     fits: list[Floats] = []
     for done, part in enumerate(seen):
@@ -150,8 +148,8 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         interval[last] = _intervals(recordings, data, fits[0][last], rows[last])
     on_step(total, total)
     judged = [
-        fitting.errors(data, fits[i + 1], _same(each.parts, len(rows)))
-        for i, each in enumerate(held)
+        fitting.errors(data, fits[i], _same(out, len(rows)))
+        for i, (_, out) in enumerate(held, start=1)
     ]
     every = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T

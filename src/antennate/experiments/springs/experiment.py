@@ -26,7 +26,6 @@ class SpringsOutcome(Outcome):
     """The springs as they are, and sets that could be wound.
 
     Attributes:
-        config: What was asked.
         windings: The best set of each stock wire, the smallest error first.
     """
 

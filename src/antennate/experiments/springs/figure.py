@@ -16,23 +16,14 @@ _SHOWN = 5
 """Sets of springs drawn."""
 
 
-def figures(outcome: SpringsOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"springs": springs(outcome.result())}
-
-
 @style.styled
-def springs(result: Mapping[str, Any]) -> Figure:
-    """Torque of each spring up to its yield, and the errors of what could be wound instead.
-
-    Args:
-        result: The content of result.json.
-    """
-    figure = style.canvas(style.WIDTH, 7.4)
+def figures(outcome: SpringsOutcome) -> dict[str, Figure]:
+    """Torque of each spring up to its yield, and the errors of what could be wound instead."""
+    figure, result = style.canvas(style.WIDTH, 7.4), outcome.result()
     torque, wound = figure.subplots(2, 1)
     _draw_torque(torque, result)
     _draw_windings(wound, result)
-    return figure
+    return {"springs": figure}
 
 
 def _draw_torque(panel: Axes, result: Mapping[str, Any]) -> None:

@@ -46,7 +46,7 @@ def effects(
     names: Sequence[str],
     response: str | None,
 ) -> list[dict[str, Any]]:
-    """The effects of each parameter, on conditions and on their differences.
+    """The effects of each parameter, on conditions, which are `names`, and on their differences.
 
     Of a random and a Sobol plan they are slopes (`regression.slopes`), of a grid and a list there
     are none.
@@ -59,14 +59,6 @@ def effects(
     1993). A strong cause raises the noise, so that weak ones may be missed; it finds none that is
     not there. From one
     trial a point nothing can be said: `noise` and `above_noise` are None.
-
-    Args:
-        config: The study.
-        axes: What varies.
-        by_cell: Rows of each point and condition.
-        points: Values of what varies.
-        names: Conditions.
-        response: What is compared.
     """
     if config.plan in ("grid", "list") or response is None or not by_cell:
         return []

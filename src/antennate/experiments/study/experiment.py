@@ -57,7 +57,7 @@ def _points(result: Mapping[str, Any]) -> Table:
         (
             str(number),
             [
-                *(_value(of[0]["values"][axis]) for axis in shown_axes),
+                *(labels.text(of[0]["values"][axis]) for axis in shown_axes),
                 *(labels.cell(measure, c["response"], c["response95"]) for c in of),
             ],
         )
@@ -78,12 +78,6 @@ def _ended(result: Mapping[str, Any]) -> str:
     if not result["interrupted"]:
         return planned
     return f"{result['ended']} of {planned}"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return " ".join(map(_value, value))
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _effects(result: Mapping[str, Any]) -> Table:
@@ -129,9 +123,7 @@ def sentence(result: Mapping[str, Any]) -> str:
         text += f"; successes over all of them (95 % interval): {', '.join(rates)}"
     if result["effects"]:
         text += f". {_depends(result)}"
-    bad = {name: n for name, n in result["statuses"].items() if name != "ok"}
-    text += "." if not bad else f". Trials that say nothing: {_counted(bad)}; trials.csv has why."
-    return text
+    return f"{text}{labels.silent(result['statuses'])}."
 
 
 def _depends(result: Mapping[str, Any]) -> str:
@@ -148,10 +140,6 @@ def _depends(result: Mapping[str, Any]) -> str:
     if not found or any(effect.get("above_noise") is None for effect in found):
         return f"Of {of} no noise is known, so nothing tells what {what} depends on"
     return f"Of {len(found)} parameters nothing moves {what} above the noise of {of}"
-
-
-def _counted(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{n} {name}" for name, n in counts.items())
 
 
 CAPTIONS = {

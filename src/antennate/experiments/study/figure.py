@@ -5,6 +5,7 @@ Panels stand below one another, so that a figure can be read on a phone.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,6 +27,7 @@ _MOST_COLUMNS = 5
 _LINE = 0.135
 """Height of a line of small text [inches]."""
 Result = Mapping[str, Any]
+_text = functools.partial(labels.text, digits=3)
 
 
 def figures(outcome: StudyOutcome) -> dict[str, Figure]:
@@ -221,9 +223,3 @@ def lines(result: Result) -> Figure:
 
 def _rest(told: Mapping[str, str], cell: Result, others: Sequence[str]) -> str:
     return ", ".join(f"{told[o]} {_text(cell['values'][o])}" for o in others)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return " ".join(map(_text, value))
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

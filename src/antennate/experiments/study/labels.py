@@ -33,12 +33,7 @@ def measure(result: Mapping[str, Any]) -> Measure:
 
 
 def measure_of(experiment: str, column: str) -> Measure:
-    """The measure of an experiment that is kept in a column, or the column in words.
-
-    Args:
-        experiment: Its name, or the function that measures.
-        column: Its name in `trials.csv`.
-    """
+    """The measure of an experiment that is kept in a column, or the column in words."""
     if column == SUCCESS:
         return _SHARE
     known = _experiment(experiment)
@@ -79,6 +74,19 @@ def axis(result: Mapping[str, Any], path: str) -> str:
         return name.replace("_", " ")
     said = "_" + unit.lower().replace("·", "_").replace("/", "_per_")
     return f"{name.removesuffix(said).replace('_', ' ')} [{unit}]"
+
+
+def text(value: Any, digits: int = 4) -> str:
+    """A value of a point as shown; a list as its entries."""
+    if isinstance(value, list | tuple):
+        return " ".join(text(each, digits) for each in value)
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def silent(statuses: Mapping[str, int]) -> str:
+    """What is said of trials that say nothing, empty if all are ok."""
+    told = ", ".join(f"{n} {name}" for name, n in statuses.items() if name != "ok")
+    return f". Trials that say nothing: {told}; trials.csv has why" if told else ""
 
 
 def _is_group(model: Any) -> bool:

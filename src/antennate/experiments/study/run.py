@@ -41,10 +41,8 @@ class StudyOutcome:
     """All rows, point by point.
 
     Attributes:
-        config: What was run.
         points: The points of the plan.
         condition: Column that tells the condition of a row; empty without.
-        axes: What varies.
         rows: One for each trial, all with the same keys.
         total: Trials of the whole plan.
         ended: Those of them that have ended.
@@ -281,8 +279,13 @@ def _table(
         for place, rows in in_order
         for row in rows
     ]
-    columns = dict.fromkeys(name for row in whole for name in row if name not in (STATUS, REASON))
-    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in whole]
+    return aligned(whole)
+
+
+def aligned(rows: Rows) -> Rows:
+    """The same rows, each with the columns of all, status and reason last."""
+    columns = dict.fromkeys(name for row in rows for name in row if name not in (STATUS, REASON))
+    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in rows]
 
 
 def cells(point: Point) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -37,50 +37,6 @@ FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.
 
 
 EmitRows = Callable[[int, Rows], None]
-
-
-class Subject(Protocol):
-    """What is run at each point.
-
-    Attributes:
-        model: Class of its configuration, None if it takes any parameters.
-        condition: Column of its rows that tells the condition; empty without.
-        most: Trials that may be run at once.
-    """
-
-    model: type[Params] | None
-    condition: str
-    most: int
-
-    def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Any:
-        """Its configuration from nested values; those allowed may differ though nothing reads them.
-
-        Raises:
-            ConfigError: A value cannot be used.
-        """
-        ...
-
-    def check(self, config: Any) -> None:
-        """Raise if a configuration cannot be run."""
-        ...
-
-    def every(self, config: Any) -> Sequence[Trial]:
-        """All trials of a configuration."""
-        ...
-
-    def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
-        """Run some trials; emit the index and the rows of each."""
-        ...
-
-    def run_on_device(
-        self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
-    ) -> None:
-        """The same on a GPU or another device of Warp.
-
-        Raises:
-            ConfigError: It has no batches, or there is no such device.
-        """
-        ...
 
 
 def find(name: str, axes: Collection[str] = ()) -> Subject:
@@ -197,6 +153,13 @@ def nested(point: Point) -> dict[str, Any]:
 
 
 class _OfExperiment:
+    """An experiment, trial by trial if it has trials, else as a whole.
+
+    Attributes:
+        condition: Column of its rows that tells the condition; empty without.
+        most: Trials that may be run at once.
+    """
+
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
         self._experiment, self._trials = experiment, experiment.trials
         self.model: type[Params] | None = experiment.config
@@ -204,6 +167,11 @@ class _OfExperiment:
         self.most = self._trials.most if self._trials else 1
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
+        """Its configuration from nested values; those allowed may differ though nothing reads them.
+
+        Raises:
+            ConfigError: A value cannot be used.
+        """
         model = self._experiment.config
         text = json.dumps(with_bases(values, model, Path()), default=_plain)
         try:
@@ -219,6 +187,7 @@ class _OfExperiment:
         return self._trials.every(config) if self._trials else [("", 0)]
 
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
+        """Run some trials; emit the index and the rows of each."""
         if self._trials is not None:
             self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
             return
@@ -228,12 +197,19 @@ class _OfExperiment:
     def run_on_device(
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
+        """The same on a GPU or another device of Warp.
+
+        Raises:
+            ConfigError: It has no batches, or there is no such device.
+        """
         if self._trials is None or self._trials.run_on_device is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 
 
 class _OfFunction:
+    """A function trial(config, seed) -> row; it takes any parameters."""
+
     model: type[Params] | None = None
     condition = ""
     most = 1
@@ -249,7 +225,7 @@ class _OfFunction:
     def check(self, config: Any) -> None:
         pass
 
-    def every(self, config: Mapping[str, Any]) -> Sequence[Trial]:
+    def every(self, config: Any) -> Sequence[Trial]:
         return [("", seed) for seed in range(config.get("trials", 1))]
 
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
@@ -261,6 +237,10 @@ class _OfFunction:
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
         raise ConfigError(f"{NO_BATCHES}; a function of your own has none")
+
+
+Subject = _OfExperiment | _OfFunction
+"""What is run at each point."""
 
 
 def _plain(value: Any) -> Any:

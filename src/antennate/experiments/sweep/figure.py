@@ -29,19 +29,13 @@ _CUE_NAMES = {
 }
 
 
-def figures(outcome: SweepOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"sweep": study(outcome.result())}
-
-
 @style.styled
-def study(result: Mapping[str, Any]) -> Figure:
+def figures(outcome: SweepOutcome) -> dict[str, Figure]:
     """Time shares of the shapes with the base fixed and moving, and the errors.
 
-    Args:
-        result: The content of result.json; the map of its `profile`, or of the first, is drawn.
+    The map is that of the `profile` of the estimates, or of the first profile.
     """
-    figure = style.canvas(style.WIDTH, 14.0)
+    figure, result = style.canvas(style.WIDTH, 14.0), outcome.result()
     upper, lower = np.array(figure.subfigures(2, 1, height_ratios=(1.25, 1)))
     name = (
         result["profile"] if result["profile"] in result["shapes"] else next(iter(result["shapes"]))
@@ -69,9 +63,8 @@ def study(result: Mapping[str, Any]) -> Figure:
         published = result["published_percent"][key]
         panel.axhline(published, color=style.INK, linewidth=1, linestyle=(0, (4, 2)))
         panel.set_title(f"{what}, with sensor noise (95 %);\ndashed: CITRAS, {published:g} %{note}")
-    handles, labels = panels[0].get_legend_handles_labels()
-    lower.legend(handles, labels, loc="outside lower center", ncols=1)
-    return figure
+    lower.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=1)
+    return {"sweep": figure}
 
 
 def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]]) -> None:

@@ -59,7 +59,6 @@ class SweepOutcome:
     """The map and the estimates.
 
     Attributes:
-        config: What was run.
         cells: Rows of the map in the order of profile, motion, distance, centre and amplitude.
         trials: Sweeps of the estimates in the order of condition, split, trial and side.
         outlines: Points of the antenna in each cell of `profile`, if they were to be saved.

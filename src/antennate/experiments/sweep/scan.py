@@ -66,7 +66,6 @@ class Trace:
         flex: Summed hinge angles under the flex sensor [rad].
         offset: Angle of the tip, seen from the base, off the base's direction [rad].
         reach: Distance from base to tip [m].
-        touching: Whether the antenna touches the wall.
         points: A point on the base before the first hinge, the hinges and the tip [m], of shape
             (n, hinges + 2, 2).
         reason: Why the trial is invalid, or empty.

@@ -37,7 +37,6 @@ class TaperOutcome(Outcome):
     """A taper and two ladders.
 
     Attributes:
-        config: What was asked.
         diameter: Diameters base to tip [m], shape (n,).
         proxy: Stiffness of each segment over that of the base, shape (n,).
         stretches: The same for one stretch for each spring of the ladder, shape (m,).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,19 +16,10 @@ _LADDER, _SUGGESTED = style.PROFILE_LOOKS["descending"][0], "#56B4E9"
 """The ladder is that of the descending profile, unless told otherwise; no profile has the other."""
 
 
-def figures(outcome: TaperOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"taper": taper(outcome.result())}
-
-
 @style.styled
-def taper(result: Mapping[str, Any]) -> Figure:
-    """The proxy of the animal, its stretches, the ladder, and the ladder that follows it best.
-
-    Args:
-        result: The content of result.json.
-    """
-    figure = style.canvas(style.WIDTH, 3.8)
+def figures(outcome: TaperOutcome) -> dict[str, Figure]:
+    """The proxy of the animal, its stretches, the ladder, and the ladder that follows it best."""
+    figure, result = style.canvas(style.WIDTH, 3.8), outcome.result()
     panel = figure.subplots()
     segments = np.array([row["proxy"] for row in result["segments"]])
     places = (np.arange(len(segments)) + 0.5) / len(segments)
@@ -54,7 +44,7 @@ def taper(result: Mapping[str, Any]) -> Figure:
         ylabel="stiffness over that of the base",
     )
     panel.legend(loc="lower left", fontsize=8)
-    return figure
+    return {"taper": figure}
 
 
 def _steps(panel: Axes, values: list[float], colour: Any, line: Any, label: str) -> None:

@@ -34,11 +34,7 @@ def figures(outcome: TouchOutcome) -> dict[str, Figure]:
 
 @style.styled
 def measures(result: Mapping[str, Any]) -> Figure:
-    """F1 by speed and by wall, and both latencies by speed, one colour a profile.
-
-    Args:
-        result: The content of result.json.
-    """
+    """F1 by speed and by wall, and both latencies by speed, one colour a profile."""
     figure = style.canvas(style.WIDTH, 11.5)
     by_speed, by_wall, *latencies = figure.subplots(4, 1)
     speeds, walls = result["by_speed"], result["by_wall"]
@@ -62,8 +58,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         panel.set_ylabel(measure.title)
         bottom, top = panel.get_ylim()
         panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
-    handles, labels = by_speed.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    figure.legend(*by_speed.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
@@ -94,11 +89,7 @@ def _draw(
 
 @style.styled
 def curves(result: Mapping[str, Any]) -> Figure:
-    """ROC of the bending level with the default theta, and F1 over theta.
-
-    Args:
-        result: The content of result.json.
-    """
+    """ROC of the bending level with the default theta, and F1 over theta."""
     figure = style.canvas(style.WIDTH, 8.4)
     roc, over = figure.subplots(2, 1, height_ratios=(1.25, 1))
     roc.plot([0, 100], [0, 100], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))

@@ -214,12 +214,7 @@ def _auc(touching: Floats, free: Floats) -> float:
 
 
 def roc(group: Sequence[Comparison], threshold: float) -> dict[str, Any]:
-    """ROC curve of b without hysteresis, and where a threshold lies on it.
-
-    Args:
-        group: Valid traverses.
-        threshold: Theta.
-    """
+    """ROC curve of b without hysteresis, and where a threshold lies on it."""
     truth = np.concatenate([np.zeros(0, dtype=bool), *(v.truth for v in group)])
     level = np.concatenate([np.zeros(0), *(v.level for v in group)])
     touching, free = np.sort(level[truth]), np.sort(level[~truth])

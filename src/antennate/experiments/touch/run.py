@@ -53,10 +53,7 @@ class TouchOutcome:
     """All traverses in the order of walls, speeds, profiles and trials, and what was sensed.
 
     Attributes:
-        config: What was run.
-        traverses: All of them.
         comparisons: For each what was sensed; None where the physics is invalid.
-        summary: The content of result.json.
     """
 
     config: TouchConfig

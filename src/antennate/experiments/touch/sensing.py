@@ -102,7 +102,6 @@ class Comparison:
         alarm: Sensed state, shape (n,).
         level: Logit of b, shape (n,).
         flex: Flex of the engine [rad], shape (n,).
-        matches: Contacts and alarms.
     """
 
     wall: str

@@ -29,7 +29,6 @@ class Plan:
         springs: Drawn factors of the n springs, shape (n,); `antenna` has them.
         overlap: How far the straight tip would stand behind the surface [m].
         site: Where the wall stands; it begins at `wall_start` along the traverse [m].
-        ticks: Number of ticks.
     """
 
     config: TouchConfig
@@ -55,7 +54,6 @@ class Traverse:
     """One traverse as it came out of the engine, tick by tick.
 
     Attributes:
-        plan: Which one.
         x: Way of the carriage [m], shape (n,).
         flex: Summed hinge angles under the flex sensor [rad], shape (n,).
         force: Force of all obstacles on the antenna, mean over the tick [N], shape (n,).

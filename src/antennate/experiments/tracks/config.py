@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, require_default
 
 _FORMAT = r"^[^{}]*\{\}[^{}]*$"
 
@@ -202,27 +202,18 @@ class TracksConfig(Params):
         plain = any(name.lower().endswith(".csv") for name in self.files)
         if not self.files:
             names = ("rate", "playback_rate", "y_down", "points", "columns", "wall")
-            self._refuse(names, "without files")
+            require_default(self, "it is not read without files", *names)
         else:
-            self._refuse(("synthetic",), "with files")
+            require_default(self, "it is not read with files", "synthetic")
         if self.files and not plain:
-            self._refuse(("columns",), "without a .csv file")
+            require_default(self, "it is not read without a .csv file", "columns")
         if self.playback_rate is not None and self.rate is None:
             raise ValueError("playback_rate: expected a rate beside it, found none")
-        unread = ("flex", "offset") if self.files and self.points.count < 3 else ()
-        unread += ("gap",) if self.files and self.wall.kind in ("none", "file") else ()
-        for name in unread:
-            if getattr(self.criteria, name) != CriteriaParams.model_fields[name].default:
+        for name in CriteriaParams.model_fields:
+            if name not in self.read_criteria:
                 why = "without a wall" if name == "gap" else "with two points along an antenna"
-                raise ValueError(f"criteria.{name}: expected the default, as it is not read {why}")
+                require_default(self, f"it is not read {why}", f"criteria.{name}")
         return self
-
-    def _refuse(self, names: tuple[str, ...], why: str) -> None:
-        for name in names:
-            if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(
-                    f"{name}: expected the default, as it is not read {why}; leave it out"
-                )
 
     @property
     def read_criteria(self) -> tuple[str, ...]:

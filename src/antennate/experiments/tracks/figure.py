@@ -25,20 +25,10 @@ _OUTLINES = 40
 _MARKS = dict(zip(SHAPES, ("o", "s", "^", "D"), strict=True))
 
 
-def figures(outcome: TracksOutcome) -> dict[str, Figure]:
-    """The figure of a run."""
-    return {"tracks": study(outcome, outcome.result())}
-
-
 @style.styled
-def study(outcome: TracksOutcome, result: Mapping[str, Any]) -> Figure:
-    """Shares by trial and over trials, outlines of each shape, an angle over time, sensitivity.
-
-    Args:
-        outcome: The antennae.
-        result: The content of result.json.
-    """
-    figure = style.canvas(style.WIDTH, 13.0)
+def figures(outcome: TracksOutcome) -> dict[str, Figure]:
+    """Shares by trial and over trials, outlines of each shape, an angle over time, sensitivity."""
+    figure, result = style.canvas(style.WIDTH, 13.0), outcome.result()
     shares, outlines, angle, change = figure.subplots(4, 1, height_ratios=(1.2, 1.4, 0.9, 1.5))
     shapes = [measures.shapes_of(outcome.config.criteria, one) for one in outcome.antennae]
     _draw_shares(shares, outcome, result)
@@ -52,7 +42,7 @@ def study(outcome: TracksOutcome, result: Mapping[str, Any]) -> Figure:
         for shape, colour in style.SHAPE_COLOURS.items()
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
-    return figure
+    return {"tracks": figure}
 
 
 def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any]) -> None:

@@ -66,14 +66,8 @@ def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track
 
 
 def _csv(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
-    data = read_limited(path, LARGEST)
-    rows = csv_rows(path, data, (), BadInputError)
+    rows = csv_rows(path, read_limited(path, LARGEST), (), BadInputError, ended=True)
     _, header = next(rows)
-    if not data.endswith((b"\n", b"\r")):
-        raise BadInputError(
-            f"{path}: row {len(data.splitlines())}: expected a line break at its end, found none "
-            "(truncated); delete the last row, or add the line break if it is whole"
-        )
     if header[0] == "scorer":
         return _deeplabcut(path, header, rows, names)
     return _plain(path, header, rows, names, columns)

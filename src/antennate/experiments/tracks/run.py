@@ -7,7 +7,7 @@ import hashlib
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +73,6 @@ class TracksOutcome:
         config: What was asked, with the points and the wall of the synthetic animal if it was one.
         rows: A row for each antenna.
         antennae: The antennae in the same order.
-        walls: The wall of each file.
         skipped: Animals known in too few frames.
     """
 
@@ -96,10 +95,7 @@ class TracksOutcome:
             "source": "files" if config.files else "synthetic",
             "synthetic_shapes": None if config.files else config.synthetic.shapes,
             "classified_by": "bend" if config.points.count > 2 else "direction",
-            "wall": {
-                name: {"kind": w.kind, "numbers": w.numbers, "fitted": w.fitted, "rms": w.rms}
-                for name, w in self.walls.items()
-            },
+            "wall": {name: asdict(wall) for name, wall in self.walls.items()},
             "animals": len(counted),
             "skipped": self.skipped,
             "trials_in_contact": len(table),
@@ -293,7 +289,6 @@ def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) 
         name: None if math.isnan(value) else float(value)
         for name, value in zip(SHAPES, share, strict=True)
     }
-    counts = {f.name: animal.counts[f.name] for f in fields(TrackRow) if f.name in animal.counts}
     return TrackRow(
         seed=config.seed,
         trial=one.trial,
@@ -310,5 +305,5 @@ def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) 
         flex_median_rad=median["flex"],
         correct=None if truth is None else float((shape == truth).mean()),
         **classes,
-        **counts,
+        **animal.counts,
     )

@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Union
 
 import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerMaker, make_controller
-from antennate.errors import ConfigError, ControllerError, SceneError, SimulationError
+from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import (
     Outcome,
     TrialMonitor,
     TrialPath,
     TrialResult,
-    Watched,
 )
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
-from antennate.sim.sim_robot import Disturbance, SimRobot
+from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial, require_room
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.pace import Restart
-from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver, Robot
+from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver
+
+if TYPE_CHECKING:
+    from antennate.sim.warp.robot import WarpRobot
 
 BATCH = 24
 """Trials of one process stepped in lockstep. Each pays its share of what all cost together."""
@@ -41,27 +43,8 @@ Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 """Takes world, frame and controller of the first row after each tick; returns events to log."""
 
 
-class Bodies(Robot, Protocol):
-    """Robots in rows that trials are put into: `SimRobot`, or a batch on a device."""
-
-    def load(self, row: int, world: World, chance: Disturbance) -> None:
-        """Put a fresh world into a row."""
-        ...
-
-    def unload(self, row: int) -> None:
-        """Empty a row."""
-        ...
-
-    def world(self, row: int) -> Watched:
-        """The world in a row."""
-        ...
-
-    @property
-    def failures(self) -> Mapping[int, SimulationError]:
-        """What ended simulations, by row."""
-        ...
-
-
+Bodies = Union[SimRobot, "WarpRobot"]
+"""Robots in rows that trials are put into, on the CPU or in a batch on a device."""
 MakeBodies = Callable[[int], tuple[Scene, Bodies]]
 """Takes the number of rows; the scene, drawn so that these robots can be put into it, and them."""
 

@@ -8,14 +8,18 @@ the episode ends, recovered, with the next such gain.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Union
 
 import numpy as np
 
 from antennate.errors import SceneError
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.trial import end_of, progress_of
+from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
+
+if TYPE_CHECKING:
+    from antennate.sim.warp.robot import WarpRow
 
 Outcome = Literal["success", "timeout", "left", "invalid"]
 
@@ -25,34 +29,8 @@ STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
 
 
-class Watched(Protocol):
-    """What is looked at: `World` on the CPU, `WarpRow` in a batch on a device."""
-
-    @property
-    def t(self) -> float:
-        """Time since the start [s]."""
-        ...
-
-    @property
-    def head(self) -> Floats:
-        """Position of the head link [m], shape (3,)."""
-        ...
-
-    def obstacle_force(self) -> float:
-        """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
-        ...
-
-    def links(self) -> Floats:
-        """Plan positions of the links, head first [m], shape (L, 2)."""
-        ...
-
-    def parts(self) -> list[Floats]:
-        """Polygons of all parts of the robot in plan [m], each (n, 2)."""
-        ...
-
-    def outlines(self) -> tuple[list[Floats], list[Floats]]:
-        """Polygons of all obstacles in plan [m]: those fixed, those that can move."""
-        ...
+Watched = Union[World, "WarpRow"]
+"""What is looked at: on the CPU, or in a batch on a device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,17 +55,17 @@ class TrialResult:
     controller: str
     outcome: Outcome
     time_s: float
-    progress_m: float
-    stuck: int
-    recovered: int
-    share_forward: float
-    share_turn_l: float
-    share_turn_r: float
-    share_reverse: float
-    share_hold: float
-    force_mean_n: float
-    force_max_n: float
-    reason: str
+    progress_m: float = 0.0
+    stuck: int = 0
+    recovered: int = 0
+    share_forward: float = 0.0
+    share_turn_l: float = 0.0
+    share_turn_r: float = 0.0
+    share_reverse: float = 0.0
+    share_hold: float = 0.0
+    force_mean_n: float = 0.0
+    force_max_n: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +101,6 @@ class TrialMonitor:
 
     Attributes:
         seed, trial: What decides all chance.
-        controller: Name of the controller.
-        scene: Where it takes place.
         before: Obstacles that can move, at the start, as in `TrialPath`.
         time_limit: Time after which it has failed [s].
     """

@@ -22,7 +22,7 @@ from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
-from antennate.types import AntennaFrame, Controller, Maneuver
+from antennate.types import AntennaFrame, Controller
 
 _Found = tuple[TrialResult, TrialPath | None]
 
@@ -110,16 +110,14 @@ def _run(
     """Run trials, those of one controller in lockstep."""
     places = {(name, trial): i for i, (_, name, trial, _) in enumerate(tasks)}
     config, _, _, logs = tasks[0]
+    run = run or functools.partial(run_trials, logs=logs)
     for name in dict.fromkeys(name for name, _ in places):
         numbers = [trial for controller, trial in places if controller == name]
 
         def take(found: _Found) -> None:
             emit(places[found[0].controller, found[0].trial], found)
 
-        if run is None:
-            run_trials(config, name, numbers, take, logs=logs)
-        else:
-            run(config, name, numbers, take)
+        run(config, name, numbers, take)
 
 
 def _run_batched(
@@ -142,22 +140,8 @@ def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
     if failure.status == "failed":
         raise failure.raised()
     name, number = trial
-    shares = {f"share_{m.name.lower()}": 0.0 for m in Maneuver}
-    row = TrialResult(
-        seed=config.seed,
-        trial=number,
-        controller=name,
-        outcome="invalid",
-        time_s=config.time_limit,
-        progress_m=0.0,
-        stuck=0,
-        recovered=0,
-        **shares,
-        force_mean_n=0.0,
-        force_max_n=0.0,
-        reason=failure.reason,
-    )
-    return row, None
+    key = config.seed, number, name
+    return TrialResult(*key, "invalid", config.time_limit, reason=failure.reason), None
 
 
 def _run_viewed(

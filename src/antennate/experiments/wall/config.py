@@ -8,13 +8,15 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from antennate.antenna.statics import PROFILES, Profile
-from antennate.experiments.wall.way import COMMAND_PERIOD
 from antennate.params.base import Params, number, require_different
 from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.sensor import SensorParams
 from antennate.sim import chain
+
+COMMAND_PERIOD = 0.002
+"""Time between commands to the carriage [s]."""
 
 
 class WallConfig(Params):

@@ -32,11 +32,7 @@ def figures(outcome: WallOutcome) -> dict[str, Figure]:
 
 @style.styled
 def outcomes(result: Mapping[str, Any]) -> Figure:
-    """Outcomes of the trials of each profile, over the whole travel and after the start.
-
-    Args:
-        result: The content of result.json.
-    """
+    """Outcomes of the trials of each profile, over the whole travel and after the start."""
     figure = style.canvas(style.WIDTH, 6.0)
     whole, late = figure.subplots(2, 1)
     profiles = result["profiles"]
@@ -122,11 +118,7 @@ def _draw_boulders(panel: Axes, seen: Traverse) -> None:
 
 @style.styled
 def passages(examples: Mapping[str, Traverse]) -> Figure:
-    """The first trial of every profile: advance of the tip, and shapes along the wall.
-
-    Args:
-        examples: Passages by profile.
-    """
+    """The first trial of every profile: advance of the tip, and shapes along the wall."""
     figure = style.canvas(style.WIDTH, 2.3 * len(examples))
     panels = figure.subplots(len(examples), 2, squeeze=False, sharex="col", sharey="col")
     for (profile, seen), (advance, along) in zip(examples.items(), panels, strict=True):

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna.statics import with_profile
-from antennate.experiments.wall.config import WallConfig
+from antennate.experiments.wall.config import COMMAND_PERIOD, WallConfig
 from antennate.experiments.wall.outcome import SAMPLE_PERIOD, Traverse
-from antennate.experiments.wall.way import COMMAND_PERIOD, from_crest, marks, ramp, spheres
+from antennate.params.bench import WallParams
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import chain
@@ -31,10 +31,8 @@ class Passage:
     """What chance has drawn for a trial, and what follows from it.
 
     Attributes:
-        config: What is run.
         antenna: The antenna, with the trial's friction.
         factors: What each spring's stiffness is multiplied with, shape (n,).
-        balls: The wall.
         base: Angle of the antenna's base [rad].
         approach: Way of the base towards the wall [m].
         crest: Distance of the crests from its start [m].
@@ -118,13 +116,7 @@ def draw(config: WallConfig, profile: str, trial: int) -> Passage:
 
 
 def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatched) -> Traverse:
-    """Move one antenna along the wall.
-
-    Args:
-        config: What is run.
-        profile: Springs of the antenna.
-        trial: Which of its trials.
-        watch: Looks at the bench of the engine; the chain has none.
+    """Move one antenna along the wall; `watch` looks at the bench of the engine, not at the chain.
 
     Raises:
         MissingPackageError: The solver needs a package that is not installed.
@@ -179,3 +171,38 @@ def _on_chain(drawn: Passage) -> Traverse:
     along = np.column_stack([np.full_like(path, drawn.approach), path])
     went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
     return drawn.traverse(came[-1:].joints[-1, -1, 1], went[kept(len(path))])
+
+
+def spheres(
+    wall: WallParams, antenna: AntennaSpec, angle: float, phase: float, crest: float
+) -> list[Ball]:
+    """Spheres all along the way, their crests clear of the tip at first.
+
+    Args:
+        wall: Its numbers.
+        antenna: The antenna that passes.
+        angle: Of the antenna against the way, at its base [rad].
+        phase: How far the first sphere stands on along the way [m].
+        crest: Distance of the crests from the base [m].
+    """
+    pitch = wall.sphere_diameter
+    below = -2 * pitch - max(0.0, -antenna.length * math.cos(angle))
+    above = wall.travel + 1.2 * antenna.length
+    heights = np.arange(below + phase, above, pitch)
+    return [Ball(crest + pitch / 2, float(y), pitch / 2) for y in heights]
+
+
+def from_crest(balls: Sequence[Ball], crest: float) -> Floats:
+    """Centres of spheres from the crest on, and their radii [m], shape (n, 3)."""
+    return np.array([(ball.x - crest, ball.y, ball.radius) for ball in balls])
+
+
+def marks(path: Sequence[float] | Floats) -> set[int]:
+    """Indices on a way at which the antenna's shape is kept: both ends and each tenth between."""
+    return {round(i * (len(path) - 1) / 10) for i in range(11)}
+
+
+def ramp(length: float, speed: float) -> list[float]:
+    """Places of the base on a way of this length [m] at a speed [m/s], one each command period."""
+    count = max(1, math.ceil(length / (speed * COMMAND_PERIOD) - 1e-9))
+    return (length * np.arange(1, count + 1) / count).tolist()

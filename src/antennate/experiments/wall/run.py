@@ -36,7 +36,6 @@ class WallOutcome:
     """All trials of a run.
 
     Attributes:
-        config: What was run.
         rows: Sorted by profile and trial.
         examples: The first trial of every profile.
     """

@@ -8,10 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.experiments.wall.config import WallConfig
+from antennate.experiments.wall.config import COMMAND_PERIOD, WallConfig
 from antennate.experiments.wall.outcome import Traverse, WallTrial, classify, invalid
-from antennate.experiments.wall.passage import SETTLE, Passage, draw, kept
-from antennate.experiments.wall.way import COMMAND_PERIOD, ramp
+from antennate.experiments.wall.passage import SETTLE, Passage, draw, kept, ramp
 from antennate.sim.chain import Motion
 from antennate.sim.warp.benches import WarpBenches
 from antennate.sim.warp.packages import require_device
