@@ -17,11 +17,11 @@ from antennate.messages import one_line
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
-from antennate.telemetry.ticks import numbers_of
-from antennate.telemetry.view.channel import SCENE, SNAPSHOT, STEP, Channel, Step
+from antennate.telemetry.ticks import Tick, numbers_of
+from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
 from antennate.telemetry.view.pace import Pace, Restart
 from antennate.telemetry.view.tuning import Tuning
-from antennate.types import AntennaFrame, Controller
+from antennate.types import AntennaFrame, Contact, Controller
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
@@ -126,25 +126,33 @@ class SimulationView(Pace):
     def redraw(self) -> None:
         """Show where everything is."""
         if self._model is not None and self._data is not None:
-            step = self._step(self._data.time, *self._last)
-            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (STEP, step.pack()))
+            tick = self._tick(self._data.time, *self._last)
+            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick.pack()))
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
         self.tell()
         self.channel.send_whole(SCENE, self._model.shapes().pack())
 
-    def _step(
+    def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
-    ) -> Step:
-        counts = _NOT_A_NUMBER if frame is None else frame.counts[0].tolist()
-        if controller is None:
-            return Step(self._number, t, counts, maneuver)
-        level, contact = controller.level[0].tolist(), controller.contact[0].tolist()
-        phase = numbers_of(controller, "phase")
-        return Step(
-            *(self._number, t, counts, int(controller.maneuver[0]), level, contact),
-            phase[0] if len(phase) == 1 else math.nan,
+    ) -> Tick:
+        left, right = _NOT_A_NUMBER if frame is None else frame.counts[0].tolist()
+        level, contact, phase = _NOT_A_NUMBER, (Contact.UNKNOWN, Contact.UNKNOWN), ()
+        if controller is not None:
+            level, contact = controller.level[0].tolist(), controller.contact[0].tolist()
+            maneuver, phase = int(controller.maneuver[0]), numbers_of(controller, "phase")
+        return Tick(
+            number=self._number,
+            t=t,
+            now=t,
+            counts=(left, right),
+            reading=(left, right),
+            level=level,
+            contact=contact,
+            maneuver=maneuver,
+            phase=phase[0] if len(phase) == 1 else math.nan,
+            angles=(),
         )
 
     def look(self) -> None:
