@@ -95,7 +95,7 @@ def parse(
         if word == "--help-all":
             raise HelpRequest(long_page(page))
     values = read_words(argv, [*others, *parameters])
-    names = fields_of(options)
+    names = fields_of(options).keys() - {*without}
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
     _refuse_alone([each for each in [*others, *parameters] if each.path in values], chosen)
     base: Mapping[str, Any] = {}
