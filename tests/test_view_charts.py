@@ -1,5 +1,6 @@
 """What the charts and the scene of a page are given, without a browser."""
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,7 +9,6 @@ import pytest
 
 from antennate.figures import font
 from antennate.telemetry.ticks import Tick
-from antennate.telemetry.view.channel import Step
 from antennate.telemetry.view.charts import Charts
 from antennate.telemetry.view.scene import arrows
 
@@ -39,8 +39,8 @@ class Panel:
 
 def tick(number: int, t: float, counts: float) -> Tick:
     """A tick of a simulation."""
-    step = Step(number, t, (counts, counts), 1, (0.2, 0.3), (0, 1))
-    return Step.unpack(step.pack())
+    pair = counts, counts
+    return Tick(number, t, t, pair, pair, (0.2, 0.3), (0, 1), 1, math.nan, ())
 
 
 @pytest.fixture

@@ -41,10 +41,15 @@ class RobotOptions(FromFile):
 
 
 @dataclass(frozen=True)
-class PortOptions(RobotOptions):
-    """The same with the bus of the servos."""
+class BusOptions(FromFile):
+    """Where the servos are."""
 
     bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
+
+
+@dataclass(frozen=True)
+class PortOptions(BusOptions, RobotOptions):
+    """Where both are."""
 
 
 Chosen = TypeVar("Chosen", bound=FromFile)
@@ -56,6 +61,7 @@ def parse_robot(
     take: Callable[[RobotFile], Config],
     argv: Sequence[str],
     options: type[Chosen],
+    file_of: Callable[[Path | None], Path | None] = lambda given: given,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command that talks to a robot.
 
@@ -65,6 +71,7 @@ def parse_robot(
         take: What it takes of a robot's file.
         argv: Its words.
         options: Its other options.
+        file_of: Which file is read, of the one that --config names.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -78,8 +85,34 @@ def parse_robot(
         return take(known)
 
     model = type(take(known))
-    config, chosen = parse(command, description, model, argv, options, read)
+    config, chosen = parse(command, description, model, argv, options, read, (), file_of)
     return config, _with_ports(chosen, known.ports)
+
+
+def parse_writer(
+    command: str,
+    description: str,
+    take: Callable[[RobotFile], Config],
+    argv: Sequence[str],
+    options: type[Chosen],
+    may_make: bool = False,
+) -> tuple[Config, Chosen, Path]:
+    """Read the words of a command that writes a robot's file, and say which file that is.
+
+    Without --config it is robot.toml in this folder, which need not exist; with `may_make` that of
+    --config need not either.
+
+    Raises:
+        ConfigError: A flag, the file or a value cannot be used.
+        HelpRequest: Help was asked for.
+    """
+
+    def file_of(given: Path | None) -> Path | None:
+        path = given or USUAL
+        return path if path.exists() or not (given is None or may_make) else None
+
+    config, chosen = parse_robot(command, description, take, argv, options, file_of)
+    return config, chosen, chosen.config or USUAL
 
 
 def _with_ports(chosen: Chosen, ports: PortsParams) -> Chosen:
@@ -132,10 +165,21 @@ def require_two_ports(options: PortOptions) -> None:
     bus = options.bus
     if bus and options.esp32 and same(options.esp32, bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {bus} twice")
-    refuse_udp(bus)
+    _refuse_udp(bus)
 
 
-def refuse_udp(bus: str) -> None:
+def require_bus(bus: str) -> None:
+    """Refuse a bus that is not named, or on a network that loses packets.
+
+    Raises:
+        ConfigError: It is.
+    """
+    if not bus:
+        raise ConfigError(f"--bus: expected a serial port, found none; `{typed('setup')}` finds it")
+    _refuse_udp(bus)
+
+
+def _refuse_udp(bus: str) -> None:
     """Refuse a servo bus on a network that loses packets.
 
     Raises:

@@ -64,6 +64,7 @@ def parse(
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
     without: Sequence[str] = (),
+    file_of: Callable[[Path | None], Path | None] = lambda given: given,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command.
 
@@ -75,6 +76,7 @@ def parse(
         options: Its other options.
         read: Reads a file that holds more than this configuration.
         without: Fields of the other options that this command has not.
+        file_of: Which file is read, of the one that --config names.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -95,14 +97,14 @@ def parse(
         if word == "--help-all":
             raise HelpRequest(long_page(page))
     values = read_words(argv, [*others, *parameters])
-    names = fields_of(options)
+    names = fields_of(options).keys() - {*without}
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
     _refuse_alone([each for each in [*others, *parameters] if each.path in values], chosen)
     base: Mapping[str, Any] = {}
-    if isinstance(chosen, FromFile) and chosen.config is not None:
-        config = read_file(chosen.config, model) if read is None else read(chosen.config)
+    if isinstance(chosen, FromFile) and (file := file_of(chosen.config)) is not None:
+        config = read_file(file, model) if read is None else read(file)
         base = config.model_dump(exclude_unset=True)
-        _refuse_code(chosen.config, base, values)
+        _refuse_code(file, base, values)
     given = {p: v for p, v in values.items() if p[0] not in names}
     for path, value in given.items():
         text = " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)

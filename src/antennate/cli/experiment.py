@@ -13,11 +13,11 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
-from antennate.cli.options import option
+from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.results import drawn_table, folder_for, tell
-from antennate.cli.run_options import OF_WORKERS, Options, go_on, workers_of
-from antennate.cli.view_options import ViewOptions, require_viewable, say_by_hand, view_of
+from antennate.cli.run_options import OF_WORKERS, RunOptions, go_on, workers_of
+from antennate.cli.view_options import ViewOptions, say_by_hand, view_of
 from antennate.errors import (
     AntennateError,
     BadInputError,
@@ -41,29 +41,19 @@ from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
-class LogOptions(Options):
-    """The same where trials can be logged."""
-
-    log: bool = option(False, "keep the log of every trial or walk, in the folder logs")
-
-
-@dataclass(frozen=True)
-class ShownOptions(ViewOptions, Options):
-    """The same where it can be watched."""
-
-
-@dataclass(frozen=True)
-class FilmOptions(Options):
-    """The same where something can be filmed."""
+class FilmOptions(RunOptions):
+    """What is filmed."""
 
     video: bool = option(False, "film one trial of each condition, drawn without a display")
+    video_trial: int = option(0, "trial that --video films", "INT", needs=["--video"], ge=0)
 
 
 @dataclass(frozen=True)
-class TrialFilmOptions(FilmOptions):
-    """The same where there are trials to film."""
+class Options(ViewOptions, FilmOptions):
+    """All that can be said of an experiment; `_without` tells what one of them has not."""
 
-    video_trial: int = option(0, "trial that --video films", "INT", needs=["--video"], ge=0)
+    log: bool = option(False, "keep the log of every trial or walk, in the folder logs")
+    trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
 
 
 @dataclass(frozen=True)
@@ -71,36 +61,25 @@ class StudyOptions(Options):
     """The same where a file says what is run."""
 
     config: Path | None = option(None, "TOML file of the study or search", "FILE", positional=True)
-    trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
-
-
-def _options(experiment: Experiment[Any, Any]) -> type[Options]:
-    """What can be said of an experiment."""
-    kinds: list[type[Options]] = [StudyOptions] if experiment.continued else []
-    if experiment.logged is not None:
-        kinds.append(LogOptions)
-    if experiment.viewed is not None:
-        kinds.append(ShownOptions)
-    if experiment.films is not None:
-        has_trials = "trials" in experiment.config.model_fields
-        kinds.append(TrialFilmOptions if has_trials else FilmOptions)
-    if not kinds:
-        return Options
-    chosen: Any = dataclass(frozen=True)(type("Chosen", tuple(kinds), {}))
-    return chosen
 
 
 def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
     """Fields of the options that this experiment has not."""
-    if not experiment.on_workers:
-        return OF_WORKERS
-    return () if experiment.in_shards else ("shard",)
+    has = {
+        OF_WORKERS: experiment.on_workers,
+        ("shard",): experiment.in_shards,
+        ("video", "video_trial"): experiment.films is not None,
+        ("video_trial",): "trials" in experiment.config.model_fields,
+        tuple(fields_of(ViewOptions)): experiment.viewed is not None,
+        ("log",): experiment.logged is not None,
+        ("trust_code",): experiment.continued,
+    }
+    return [name for names, there in has.items() if not there for name in names]
 
 
 def _filmed(options: Options) -> int | None:
     """The trial to film, None for none."""
-    wanted = isinstance(options, FilmOptions) and options.video
-    return getattr(options, "video_trial", 0) if wanted else None
+    return options.video_trial if options.video else None
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
@@ -114,7 +93,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         experiment.description,
         experiment.config,
         argv,
-        _options(experiment),
+        StudyOptions if experiment.continued else Options,
         without=_without(experiment),
     )
     experiment.check(config)
@@ -147,12 +126,12 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    require_viewable(options, config)
+    if options.view or options.foxglove:
+        _require_viewable(options, config)
     _require_unfinished(options)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
     workers = workers_of(options, closed=shards is not None, apart=apart)
-    logs = isinstance(options, LogOptions) and options.log
-    kind = f"{experiment.name} --log" if logs else experiment.name
+    kind = f"{experiment.name} --log" if options.log else experiment.name
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
     what = identity(kind, config)
     if shards and (changes := differences(shards.identity, what)):
@@ -206,6 +185,26 @@ def _folder(
     return folder_for(experiment.view, options, config, argv, identity, **how)
 
 
+def _require_viewable(options: Options, config: Params) -> None:
+    """Check that what is run beside a view can be shown: by the engine, in this process.
+
+    Raises:
+        ConfigError: It cannot.
+    """
+    for name in OF_WORKERS:
+        value = getattr(options, name)
+        if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
+            raise ConfigError(
+                f"{flag_of((name,))}: expected none beside --view or --foxglove, which show one "
+                f"trial after the other, found {'one' if value is True else found(value)}"
+            )
+    if getattr(config, "solver", "mujoco") != "mujoco":
+        raise ConfigError(
+            "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
+            "found chain"
+        )
+
+
 def _require_unfinished(options: Options) -> None:
     """Refuse a shard of what is finished, before the folder is touched.
 
@@ -228,7 +227,7 @@ def _outcome(
     view: SimulationView | None,
 ) -> Outcome:
     """Run it: watched, logged, or neither."""
-    logs = run.folder(LOGS) if isinstance(options, LogOptions) and options.log else None
+    logs = run.folder(LOGS) if options.log else None
     interim = Interim()
 
     def keep(row: Any) -> None:

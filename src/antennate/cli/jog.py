@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
 
+from antennate.cli.addresses import BusOptions, parse_writer, require_bus
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, typed_keys
 from antennate.cli.options import option
-from antennate.cli.robot_toml import BusOptions, parse_writer, require_bus
 from antennate.cli.status import StatusLine, write
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.bus_survey import master

@@ -12,9 +12,9 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.experiment import Shards, carry_out
+from antennate.cli.experiment import Options, Shards, carry_out
 from antennate.cli.options import option
-from antennate.cli.run_options import Options, shard_of
+from antennate.cli.run_options import shard_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import shown
 from antennate.params.base import Params

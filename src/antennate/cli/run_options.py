@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.options import fields_of, flag_of, found, option
+from antennate.cli.options import option
 from antennate.cli.results import ResultOptions
 from antennate.errors import ConfigError
 from antennate.messages import shortened, typed
@@ -18,7 +18,7 @@ from antennate.studies.pool import TIMEOUT, Workers, core_count
 
 
 @dataclass(frozen=True)
-class Options(ResultOptions):
+class RunOptions(ResultOptions):
     """How to run; nothing here changes a result, but for another engine."""
 
     workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
@@ -46,7 +46,7 @@ class Options(ResultOptions):
     )
 
 
-def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
+def workers_of(options: RunOptions, closed: bool, apart: bool) -> Workers:
     """The workers that are asked for; see `Workers`. They are given the store later.
 
     Raises:
@@ -57,23 +57,6 @@ def workers_of(options: Options, closed: bool, apart: bool) -> Workers:
     how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
     count = options.workers or core_count()
     return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
-
-
-def refuse_workers(options: Any, expected: str) -> None:
-    """Refuse what is for trials that run at any place, in any order; one worker is none.
-
-    Args:
-        options: What was said; it may have no such options at all.
-        expected: What is expected in place of it.
-
-    Raises:
-        ConfigError: Something of the kind was said.
-    """
-    for name, field in fields_of(type(options)).items():
-        value = getattr(options, name)
-        if name in OF_WORKERS and value != field.default and (name, value) != ("workers", 1):
-            told = "one" if value is True else found(value)
-            raise ConfigError(f"{flag_of((name,))}: expected {expected}, found {told}")
 
 
 OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")

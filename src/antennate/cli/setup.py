@@ -8,12 +8,12 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
+from antennate.cli.addresses import BusOptions, parse_writer
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.person import TerminalPerson
 from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
-from antennate.cli.robot_toml import BusOptions, parse_writer
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.host_clock import HostClock

@@ -5,16 +5,13 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic.dataclasses import dataclass
 
 from antennate.cli import view_server
 from antennate.cli.options import option
-from antennate.cli.run_options import refuse_workers
 from antennate.cli.status import write
-from antennate.errors import ConfigError
-from antennate.params.base import Params
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import BY_HAND
 from antennate.telemetry.view import ports
@@ -91,14 +88,14 @@ def _say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def view_of(options: Any) -> Iterator[SimulationView | None]:
+def view_of(options: ViewOptions) -> Iterator[SimulationView | None]:
     """The view of a simulation, None if none is wanted.
 
     Raises:
         AntennateError: As `page_of`.
     """
-    process = page_of(options) if isinstance(options, ViewOptions) else None
-    if process is None or not isinstance(options, ViewOptions):
+    process = page_of(options)
+    if process is None:
         yield None
         return
     from antennate.telemetry.view.simulation import SimulationView
@@ -106,24 +103,6 @@ def view_of(options: Any) -> Iterator[SimulationView | None]:
     with process:
         speed, paused = options.view_speed, options.view_paused
         yield SimulationView(process.channel, speed, paused=paused)
-
-
-def require_viewable(options: Any, config: Params) -> None:
-    """Check that what is run beside a view can be shown: by the engine, in this process.
-
-    Raises:
-        ConfigError: It cannot.
-    """
-    shown = getattr(options, "view", False) or getattr(options, "foxglove", False)
-    if shown:
-        refuse_workers(
-            options, "none beside --view or --foxglove, which show one trial after the other"
-        )
-    if shown and getattr(config, "solver", "mujoco") != "mujoco":
-        raise ConfigError(
-            "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
-            "found chain"
-        )
 
 
 def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:

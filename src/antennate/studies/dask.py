@@ -28,7 +28,7 @@ from antennate.studies.submitted import (
     require_same,
     work_apart,
 )
-from antennate.studies.work import Emit, Fail, Failure, Part, Work
+from antennate.studies.work import Emit, Fail, Part, Work
 
 CONNECT = 10.0
 """Time within which a scheduler has to answer, or to come back [s]."""
@@ -225,21 +225,14 @@ def carry_out_apart(
     """
     folder = folder_of(theirs)
     require_same(theirs, folder)
-    places = list(part.tasks)
     answers: list[tuple[int, Any]] = []
 
-    def emit(index: int, result: Any) -> None:
-        answers.append((places[index], result))
+    def take(place: int, answer: Any) -> None:
+        answers.append((place, answer))
 
-    def fail(index: int, failure: Failure) -> None:
-        answers.append((places[index], Failure(failure.status, failure.reason)))
-
-    def saw(model: str) -> None:
-        answers.append((NO_PLACE, Processor(model)))
-
-    work = work_apart(part, folder, added, saw)
+    work = work_apart(part, folder, added, lambda model: take(NO_PLACE, Processor(model)))
     with _processes(run) as processes:
-        processes.run(work, [range(len(places))], 1, emit, fail)
+        processes.run(work, [list(part.tasks)], 1, take, take)
     return answers
 
 

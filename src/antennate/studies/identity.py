@@ -41,7 +41,7 @@ def packages_used(command: str, config: Params) -> tuple[str, ...]:
     """Optional packages that its numbers depend on: of the chain solver, a GPU, a search."""
     words = command.split()
     return (
-        *(("numba",) if "chain" in _texts(config.model_dump(mode="json")) else ()),
+        *(("numba",) if "chain" in texts(config.model_dump(mode="json")) else ()),
         *(("mujoco-warp", "warp-lang") if "warp" in words else ()),
         *(("optuna",) if "design" in words else ()),
     )
@@ -84,7 +84,7 @@ def code_named(values: Any) -> dict[str, str]:
     Beside FILE.py also what it imports of its own folder.
     """
     found = {}
-    for text in _texts(values):
+    for text in texts(values):
         place, _, name = text.rpartition(":")
         file = Path(place if name and place else text)
         if file.suffix and file.is_file():
@@ -116,7 +116,7 @@ def _with_imports(first: Path) -> list[Path]:
 
 def _code_added(values: Any) -> dict[str, str]:
     """Checksums of the source of objects that were added to a registry and are named."""
-    named = set(_texts(values))
+    named = set(texts(values))
     added = [pair for objects in ADDED.values() for pair in objects.items() if pair[0] in named]
     found = {}
     for name, each in added:
@@ -147,12 +147,13 @@ def _checksum(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def _texts(values: Any) -> Iterator[str]:
+def texts(values: Any) -> Iterator[str]:
+    """All texts in nested tables and lists."""
     if isinstance(values, str):
         yield values
-    elif isinstance(values, Mapping | list):
+    elif isinstance(values, Mapping | list | tuple):
         for item in values.values() if isinstance(values, Mapping) else values:
-            yield from _texts(item)
+            yield from texts(item)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, read_limited, remove_abandoned
+from antennate.studies.identity import texts
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
 
@@ -96,7 +97,7 @@ def require_apart(
         OutputError: It would.
     """
     held = files_of(Path(out)) if out is not None and Path(out).is_dir() else []
-    for path in (*reads, *map(Path, _texts(config))) if held else ():
+    for path in (*reads, *map(Path, texts(config))) if held else ():
         if any(is_same(path, each) for each in held):
             raise OutputError(f"expected another folder than that of {path}, found {out}")
 
@@ -107,17 +108,6 @@ def is_same(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except (OSError, ValueError):  # no file, or not even a name of one
         return False
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """All texts in a configuration."""
-    if isinstance(value, Mapping):
-        value = tuple(value.values())
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Sequence):
-        for each in value:
-            yield from _texts(each)
 
 
 def outdated(held: Sequence[Path], stays: str, finished: bool) -> list[Path]:

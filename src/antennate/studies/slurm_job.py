@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -83,17 +84,14 @@ class Resumable:
         store.begin(self._identity)
         left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
 
-        places = list(left)
+        def emit(place: int, result: Any) -> None:
+            store.append(str(place), {"result": encoded(result)})
 
-        def emit(index: int, result: Any) -> None:
-            store.append(str(places[index]), {"result": encoded(result)})
+        def fail(place: int, failure: Failure) -> None:
+            store.append(str(place), {"failure": [failure.status, failure.reason]})
 
-        def fail(index: int, failure: Failure) -> None:
-            store.append(str(places[index]), {"failure": [failure.status, failure.reason]})
-
-        part = Part(self._part.function, left, self._part.together, self._part.timeout)
-        indices, size = range(len(left)), self._at_once
-        parts = [indices[i : i + size] for i in indices[::size]]
+        part, places, size = replace(self._part, tasks=left), list(left), self._at_once
+        parts = [places[i : i + size] for i in range(0, len(places), size)]
         if left:
             work = work_apart(part, Path.cwd(), self._added, store.saw, _LATER)
             Processes().run(work, parts, 1, emit, fail)

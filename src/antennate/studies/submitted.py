@@ -144,7 +144,7 @@ def work_apart(
     """A part as work for a process beside this one, which needs nothing that this one imported.
 
     Args:
-        part: Its tasks are named by their order, from 0.
+        part: Some tasks.
         folder: Where they are run.
         added: Objects that were added to registries in the driver.
         saw: Takes the model of the processor.
@@ -153,7 +153,7 @@ def work_apart(
     import cloudpickle  # which Dask and submitit need too; it sends what was typed at a prompt
 
     content = cloudpickle.dumps((part, str(folder), added, ignored))
-    tasks = [(place,) for place in part.tasks]
+    tasks = {place: (place,) for place in part.tasks}
     return Work(_Carried(content), tasks, part.together, part.timeout, saw=saw)
 
 

@@ -58,7 +58,7 @@ class Work:
     Attributes:
         function: At the top of a module: function(*task) -> result; with `together`
             function(tasks, emit), which emits the index of a task and its result.
-        tasks: Its arguments.
+        tasks: Its arguments, by place.
         together: Whether several tasks are carried out at once.
         timeout: Time after which a task that has not ended is given up [s].
         folder: Run directory that it belongs to, None without.
@@ -71,7 +71,7 @@ class Work:
     """
 
     function: Callable[..., Any]
-    tasks: Sequence[tuple[Any, ...]]
+    tasks: Sequence[tuple[Any, ...]] | Mapping[int, tuple[Any, ...]]
     together: bool
     timeout: float
     folder: Path | None = None

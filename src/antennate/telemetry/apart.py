@@ -26,6 +26,7 @@ import numpy as np
 
 from antennate.errors import LogError
 from antennate.messages import ended_by, one_line
+from antennate.telemetry.feed import read
 from antennate.telemetry.header import Header
 from antennate.telemetry.rows import RowLog, Rows
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
@@ -180,22 +181,14 @@ def _messages(log: RowLog[_Tick] | None = None) -> Iterator[tuple[int, bytes]]:
         while True:
             while log is not None and not select.select((stream,), (), (), _IDLE)[0]:
                 log.settle()
-            head = _read(stream.fileno(), _HEAD.size)
+            head = read(stream, _HEAD.size)
             if len(head) < _HEAD.size:
                 return
             kind, length = _HEAD.unpack(head)
-            content = _read(stream.fileno(), length)
+            content = read(stream, length)
             if len(content) < length:
                 return
             yield kind, content
-
-
-def _read(file: int, count: int) -> bytes:
-    """So many bytes, fewer at the end."""
-    found = b""
-    while len(found) < count and (more := os.read(file, count - len(found))):
-        found += more
-    return found
 
 
 def _rows(ticks: Sequence[_Tick]) -> Rows:

@@ -10,7 +10,8 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from io import BufferedIOBase
+from typing import Any
 
 import numpy as np
 from mcap.data_stream import RecordBuilder
@@ -48,18 +49,6 @@ _FOOT = struct.Struct("<BQQQ")
 """Kind, length and both places of the last record, which its own CRC covers."""
 
 
-class Sink(Protocol):
-    """Where a file goes."""
-
-    def write(self, data: bytes, /) -> Any:
-        """Add bytes."""
-        ...
-
-    def tell(self) -> int:
-        """Where the next byte comes."""
-        ...
-
-
 class Container:
     """One file, from its first byte on.
 
@@ -68,7 +57,7 @@ class Container:
         library: The program that writes it.
     """
 
-    def __init__(self, file: Sink, library: str) -> None:
+    def __init__(self, file: BufferedIOBase, library: str) -> None:
         self._file, self._packer = file, ZstdCompressor(_EFFORT)
         self._schemas, self._channels = list[Schema](), list[Channel]()
         self._content, self._indexes = bytearray(), dict[int, list[int]]()

@@ -249,11 +249,11 @@ def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterat
     while True:
         while idle is not None and not select.select((stream,), (), (), _IDLE)[0]:
             idle()
-        head = _read(stream, _HEAD.size)
+        head = read(stream, _HEAD.size)
         length, dropped = _HEAD.unpack(head) if len(head) == _HEAD.size else (_LONGEST + 1, 0)
         if not length:
             return
-        content = _read(stream, length) if length <= _LONGEST else b""
+        content = read(stream, length) if length <= _LONGEST else b""
         if len(content) < length:
             break
         yield Message(content, dropped)
@@ -263,7 +263,7 @@ def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterat
     )
 
 
-def _read(stream: BinaryIO, count: int) -> bytes:
+def read(stream: BinaryIO, count: int) -> bytes:
     """So many bytes, fewer at the end."""
     found = b""
     while len(found) < count and (more := stream.read(count - len(found))):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import select
 import socket
 import struct
@@ -22,13 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.telemetry.ticks import Tick
-from antennate.types import Contact
 
-SCENE, MORE, POSES, TICK = b"S", b"M", b"P", b"T"
-"""Kinds of messages: the scene and a piece of it, poses with forces, a tick."""
-SNAPSHOT, STEP = b"G", b"t"
-"""The same of a simulation, with less work for it: a snapshot of the engine, a `Step`."""
+SCENE, POSES, SNAPSHOT, TICK = b"S", b"P", b"G", b"T"
+"""Kinds of messages: the scene, poses with forces or a snapshot of the engine, a tick."""
 HEADER, TEXT, STATE, END = b"H", b"X", b"Z", b"E"
 """The header of a log, a line of text, the state of the controls, the end in order."""
 READY, FAILED = b"R", b"F"
@@ -38,7 +33,6 @@ _SEVERAL = b"+"
 _BEGUN, _ENDED = b"b", b"e"
 """Kinds that hold a piece of a long message, and its last one."""
 _PART = struct.Struct("<cI")
-_STEP = struct.Struct("<qd2dq2d2qd")
 ORDER = b"O"
 """The kind that the page sends: what a person wants, as JSON."""
 _PIECE = 1 << 16
@@ -47,7 +41,7 @@ _LONGEST = 1 << 17
 _ROOM = 1 << 20
 """Bytes that may wait to be taken; the system may allow less."""
 _PATIENCE = 5.0
-"""Longest wait for room for a piece of the scene [s]; assumed: the other end is starting."""
+"""Longest wait for room for the scene [s]; assumed: the other end is starting."""
 _LAST = 1.0
 """Longest wait for room for the last messages [s]; assumed: a page that is shown takes them."""
 
@@ -84,41 +78,6 @@ class Poses(NamedTuple):
             return cls(float(t), numbers[:end].reshape(-1, 12), numbers[end:].reshape(-1, 6))
         except ValueError as error:
             raise BadInputError(f"expected poses, found {error}") from None
-
-
-class Step(NamedTuple):
-    """What a simulation knows of a tick; as of `Tick`."""
-
-    number: int
-    t: float
-    counts: Sequence[float] = (math.nan, math.nan)
-    maneuver: int = 0
-    level: Sequence[float] = (math.nan, math.nan)
-    contact: Sequence[int] = (Contact.UNKNOWN, Contact.UNKNOWN)
-    phase: float = math.nan
-
-    def pack(self) -> bytes:
-        """It as bytes."""
-        number, t, counts, maneuver, level, contact, phase = self
-        return _STEP.pack(number, t, *counts, maneuver, *level, *contact, phase)
-
-    @staticmethod
-    def unpack(content: bytes) -> Tick:
-        """The tick of what `pack` gave.
-
-        Raises:
-            BadInputError: They are something else.
-        """
-        try:
-            number, t, left, right, maneuver, *more = _STEP.unpack(content)
-        except struct.error as error:
-            raise BadInputError(f"expected a step, found {error}") from None
-        *level, one, other, phase = more
-        counts = left, right
-        return Tick(
-            *(number, t, t, counts, counts, (level[0], level[1]), (one, other), maneuver, phase),
-            angles=(),
-        )
 
 
 class Channel:
@@ -166,8 +125,7 @@ class Channel:
         else:
             self._go_on()
             if taken := not self._left:
-                *pieces, last = _pieces(b"".join(parts))
-                self._left += [*((_BEGUN, piece) for piece in pieces), (_ENDED, last)]
+                self._left += _pieces(b"".join(parts))
                 self._go_on()
         self.dropped += not taken and not self.closed
         return taken and not self.closed
@@ -193,66 +151,59 @@ class Channel:
         return self.send(kind, json.dumps(content).encode())
 
     def send_whole(self, kind: bytes, content: bytes) -> bool:
-        """Send a long message in pieces; False if the other end takes none."""
-        end = time.monotonic() + _PATIENCE
-        pieces = _pieces(content) or [b""]
-        kinds = [MORE] * (len(pieces) - 1) + [kind]
-        for each, piece in zip(kinds, pieces, strict=True):
-            while not self.send(each, piece):
-                self.dropped -= not self.closed
-                left = end - time.monotonic()
-                if self.closed or left <= 0 or not select.select((), (self._end,), (), left)[1]:
-                    return False
-        return True
+        """Send a message in pieces and wait for room; False if the other end takes none."""
+        self._left += _pieces(kind + content)
+        return self._drain(time.monotonic() + _PATIENCE)
 
     def finish(self, kind: bytes) -> None:
         """Send what is left of a long message, then an empty one of this kind."""
         end = time.monotonic() + _LAST
-        while not self.closed and (self._left or not self._put((kind,))):
-            left = end - time.monotonic()
-            if left <= 0 or not select.select((), (self._end,), (), left)[1]:
+        while self._drain(end) and not self._put((kind,)):
+            if not self._wait_for_room(end):
                 return
+
+    def _drain(self, end: float) -> bool:
+        """Send what is left of a long message; False if that is not taken by a time [s]."""
+        self._go_on()
+        while self._left and self._wait_for_room(end):
             self._go_on()
+        return not (self._left or self.closed)
+
+    def _wait_for_room(self, end: float) -> bool:
+        """Whether there is room again by a time [s], or the other end is gone."""
+        left = end - time.monotonic()
+        return not self.closed and left > 0 and bool(select.select((), (self,), (), left)[1])
 
     def receive(self) -> Iterator[tuple[bytes, bytes]]:
         """Kind and content of what has come; a long message is put together."""
         self._go_on()
-        held = b""
-        while held or self._come.poll(0):
+        while self._come.poll(0):
             try:
                 message = self._end.recv(_LONGEST)
             except BlockingIOError:
-                if not held:
-                    return
-                select.select((self._end,), (), (), _PATIENCE)
-                continue
+                return
             except OSError:
                 message = b""
             if not message:
                 self.closed = True
                 return
-            kind = message[:1]
-            if kind == MORE:
-                held += message[1:]
-            elif kind in (_BEGUN, _ENDED):
+            if message[:1] in (_BEGUN, _ENDED):
                 self._pieces.append(message[1:])
-                if kind == _ENDED:
-                    message = b"".join(self._pieces)
-                    self._pieces.clear()
-                    yield from _messages(message)
-            elif kind == _SEVERAL:
-                yield from _messages(message)
-            else:
-                content, held = held + message[1:], b""
-                yield kind, content
+                if message[:1] == _BEGUN:
+                    continue
+                message = b"".join(self._pieces)
+                self._pieces.clear()
+            yield from _messages(message)
 
     def close(self) -> None:
         """Close this end."""
         self._end.close()
 
 
-def _pieces(content: bytes) -> list[bytes]:
-    return [content[at : at + _PIECE] for at in range(0, len(content), _PIECE)]
+def _pieces(message: bytes) -> list[tuple[bytes, bytes]]:
+    """A message in pieces, each with its kind."""
+    *pieces, last = (message[at : at + _PIECE] for at in range(0, len(message), _PIECE))
+    return [*((_BEGUN, piece) for piece in pieces), (_ENDED, last)]
 
 
 def _messages(message: bytes) -> Iterator[tuple[bytes, bytes]]:

@@ -27,11 +27,9 @@ from antennate.telemetry.view.channel import (
     POSES,
     SCENE,
     SNAPSHOT,
-    STEP,
     TEXT,
     TICK,
     Poses,
-    Step,
 )
 
 _HOST = "127.0.0.1"
@@ -105,8 +103,6 @@ class FoxgloveSink:
         """Send a message on."""
         if kind == TICK:
             self._tick(Tick.unpack(content))
-        elif kind == STEP:
-            self._tick(Step.unpack(content))
         elif kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
         elif kind == SNAPSHOT and self._shapes is not None:

@@ -6,9 +6,14 @@ import math
 import select
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from antennate.errors import ConfigError
+from antennate.messages import one_line
 from antennate.telemetry.view.channel import ORDER, STATE, TEXT, Channel, read
+
+if TYPE_CHECKING:
+    from antennate.telemetry.view.tuning import Tuning
 
 RATE = 60.0
 """Pictures a second."""
@@ -38,14 +43,18 @@ class Pace:
     Args:
         channel: To the process that shows it.
         speed: Times real time at which it begins; 0 is as fast as it goes.
+        tuning: The controller whose numbers the page may change, None without one.
 
     Attributes:
         state: What the page shows of the controls.
+        by_hand: What was changed by hand, in order.
     """
 
-    def __init__(self, channel: Channel, speed: float) -> None:
-        self.channel = channel
-        self.state: dict[str, Any] = {"speed": speed, "paused": False, "values": {}}
+    def __init__(self, channel: Channel, speed: float, tuning: Tuning | None = None) -> None:
+        self.channel, self.tuning = channel, tuning
+        values = {} if tuning is None else tuning.values
+        self.state: dict[str, Any] = {"speed": speed, "paused": False, "values": values}
+        self.by_hand: list[str] = []
         self._steps = 0
         self._next = -math.inf
         self._begin: tuple[float, float] | None = None
@@ -119,7 +128,7 @@ class Pace:
                 self.carry_out(read(content))
 
     def carry_out(self, order: Mapping[str, Any]) -> None:
-        """Carry out one order; an unknown one is left alone."""
+        """Carry out one order; one that cannot be is left alone."""
         what, value = order.get("do"), order.get("value")
         if what == "pause":
             self.state["paused"] = bool(order.get("on"))
@@ -131,3 +140,15 @@ class Pace:
         elif what == "speed" and isinstance(value, float | int) and 0 <= value <= 100:
             self.state["speed"] = float(value)
             self._begin = None
+        elif what == "set" and self.tuning is not None:
+            try:
+                if done := self.tuning.set(str(order.get("name")), value):
+                    self.note(done)
+            except ConfigError as error:
+                self.say(one_line(str(error)))
+            self.state["values"] = self.tuning.values
+            self.tell()
+
+    def note(self, what: str) -> None:
+        """Say what was changed by hand."""
+        self.say(f"by hand: {what}")

@@ -19,6 +19,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TICK, Channel, Poses
 from antennate.telemetry.view.pace import Pace, Restart
+from antennate.telemetry.view.tuning import Tuning
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _LOOK = 0.05
@@ -33,12 +34,19 @@ class LogPlayer(Pace):
         title: What is shown, in a few words.
         speed: Times real time at which it begins; 0 is as fast as it goes.
         arena: The world in which it was simulated, None for a bare floor.
+        tuning: As of `Pace`.
     """
 
     def __init__(
-        self, channel: Channel, header: Header, title: str, speed: float, arena: World | None = None
+        self,
+        channel: Channel,
+        header: Header,
+        title: str,
+        speed: float,
+        arena: World | None = None,
+        tuning: Tuning | None = None,
     ) -> None:
-        super().__init__(channel, speed)
+        super().__init__(channel, speed, tuning)
         self._header, self._arena = header, arena
         self._scene: LogScene | None = None
         self._model: VisibleModel | None = None

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from antennate.errors import ConfigError
 from antennate.hardware.driving.decision import Decision
-from antennate.messages import one_line
 from antennate.params.control import ControlParams
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
@@ -42,7 +40,7 @@ class ReplayPlayer(LogPlayer):
         ConfigError: There is none of that name.
 
     Attributes:
-        by_hand: What was changed by hand, in order.
+        controller: What decides.
     """
 
     def __init__(
@@ -57,20 +55,10 @@ class ReplayPlayer(LogPlayer):
         def make(control: ControlParams) -> Controller:
             return recorded_controller(header.model_copy(update={"params": control}), name)
 
-        self._tuning = Tuning(name or header.controller, header.params, make)
-        self.by_hand: list[str] = []
         self._now = 0.0
-        super().__init__(channel, header, title, speed, arena)
-
-    @property
-    def controller(self) -> Controller:
-        """What decides."""
-        return self._tuning.controller
-
-    def begin(self) -> None:
-        """From the beginning."""
-        self.state["values"] = self._tuning.values
-        super().begin()
+        tuning = Tuning(name or header.controller, header.params, make)
+        self.controller = tuning.controller
+        super().__init__(channel, header, title, speed, arena, tuning)
 
     def ticks(self, log: LogReader) -> Iterator[Tick]:
         """The ticks of a log; what it tells of the scene is kept for the page."""
@@ -96,20 +84,7 @@ class ReplayPlayer(LogPlayer):
             )
         )
 
-    def carry_out(self, order: Mapping[str, Any]) -> None:
-        """Carry out one order; one that cannot be is left alone, and the page says so.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-        """
-        super().carry_out(order)
-        if order.get("do") != "set":
-            return
-        try:
-            if done := self._tuning.set(str(order.get("name")), order.get("value")):
-                self.by_hand.append(f"{self._now:.2f} s: {done}")
-                self.say(f"by hand: {done}")
-        except ConfigError as error:
-            self.say(one_line(str(error)))
-        self.state["values"] = self._tuning.values
-        self.tell()
+    def note(self, what: str) -> None:
+        """Keep what was changed by hand, and say so."""
+        self.by_hand.append(f"{self._now:.2f} s: {what}")
+        super().note(what)

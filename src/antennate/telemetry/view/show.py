@@ -27,12 +27,10 @@ from antennate.telemetry.view.channel import (
     SCENE,
     SNAPSHOT,
     STATE,
-    STEP,
     TEXT,
     TICK,
     Channel,
     Poses,
-    Step,
     read,
 )
 from antennate.telemetry.view.charts import LABELS, Charts, Map
@@ -156,8 +154,6 @@ class Page:
                 self._note_head()
         elif kind == TICK:
             self._take_tick(Tick.unpack(content))
-        elif kind == STEP:
-            self._take_tick(Step.unpack(content))
         elif kind == TEXT:
             self._lines.append(content.decode("utf-8", "replace"))
         elif kind == STATE:

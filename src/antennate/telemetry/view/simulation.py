@@ -12,16 +12,14 @@ from typing import Any
 
 from antennate.colours import SERIES, rgba
 from antennate.control.registry import make_controller
-from antennate.errors import ConfigError
-from antennate.messages import one_line
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
-from antennate.telemetry.ticks import numbers_of
-from antennate.telemetry.view.channel import SCENE, SNAPSHOT, STEP, Channel, Step
+from antennate.telemetry.ticks import Tick, numbers_of
+from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
 from antennate.telemetry.view.pace import Pace, Restart
 from antennate.telemetry.view.tuning import Tuning
-from antennate.types import AntennaFrame, Controller
+from antennate.types import AntennaFrame, Contact, Controller
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
@@ -41,7 +39,6 @@ class SimulationView(Pace):
         paused: Whether it stands at first.
 
     Attributes:
-        by_hand: What was changed by hand, in order.
         results: The folder that is to hold the results, empty if there is none.
     """
 
@@ -53,10 +50,8 @@ class SimulationView(Pace):
         self._steered = steered
         if not steered:
             self.state = {"speed": None, "paused": False}
-        self.by_hand: list[str] = []
         self.results = ""
         self._fresh: list[str] = []
-        self._tuning: Tuning | None = None
         self._seen: Any = None
         self._model: VisibleModel | None = None
         self._data: Any = None
@@ -66,7 +61,7 @@ class SimulationView(Pace):
     def begin(self, title: str, seed: int | None = None) -> None:
         """A trial begins; `seed` is the one that it has, None where there is no chance."""
         self._title, self._number, self._seen = title, 0, None
-        self._tuning = None
+        self.tuning = None
         self.state |= {"title": title, "values": {}, "results": self.results}
         self.state.pop("seed", None)
         if seed is not None:
@@ -84,9 +79,9 @@ class SimulationView(Pace):
         def make(values: ControlParams) -> Controller:
             return make_controller(name, values, robot, batch)
 
-        self._tuning = Tuning(name, control, make)
-        self.state["values"] = self._tuning.values
-        return self._tuning.controller
+        self.tuning = Tuning(name, control, make)
+        self.state["values"] = self.tuning.values
+        return self.tuning.controller
 
     def tick(
         self,
@@ -126,25 +121,33 @@ class SimulationView(Pace):
     def redraw(self) -> None:
         """Show where everything is."""
         if self._model is not None and self._data is not None:
-            step = self._step(self._data.time, *self._last)
-            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (STEP, step.pack()))
+            tick = self._tick(self._data.time, *self._last)
+            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick.pack()))
 
     def _show_model(self, model: Any) -> None:
         self._seen, self._model = model, VisibleModel(model, _SIDES)
         self.tell()
         self.channel.send_whole(SCENE, self._model.shapes().pack())
 
-    def _step(
+    def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
-    ) -> Step:
-        counts = _NOT_A_NUMBER if frame is None else frame.counts[0].tolist()
-        if controller is None:
-            return Step(self._number, t, counts, maneuver)
-        level, contact = controller.level[0].tolist(), controller.contact[0].tolist()
-        phase = numbers_of(controller, "phase")
-        return Step(
-            *(self._number, t, counts, int(controller.maneuver[0]), level, contact),
-            phase[0] if len(phase) == 1 else math.nan,
+    ) -> Tick:
+        left, right = _NOT_A_NUMBER if frame is None else frame.counts[0].tolist()
+        level, contact, phase = _NOT_A_NUMBER, (Contact.UNKNOWN, Contact.UNKNOWN), ()
+        if controller is not None:
+            level, contact = controller.level[0].tolist(), controller.contact[0].tolist()
+            maneuver, phase = int(controller.maneuver[0]), numbers_of(controller, "phase")
+        return Tick(
+            number=self._number,
+            t=t,
+            now=t,
+            counts=(left, right),
+            reading=(left, right),
+            level=level,
+            contact=contact,
+            maneuver=maneuver,
+            phase=phase[0] if len(phase) == 1 else math.nan,
+            angles=(),
         )
 
     def look(self) -> None:
@@ -164,26 +167,13 @@ class SimulationView(Pace):
         """
         super().carry_out(order)
         what = order.get("do")
-        if what == "set":
-            self._set(str(order.get("name")), order.get("value"))
-        elif what == "move":
+        if what == "move":
             self._move(order)
         elif what == "restart" and "seed" in self.state:
             seed = order.get("seed")
             if isinstance(seed, int) and 0 <= seed < 1 << 32:
-                self._note(f"begun anew with seed {seed}")
+                self.note(f"begun anew with seed {seed}")
                 raise Restart(seed)
-
-    def _set(self, name: str, value: Any) -> None:
-        if self._tuning is None:
-            return
-        try:
-            if done := self._tuning.set(name, value):
-                self._note(done)
-        except ConfigError as error:
-            self.say(one_line(str(error)))
-        self.state["values"] = self._tuning.values
-        self.tell()
 
     def _move(self, order: Mapping[str, Any]) -> None:
         body, x, y = (order.get(each) for each in ("body", "x", "y"))
@@ -194,9 +184,9 @@ class SimulationView(Pace):
         if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST):  # nor where one is NaN
             return
         if self._model.move(self._data, body, x, y) and order.get("end"):
-            self._note(f"obstacle {body} moved to x = {x:.3f} m, y = {y:.3f} m")
+            self.note(f"obstacle {body} moved to x = {x:.3f} m, y = {y:.3f} m")
 
-    def _note(self, what: str) -> None:
+    def note(self, what: str) -> None:
         """Keep what was changed by hand; of a slider that is drawn the last value counts."""
         t = 0.0 if self._data is None else float(self._data.time)
         line = f"{self._title}, {t:.2f} s: {what}"
@@ -205,4 +195,4 @@ class SimulationView(Pace):
         if self.by_hand and name in self.by_hand[-1] and self.by_hand[-1].startswith(self._title):
             self.by_hand.pop()
         self.by_hand.append(line)
-        self.say(f"by hand: {what}")
+        super().note(what)
