@@ -190,7 +190,7 @@ def test_a_board_that_speaks_another_language_is_quoted() -> None:
     text = BoardSurvey(text="MicroPython v1.24 on ESP32\r\n>>> ", received=40)
     other = BoardSurvey(refusals=["the board speaks protocol version 9"], received=40)
     for survey, said in ((text, "'MicroPython v1.24 on ESP32 >>>'"), (other, "version 9")):
-        rows = list(board_checks.rows(survey, ROBOT))
+        rows = [finding for finding, *_ in board_checks.findings(survey, ROBOT)]
         assert len(rows) == 1
         assert said in rows[0].found
         assert "firmware/" in rows[0].cure

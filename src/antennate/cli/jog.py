@@ -60,10 +60,13 @@ def command(argv: Sequence[str]) -> int:
         )
     require_bus(orders.bus)
     at, clock = names.index(orders.joint or names[0]), HostClock()
-    open_bus = opener_of(orders.bus, "--bus")
-    with open_bus(config.robot.baud) as port, typed_keys() as keys, StopOnce(last=True) as stop:
+    opener = opener_of(orders.bus, "--bus")
+    with (
+        master(opener, config.robot.baud, clock.now) as bus,
+        typed_keys() as keys,
+        StopOnce(last=True) as stop,
+    ):
         stop.within = _move  # no signal keeps the torque from going off
-        bus = master(port, config.robot.baud, clock.now)
         off, last = True, ""
         while off and last not in ("q", END) and not stop.received:
             off, last = _one_joint(bus, config, at, keys, clock)

@@ -16,6 +16,7 @@ from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.dynamixel.tables import model_name
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.setup import ports
@@ -23,7 +24,7 @@ from antennate.hardware.setup.assembly import Assembly, JointState
 from antennate.hardware.setup.config import SetupConfig
 from antennate.hardware.setup.person import Quit, confirm
 from antennate.hardware.setup.robot_toml import change
-from antennate.hardware.setup.servos import ServoSetup, model_name
+from antennate.hardware.setup.servos import ServoSetup
 from antennate.hardware.setup.zeros import by_group
 from antennate.messages import nearest, shortened, typed
 from antennate.studies.measures import Table

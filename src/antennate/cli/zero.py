@@ -67,8 +67,7 @@ def command(argv: Sequence[str]) -> int:
 
 def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: Path) -> int:
     robot, clock = config.robot, HostClock()
-    with opener_of(orders.bus, "--bus")(robot.baud) as port:
-        bus = master(port, robot.baud, clock.now)
+    with master(opener_of(orders.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
         if left := bringup.disable(bus, robot.ids):
             raise BringUpError(f"expected torque off, servos {left} did not confirm it")

@@ -9,7 +9,7 @@ import numpy as np
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.board_survey import BoardSurvey
-from antennate.hardware.doctor.check import Finding, Row
+from antennate.hardware.doctor.check import Finding
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sensor
 from antennate.hardware.robot import DoctorConfig
@@ -33,14 +33,8 @@ _CURES = {
 _DEGRADED = (diagnosis.Finding.OUT_OF_CAL, diagnosis.Finding.SPIKY, diagnosis.Finding.SATURATED)
 
 
-def rows(board: BoardSurvey, config: DoctorConfig) -> Iterator[Row]:
-    """The rows for which there is something to look at, in the order in which they are shown."""
-    for finding, check, expected in _findings(board, config):
-        yield finding.row("esp32", check, expected)
-
-
-def _findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
-    """Each with the name of its check and what would be good."""
+def findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
+    """Each with the name of its check and what would be good, in the order to be shown."""
     hello = board.hello
     yield _greeting(board), "greeting", f"within {config.doctor.greeting:g} s"
     if hello is None:

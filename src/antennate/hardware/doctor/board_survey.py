@@ -98,8 +98,8 @@ def survey_board(
         survey.hello, survey.refusals = board.hello, board.refusals
         survey.text, survey.received = board.decoder.take_text(), board.decoder.counters.received
     if survey.hello is None and not survey.refusals:
-        with opener(robot.baud) as port:
-            survey.servos = bool(master(port, robot.baud, now).scan())
+        with master(opener, robot.baud, now) as bus:
+            survey.servos = bool(bus.scan())
     return survey
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from statistics import median
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
-from antennate.hardware.doctor.check import Finding, Grade, Row, grouped, ids_text
+from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text
 from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, register_findings
-from antennate.hardware.dynamixel.tables import TABLES
+from antennate.hardware.dynamixel.tables import TABLES, model_name
 from antennate.hardware.robot import DoctorConfig
 from antennate.robots.spec import RobotSpec
 
@@ -23,21 +23,15 @@ _FOUND_AND_CURE = {
 }
 
 
-def rows(bus: BusSurvey, config: DoctorConfig) -> Iterator[Row]:
-    """The rows for which there is something to look at, in the order in which they are shown."""
-    for finding, check, expected in _findings(bus, config):
-        yield finding.row("bus", check, expected)
-
-
-def _findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
-    """Each with the name of its check and what would be good."""
+def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
+    """Each with the name of its check and what would be good, in the order to be shown."""
     robot, good = config.robot, config.doctor
     yield _baud(bus), "baud", f"all at {bus.baud}"
     if not (bus.here or bus.elsewhere):
         return
     yield _ids(bus, robot), "ids", ids_text(robot.ids)
     yield _answers(bus), "answers", "one whole answer of each"
-    yield _models(bus, robot), "models", grouped(robot.models, _model)
+    yield _models(bus, robot), "models", grouped(robot.models, model_name)
     newest = ", ".join(f"{t.name} {t.fast_read_firmware}" for t in TABLES.values())
     yield _firmware(bus), "firmware", f"from {newest} on"
     if not bus.registers.keys() & set(robot.ids):
@@ -115,11 +109,7 @@ def _models(bus: BusSurvey, robot: RobotSpec) -> Finding:
     models = {i: seen.model for i, seen in bus.here.items() if seen.model is not None}
     wrong = [i for i, model in models.items() if model != robot.models.get(i, model)]
     cure = f"{ids_text(wrong)}: put a servo of the expected model there, or correct robot.*.ids"
-    return Finding(grouped(models, _model), "bad" if wrong else "ok", cure)
-
-
-def _model(model: int) -> str:
-    return TABLES[model].name if model in TABLES else f"model {model}"
+    return Finding(grouped(models, model_name), "bad" if wrong else "ok", cure)
 
 
 def _firmware(bus: BusSurvey) -> Finding:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from statistics import median
 from typing import Any
@@ -13,10 +14,9 @@ from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
 from antennate.hardware.dynamixel.bus import PING_DATA, Bus
 from antennate.hardware.dynamixel.inquiry import PINGS, Present
 from antennate.hardware.dynamixel.packets import OVERHEAD
-from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT, XC430_W240, Register
+from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT, XC430_W240
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.ports.port import Port
 from antennate.params.doctor import DoctorParams
 from antennate.robots.spec import RobotSpec
 
@@ -49,8 +49,6 @@ _GAP = 0.05
 """Longest silence before an answer [s]: three times the 16 ms of a slow adapter."""
 _BUDGET = 0.25
 """Time for one reading of all [s]: slow answers of 16 ms come in lumps."""
-_TRIES = 3
-"""Readings of all."""
 _SAMPLE_TIME = 0.3
 """Time in which an antenna board on the port of the bus is recognised [s]: thirty samples."""
 
@@ -116,8 +114,7 @@ def survey_bus(
         PortError: The port is gone or cannot be opened.
     """
     survey = BusSurvey(robot.baud)
-    with opener(robot.baud) as port:
-        bus = master(port, robot.baud, now)
+    with master(opener, robot.baud, now) as bus:
         survey.here = _present(bus, robot.ids)
         survey.registers = _registers(bus, survey.whole)
         _time_pings(bus, survey, now)
@@ -129,14 +126,11 @@ def survey_bus(
     return survey
 
 
-def master(port: Port, baud: int, now: Callable[[], float]) -> Bus:
-    """A patient master of a bus."""
-    return Bus(port, Timing(baud, gap=_GAP), clock=now)
-
-
-def read_some(bus: Bus, ids: Iterable[int], register: Register) -> dict[int, int]:
-    """One register of those servos that answer."""
-    return inquiry.read_some(bus, ids, register, _TRIES, _BUDGET)
+@contextlib.contextmanager
+def master(opener: Opener, baud: int, now: Callable[[], float]) -> Iterator[Bus]:
+    """A patient master of a bus, as long as the context lasts; PortError if it does not open."""
+    with opener(baud) as port:
+        yield Bus(port, Timing(baud, gap=_GAP), clock=now)
 
 
 def _present(bus: Bus, expected: Iterable[int]) -> dict[int, Present]:
@@ -151,7 +145,7 @@ def _registers(bus: Bus, ids: Iterable[int]) -> dict[int, dict[str, int]]:
     """REGISTERS of servos, as far as they answer."""
     values: dict[int, dict[str, int]] = {servo: {} for servo in ids}
     for name in REGISTERS:
-        for servo, value in read_some(bus, values, XC430_W240[name]).items():
+        for servo, value in inquiry.read_some(bus, values, XC430_W240[name]).items():
             values[servo][name] = value
     return {servo: named for servo, named in values.items() if named}
 
@@ -172,8 +166,8 @@ def _elsewhere(
     others: list[tuple[int, Present]] = []
     for baud in _BAUDS:
         if baud != robot.baud:
-            with opener(baud) as port:
-                others += [(baud, one) for one in _present(master(port, baud, now), ()).values()]
+            with master(opener, baud, now) as bus:
+                others += [(baud, one) for one in _present(bus, ()).values()]
     return others
 
 

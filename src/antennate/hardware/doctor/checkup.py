@@ -61,11 +61,13 @@ def examine(
     def bus_rows(path: str, opener: Opener) -> Iterator[Row]:
         survey = checkup.bus = survey_bus(opener, config.robot, config.doctor, now)
         yield latency_row(path, bus_checks.slow(survey, config), config.doctor)
-        yield from bus_checks.rows(survey, config)
+        for finding, check, expected in bus_checks.findings(survey, config):
+            yield finding.row("bus", check, expected)
 
     def board_rows(path: str, opener: Opener) -> Iterator[Row]:
         survey = checkup.board = survey_board(opener, config.robot, config.doctor, now)
-        yield from board_checks.rows(survey, config)
+        for finding, check, expected in board_checks.findings(survey, config):
+            yield finding.row("esp32", check, expected)
 
     if bus is not None:
         checkup.rows += _rows("bus", *bus, config.robot.baud, bus_rows)

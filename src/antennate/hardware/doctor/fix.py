@@ -9,12 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from antennate.hardware import settings
-from antennate.hardware.doctor.bus_survey import BusSurvey, master, read_some
+from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import look
+from antennate.hardware.dynamixel.inquiry import look, read_some
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.settings import Setting
 from antennate.robots.spec import RobotSpec
@@ -91,8 +91,7 @@ def apply(opener: Opener, change: Change, now: Callable[[], float]) -> None:
         PortError: The port is gone.
     """
     register = XC430_W240[change.register]
-    with opener(change.baud) as port:
-        bus = master(port, change.baud, now)
+    with master(opener, change.baud, now) as bus:
         _require_alone(bus, change)
         if left := bringup.disable(bus, [change.servo]):
             raise BringUpError(f"expected torque off, servo {left[0]} did not confirm it; {_POWER}")
@@ -125,8 +124,7 @@ def _require_moved(opener: Opener, change: Change, now: Callable[[], float]) -> 
     to_id = change.register == _ID
     servo = change.after if to_id else change.servo
     baud = change.baud if to_id else BAUD_RATES[change.after]
-    with opener(baud) as port:
-        bus = master(port, baud, now)
+    with master(opener, baud, now) as bus:
         _require_value(bus, servo, change)
         if to_id and look(bus, change.servo, 1) is not None:
             raise BringUpError(f"expected id {change.servo} to be left by all, found one there")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 from antennate.hardware.doctor.check import Finding, Opener, Row
@@ -12,7 +11,6 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.errors import OpenError
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.holder import holders
-from antennate.hardware.ports.port import Port
 from antennate.params.doctor import DoctorParams
 from antennate.params.network import NetworkParams
 
@@ -30,16 +28,7 @@ def opener_of(
     Raises:
         ConfigError: pyserial is not installed.
     """
-
-    @contextlib.contextmanager
-    def opened(baud: int) -> Iterator[Port]:
-        line = finder(path, baud, flag, key, network)()
-        try:
-            yield line
-        finally:
-            line.close()
-
-    return opened
+    return lambda baud: contextlib.closing(finder(path, baud, flag, key, network)())
 
 
 def port_row(part: str, path: str, opener: Opener, baud: int = BOARD_BAUD) -> Row:

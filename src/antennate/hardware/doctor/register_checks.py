@@ -31,18 +31,18 @@ Grading = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
 
 
 class _Check(NamedTuple):
-    """A check of one register of all servos.
+    """A check of one register of all servos, by default one that `drive` requires.
 
     In `expected` {config} and {modes} are filled in, in `cure` the {ids} that are not ok; `text`
-    says a value in words.
+    says a value in words. `name` is that of the register if empty.
     """
 
-    name: str
     register: str
     expected: str
-    grading: Grading
     cure: str
     text: Callable[[int], str] = str
+    grading: Grading | None = None
+    name: str = ""
 
 
 def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
@@ -51,9 +51,11 @@ def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Fi
     yield _position_limits(bus, config)
     for check in _CHECKS:
         values = _values(bus, config, check.register)
-        grades: dict[int, Grade] = {i: check.grading(bus, config, i, values[i]) for i in values}
+        grading = check.grading or _required(check.register)
+        grades: dict[int, Grade] = {i: grading(bus, config, i, values[i]) for i in values}
         finding = _of_servos(grades, grouped(values, check.text), check.cure)
-        yield finding, check.name, check.expected.format(config=config, modes=modes)
+        name = check.name or check.register.replace("_", " ")
+        yield finding, name, check.expected.format(config=config, modes=modes)
 
 
 def _values(bus: BusSurvey, config: DoctorConfig, register: str) -> dict[int, int]:
@@ -121,105 +123,87 @@ def _watchdog(counts: int) -> str:
 
 
 _CHECKS = (
+    _Check("operating_mode", "{modes}", FIX),
     _Check(
-        "operating mode",
-        "operating_mode",
-        "{modes}",
-        _required("operating_mode"),
-        FIX,
-    ),
-    _Check(
-        "return delay",
         "return_delay_time",
         "0 us",
-        _only(0, "warn"),
         FIX,
         lambda value: f"{1e6 * RETURN_DELAY_UNIT * value:g} us",
+        _only(0, "warn"),
+        "return delay",
     ),
     _Check(
-        "status return level",
         "status_return_level",
         str(_ANSWERS_ALL),
-        _only(_ANSWERS_ALL, "warn"),
         OFF_AND_ON,
+        grading=_only(_ANSWERS_ALL, "warn"),
     ),
+    _Check("homing_offset", "0", f"{FIX}, then correct robot.*.zeros of {{ids}}"),
     _Check(
-        "homing offset",
-        "homing_offset",
-        "0",
-        _required("homing_offset"),
-        f"{FIX}, then correct robot.*.zeros of {{ids}}",
-    ),
-    _Check(
-        "drive mode",
         "drive_mode",
         "normal",
-        _required("drive_mode"),
         f"{FIX}; robot.*.directions of {{ids}} tells signs",
         lambda value: " + ".join(word for bit, word in _MODES if value & bit) or "normal",
     ),
     _Check(
-        "velocity limit",
         "velocity_limit",
         "from robot.*.fastest on",
-        _required("velocity_limit"),
         f"{FIX}: {{ids}} would refuse their profile velocity",
     ),
     _Check(
-        "shuts itself down at",
         "shutdown",
         ", ".join(hardware_errors(_SHUTDOWNS)),
-        _shutdown,
         f"set register 63 of {{ids}} to {_SHUTDOWNS} with DYNAMIXEL Wizard",
         lambda bits: f"{'' if bits & _SHUTDOWNS == _SHUTDOWNS else 'not '}all of these",
+        _shutdown,
+        "shuts itself down at",
     ),
     _Check(
-        "supply",
         "present_input_voltage",
         "body from {config.limits.supply_warn:g} V on, antennae within their limits",
-        _supply,
         "{ids}: charge the battery, or check supply and cable to them",
         lambda value: f"{_VOLT * value:.1f} V",
+        _supply,
+        "supply",
     ),
     _Check(
-        "temperature",
         "present_temperature",
         "{config.doctor.heat_margin:g} degC below the limit",
-        _heat,
         "{ids}: let them cool down",
         lambda heat: f"{heat} degC",
+        _heat,
+        "temperature",
     ),
     _Check(
-        "hardware errors",
         "hardware_error_status",
         "none",
-        _only(0, "bad"),
         "{ids}: remove the cause (load, heat, supply), then switch the supply off and on",
         lambda bits: ", ".join(hardware_errors(bits)) or "none",
+        _only(0, "bad"),
+        "hardware errors",
     ),
     _Check(
-        "bus watchdog",
         "bus_watchdog",
         "off",
-        _only(0, "warn"),
         "{ids}: left by a program that died, or in use by one; drive clears it when it arms",
         _watchdog,
+        _only(0, "warn"),
     ),
     _Check(
-        "goal PWM",
         "goal_pwm",
         "all that the PWM limit allows",
-        _full,
         "{ids}: little force, left by a program that died, such as jog; drive, teleop and jog set "
         "it when they arm",
         lambda pwm: f"{100 * pwm / _FULL_PWM:.0f} %",
+        _full,
+        "goal PWM",
     ),
     _Check(
-        "torque",
         "torque_enable",
         "off",
-        _only(0, "bad"),
         "{ids}: no other program may drive them; hold the robot and switch the supply off",
         lambda value: "on" if value else "off",
+        _only(0, "bad"),
+        "torque",
     ),
 )

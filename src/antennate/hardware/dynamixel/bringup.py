@@ -13,7 +13,7 @@ from antennate.hardware.dynamixel import inquiry
 from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.inquiry import Present, State
-from antennate.hardware.dynamixel.tables import EXTENDED_MODE, TABLES, XC430_W240, Register
+from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, Register, model_name
 from antennate.hardware.ports.port import PortError
 
 WATCHDOG_COUNTS = 5
@@ -187,8 +187,7 @@ def _fault(present: Present | None, model: int) -> str:
     if present is None:
         return "silent"
     if present.model not in (None, model):
-        name = TABLES[model].name if model in TABLES else str(model)
-        return f"expected model {name}, found number {present.model}"
+        return f"expected model {model_name(model)}, found number {present.model}"
     return _REASONS[present.state]
 
 

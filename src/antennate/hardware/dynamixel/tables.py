@@ -265,6 +265,12 @@ XL330_M288 = _table(
 TABLES = {table.model: table for table in (XC430_W240, XL330_M288, XL430_W250)}
 """By model number."""
 
+
+def model_name(model: int | None) -> str:
+    """Name of a model, or its number if it is not known."""
+    return TABLES[model].name if model in TABLES else f"model {model}"
+
+
 HARDWARE_ERRORS = {
     0: "input voltage",
     2: "overheating",

@@ -8,15 +8,16 @@ last: one that was interrupted before is found as a new one again.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 from antennate.hardware import settings
-from antennate.hardware.doctor.bus_survey import master, read_some
+from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import Present, look
-from antennate.hardware.dynamixel.tables import BAUD_RATES, TABLES, XC430_W240
+from antennate.hardware.dynamixel.inquiry import Present, look, read_some
+from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240, model_name
 from antennate.hardware.settings import Setting
 from antennate.hardware.setup.person import SetupError
 from antennate.robots.spec import RobotSpec
@@ -55,11 +56,6 @@ def joints_of(robot: RobotSpec) -> list[Joint]:
     return [Joint(n, i, models[i]) for n, i in zip(robot.joint_names, robot.ids, strict=True)]
 
 
-def model_name(model: int | None) -> str:
-    """Name of a model, or its number if it is not known."""
-    return TABLES[model].name if model in TABLES else f"model {model}"
-
-
 class OwnedError(SetupError):
     """The servo is that of another joint, which is done; nothing was changed.
 
@@ -90,6 +86,7 @@ class ServoSetup:
     ) -> None:
         self.joints = joints_of(robot)
         self._opener, self._scan, self._now = opener, scan, now
+        self._master = partial(master, opener, now=now)
         self._baud = robot.baud
         delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
         self._rules = {**settings.settings(robot), "return_delay_time": delay}
@@ -100,8 +97,7 @@ class ServoSetup:
         Raises:
             PortError: The port is gone or cannot be opened.
         """
-        with self._opener(self._baud) as port:
-            bus = master(port, self._baud, self._now)
+        with self._master(self._baud) as bus:
             answering = {status.id for status in bus.scan(self._scan)}
             return {j.name: self._lacks(bus, j) for j in self.joints if j.servo in answering}
 
@@ -145,8 +141,8 @@ class ServoSetup:
         others = [b for b in BAUD_RATES if b not in usual and b <= _FASTEST]
         for speeds in (tuple(dict.fromkeys(usual)), others):
             for baud in speeds:
-                with self._opener(baud) as port:
-                    found += [(baud, one) for one in self._here(master(port, baud, self._now))]
+                with self._master(baud) as bus:
+                    found += [(baud, one) for one in self._here(bus)]
             if found:
                 break
         if not found:
@@ -171,14 +167,14 @@ class ServoSetup:
         owners = [j for j in self.joints if j.servo == servo and j.name in done and j != joint]
         if baud != self._baud or not owners:
             return None
-        with self._opener(baud) as port:
-            lacks = self._lacks(master(port, baud, self._now), owners[0])
+        with self._master(baud) as bus:
+            lacks = self._lacks(bus, owners[0])
         return owners[0] if not lacks else None
 
     def _plan(self, baud: int, servo: int, joint: Joint) -> list[Change]:
         """What differs, in the order in which it is to be changed."""
-        with self._opener(baud) as port:
-            there = self._read(master(port, baud, self._now), servo)
+        with self._master(baud) as bus:
+            there = self._read(bus, servo)
         changes = [
             Change(servo, baud, name, there[name], rule.cure)
             for name, rule in self._wanted(joint).items()
@@ -197,8 +193,8 @@ class ServoSetup:
         Raises:
             SetupError: It is not.
         """
-        with self._opener(self._baud) as port:
-            lacks = self._lacks(master(port, self._baud, self._now), joint)
+        with self._master(self._baud) as bus:
+            lacks = self._lacks(bus, joint)
         if lacks:
             raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
 
