@@ -29,40 +29,7 @@ CREEP = 10.0
 """Speed below which friction holds a shaft [ticks/s]: a fifth of a degree in a quarter second."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rating:
-    """What the datasheet says of a motor at its recommended supply.
-
-    Attributes:
-        voltage: That supply [V].
-        stall_torque: Torque at standstill [N·m].
-        stall_current: Current at standstill [A].
-        no_load_speed: Speed unloaded [rad/s].
-        inertia: Inertia at the output [kg·m²].
-    """
-
-    voltage: float
-    stall_torque: float
-    stall_current: float
-    no_load_speed: float
-    inertia: float
-
-
-def _rating(servo: ServoParams) -> Rating:
-    return Rating(
-        servo.voltage,
-        servo.stall_torque,
-        servo.stall_current,
-        servo.no_load_speed,
-        servo.armature,
-    )
-
-
-RATINGS = {
-    1080: _rating(ServoParams()),
-    1200: _rating(XL330Params()),
-    1060: _rating(XL430Params()),
-}
+RATINGS = {kind.model_number: kind for kind in (ServoParams(), XL330Params(), XL430Params())}
 """By model number; datasheets at 11.1, 5.0 and 11.1 V, inertia of the XL430 as of the XC430."""
 
 
@@ -93,15 +60,15 @@ class Motor(Shaft):
 
     Args:
         position: Where it is [ticks].
-        rating: The motor's.
+        rating: Of its motor, at the recommended supply.
     """
 
-    def __init__(self, position: float, rating: Rating) -> None:
+    def __init__(self, position: float, rating: ServoParams) -> None:
         super().__init__(position)
         self.rating = rating
         self._fastest = rating.no_load_speed / _TICK
-        self._lag = rating.inertia * rating.no_load_speed / rating.stall_torque
-        self._stop = FRICTION * rating.stall_torque / rating.inertia / _TICK
+        self._lag = rating.armature * rating.no_load_speed / rating.stall_torque
+        self._stop = FRICTION * rating.stall_torque / rating.armature / _TICK
         self._faded = math.exp(-STEP / self._lag)
 
     def drive(self, duty: float, dt: float, supply: float) -> None:

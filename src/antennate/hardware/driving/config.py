@@ -58,6 +58,11 @@ class DriveConfig(RobotConfig):
     def _known(cls, name: str) -> str:
         return CONTROLLERS.check(name)
 
+    @property
+    def reader(self) -> str:
+        """What reads the numbers of the control."""
+        return self.controller
+
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what its controller does not read."""
-        return unused(self.robot) | unread_by_all([self.controller], self.control, self.robot)
+        return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot)

@@ -7,20 +7,20 @@ while.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from antennate.control.controllers import RuleController
-from antennate.control.readers import TELEOP, UNREAD, unread_by_all
+from antennate.control.readers import TELEOP, UNREAD
 from antennate.hardware.driving.config import DriveConfig
 from antennate.params.base import paths_of
 from antennate.params.control import ControlParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.readers import SIMULATION_ALONE, unused
+from antennate.robots.readers import SIMULATION_ALONE
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
@@ -55,54 +55,22 @@ class TeleopConfig(DriveConfig):
     )
     teleop: TeleopParams = TeleopParams()
 
-    def unread_here(self) -> Mapping[str, str]:
-        """What this robot does not have, and what its controller does not read."""
-        return unused(self.robot) | unread_by_all([TELEOP], self.control, self.robot)
-
-
-@dataclass
-class Wishes:
-    """What the keys ask for.
-
-    Attributes:
-        maneuver: The maneuver of the newest key.
-        pressed_at: When its key came [s], by the host's clock.
-        oscillating: The antennae oscillate.
-    """
-
-    maneuver: Maneuver = Maneuver.HOLD
-    pressed_at: float = -math.inf
-    oscillating: bool = False
-
-    def press(self, key: str, now: float) -> None:
-        """Take a key at a time [s]; a key without a meaning is ignored.
-
-        Raises:
-            KeyboardInterrupt: It ends the drive.
-        """
-        if key in QUIT:
-            raise KeyboardInterrupt("a key" if key == "q" else "the end of the keys")
-        if key in KEYS:
-            self.maneuver, self.pressed_at = KEYS[key], now
-        elif key == OSCILLATE:
-            self.oscillating = not self.oscillating
-
-    def now(self, now: float, patience: float) -> Maneuver:
-        """The maneuver wanted at a time [s]; HOLD if the last key is older than `patience` [s]."""
-        return self.maneuver if now - self.pressed_at <= patience else Maneuver.HOLD
+    @property
+    def reader(self) -> str:
+        """What reads the numbers of the control."""
+        return TELEOP
 
 
 class KeyRule:
     """The rule of a controller: the maneuver of the keys.
 
-    Args:
-        control: Numbers of the control.
-        wanted: The maneuver that is wanted now.
+    Attributes:
+        wanted: That maneuver, of the newest key if it came a short time ago.
     """
 
-    def __init__(self, control: ControlParams, wanted: Callable[[], Maneuver]) -> None:
+    def __init__(self, control: ControlParams) -> None:
         self.turn_offset = control.gait.turn_offset
-        self._wanted = wanted
+        self.wanted = Maneuver.HOLD
 
     def reset(self, rows: Ints | Bools) -> None:
         """Do nothing: there is no memory."""
@@ -110,10 +78,10 @@ class KeyRule:
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """The maneuver of the keys; HOLD where a reading cannot be used."""
         unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
-        return np.where(unknown, int(Maneuver.HOLD), int(self._wanted()))
+        return np.where(unknown, int(Maneuver.HOLD), int(self.wanted))
 
 
-class KeyController:
+class KeyController(RuleController):
     """The controller of one robot by keys.
 
     Args:
@@ -132,32 +100,18 @@ class KeyController:
         keys: Callable[[], list[str]],
         clock: Callable[[], float],
     ) -> None:
-        self._params, self._wishes = params, Wishes()
-        self._keys, self._clock = keys, clock
-        rule = KeyRule(control, lambda: self._wishes.now(clock(), params.release))
-        self._walk = RuleController(rule, control, robot, 1)
+        self._by_keys = KeyRule(control)
+        super().__init__(self._by_keys, control, robot, 1)
+        self._params, self._keys, self._clock = params, keys, clock
+        self._asked, self._pressed_at = Maneuver.HOLD, -math.inf
+        self._oscillating = False
         self._middle = control.gait.antenna_mean
         self._swing = 2.0 * math.pi * params.oscillation_frequency * control.period
         self._phase = 0.0
 
-    @property
-    def maneuver(self) -> Ints:
-        """`Maneuver` of the last step, shape (1,)."""
-        return self._walk.maneuver
-
-    @property
-    def contact(self) -> Ints:
-        """`Contact` of each antenna in the last step, shape (1, 2)."""
-        return self._walk.contact
-
-    @property
-    def level(self) -> Floats:
-        """Bending level of each antenna in the last step, 0 to 1, shape (1, 2)."""
-        return self._walk.level
-
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Forget everything and start the gait at a phase [rad]."""
-        self._walk.reset(rows, phase)
+        super().reset(rows, phase)
         self._phase = 0.0
 
     def step(self, frame: AntennaFrame) -> JointCommand:
@@ -167,9 +121,24 @@ class KeyController:
             KeyboardInterrupt: A key ends the drive.
         """
         for key in self._keys():
-            self._wishes.press(key, self._clock())
-        command = self._walk.step(frame)
-        if self._wishes.oscillating:
+            self._press(key)
+        recent = self._clock() - self._pressed_at <= self._params.release
+        self._by_keys.wanted = self._asked if recent else Maneuver.HOLD
+        command = super().step(frame)
+        if self._oscillating:
             self._phase += self._swing
         angle = self._middle + self._params.oscillation_amplitude * math.sin(self._phase)
         return replace(command, antenna=np.full((1, 2), angle))
+
+    def _press(self, key: str) -> None:
+        """Take a key; one without a meaning is ignored.
+
+        Raises:
+            KeyboardInterrupt: It ends the drive.
+        """
+        if key in QUIT:
+            raise KeyboardInterrupt("a key" if key == "q" else "the end of the keys")
+        if key in KEYS:
+            self._asked, self._pressed_at = KEYS[key], self._clock()
+        elif key == OSCILLATE:
+            self._oscillating = not self._oscillating
