@@ -72,6 +72,18 @@ def test_an_engine_that_is_another_one_or_broken_is_refused(
     assert found in refusal(tmp_path, *TUNNEL)
 
 
+@pytest.mark.parametrize("words", [["tunnel", "--help"], ["twin", "--help-all"], ["view", "-h"]])
+def test_help_is_printed_beside_two_versions_or_an_old_one(
+    tmp_path: Path, words: list[str]
+) -> None:
+    distribution(tmp_path, "3.17.0")
+    old = "import mujoco\nmujoco.__version__ = '3.17.0'\n"
+    (tmp_path / "sitecustomize.py").write_text(old)
+    done = python(tmp_path, "-m", "antennate", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"usage: antennate {words[0]} ")
+
+
 def test_python_gets_the_same_line(tmp_path: Path) -> None:
     distribution(tmp_path, "3.17.0")
     source = """if True:

@@ -6,8 +6,10 @@ import errno
 import io
 import json
 import os
+import socket
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,8 @@ from antennate.cli import BAD_INPUT, main
 from antennate.hardware.ports.errors import explain
 from antennate.hardware.ports.holder import holders
 from antennate.hardware.ports.serial_port import SerialPort
+
+VISER = find_spec("viser") is not None
 
 
 @pytest.fixture
@@ -150,6 +154,27 @@ def test_a_flag_that_has_nothing_to_say_is_refused(
     told = capsys.readouterr()
     assert told.err.count("\n") == 1
     assert f"{words[1]}: expected " in told.err
+
+
+@pytest.mark.parametrize(
+    "more",
+    [[], pytest.param(["--view"], marks=pytest.mark.skipif(not VISER, reason="needs viser"))],
+    ids=["bus", "page"],
+)
+def test_a_twin_whose_port_is_taken_leaves_no_log(
+    more: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with socket.create_server(("127.0.0.1", 0)) as holder:
+        port = str(holder.getsockname()[1])
+        words = [*more, "--view-port", port] if more else ["--tcp", port]
+        assert main(["twin", "--duration", "1", "--log", "twin.mcap", *words]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert port in line
+    assert not list(tmp_path.iterdir())
 
 
 def test_bad_robot_toml_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -129,11 +129,21 @@ def slow_study(free: int) -> subprocess.Popen[bytes]:
     return program(*words, "--workers", "1", "--no-figures", FREE=str(free))
 
 
-def test_killed_before_its_first_trial_the_old_run_is_there_again() -> None:
+def test_killed_before_its_first_trial_the_old_run_is_there_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """For each command that is given its folder."""
     before = files()
     killed_once(Path("begun"), slow_study(free=0))
+    shutil.copytree("run", "killed")
     assert RunDirectory.open("run").rows()
     assert files() == before
+    for words in (["log", "info"], ["replay"], ["view"]):
+        shutil.rmtree("run")
+        shutil.copytree("killed", "run")
+        assert main([*words, "run"]) == 2  # what this run has is none that can be read
+        assert "run/logs/descending-0.mcap" in capsys.readouterr().err
+        assert files() == before
 
 
 def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:

@@ -29,6 +29,7 @@ ROBOT_COMMANDS = {
     "report": "A run, or two side by side, as one page to read, print and send",
     "merge": "The shards of a run as the run that they are parts of",
 }
+_HELP = {"-h", "--help", "--help-all", "--completion"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -41,11 +42,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code.
     """
     from antennate.cli.output import safe_streams
+    from antennate.sim.describing import describe_only
     from antennate.sim.engine_warnings import dropped
     from antennate.sim.gl import keep_wish
 
     keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)
+    describe_only(not _HELP.isdisjoint(words))
     name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
     with dropped(), safe_streams(result_alone="--json" in words) as output:
         try:

@@ -18,6 +18,7 @@ from antennate.errors import BadInputError
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
+from antennate.studies.replaced import settle_if_free
 from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOG, LOGS, require_apart
@@ -86,6 +87,7 @@ def log_of(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
+    settle_if_free(path)
     every = sorted((path / LOGS).glob("*.mcap"))
     logs = [each for each in every if _original(each) not in every]
     logs = logs or [each for each in [path / LOG] if each.exists()]

@@ -117,13 +117,14 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
-        Kept(places, robot, passage, config) as kept,
+        Kept(places, robot) as kept,
         page_of(places) or nullcontext() as page,
         TwinServer(robot, faults, *_endpoints(places), orders) as server,
     ):
         _watch(robot, passage, faults, kept, places.passed)
         if page is not None:
             kept.watchers.append(_shown(page, robot, config))
+        kept.begin(passage, config)
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep

@@ -43,39 +43,47 @@ class Kept:
     Args:
         options: What is wanted.
         robot: The twin.
-        passage: How far it has come; its `on_tick` and `on_pass` are the caller's.
-        config: What is served.
 
     Attributes:
         watchers: What is to be called with the world after each tick.
 
     Raises:
         ConfigError: A file has another ending, or exists.
-        LogError: The log cannot be begun.
         MissingPackageError: A package of the extra `video` is missing.
         BadInputError: Nothing here can draw.
     """
 
-    def __init__(
-        self, options: KeptOptions, robot: TwinRobot, passage: Passage, config: TwinConfig
-    ) -> None:
+    def __init__(self, options: KeptOptions, robot: TwinRobot) -> None:
         self.watchers: list[Callable[[World], None]] = []
-        self._robot = robot
+        self._options, self._robot = options, robot
         self._log: LogProcess | None = None
         self._film: TwinFilm | None = None
-        self._video = options.video
         _require("--log", options.log, ".mcap")
         _require("--video", options.video, ".mp4")
         if options.video is not None:
-            from antennate.telemetry.film import require_video  # these are slow to import
-            from antennate.telemetry.twin_film import TwinFilm
+            from antennate.telemetry.film import require_video  # slow to import
 
             require_video()
-            self._film = TwinFilm(robot, passage, config)
+
+    def begin(self, passage: Passage, config: TwinConfig) -> None:
+        """Begin, once all else is ready: before that no file is made.
+
+        Args:
+            passage: How far the twin has come; its `on_tick` and `on_pass` are the caller's.
+            config: What is served.
+
+        Raises:
+            LogError: The log cannot be begun.
+        """
+        if self._options.log is not None:
+            log = LogProcess(self._options.log, header_of(config, time.time_ns()), _tell)
+            self._log = log
+            self.watchers.append(TwinLog(log, self._robot, config).take)
+        if self._options.video is not None:
+            from antennate.telemetry.twin_film import TwinFilm  # slow to import
+
+            self._film = TwinFilm(self._robot, passage, config)
             self.watchers.append(self._film.take)
-        if options.log is not None:
-            self._log = LogProcess(options.log, header_of(config, time.time_ns()), _tell)
-            self.watchers.append(TwinLog(self._log, robot, config).take)
 
     def event(self, text: str) -> None:
         """Keep in the log what happened now."""
@@ -97,8 +105,8 @@ class Kept:
             failure = self._log.failure
             if not failure:
                 write(f"log: {self._log.path}{f': {wrong}' if wrong else ''}\n")
-        if self._film is not None and self._video is not None:
-            _draw(self._film, self._video)
+        if self._film is not None and self._options.video is not None:
+            _draw(self._film, self._options.video)
         if failure and isinstance(error, KeyboardInterrupt | None):
             raise LogError(failure) from None
 

@@ -15,6 +15,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from antennate.errors import OutputError
 from antennate.studies.run_files import (
     CALIBRATION,
     ENDINGS,
@@ -100,6 +101,12 @@ def settle(place: Path) -> None:
                 _settle(place)
             finally:
                 os.close(lock)
+
+
+def settle_if_free(place: Path) -> None:
+    """The same before a folder is read: unless it cannot be written, or another process lives."""
+    with contextlib.suppress(OSError, OutputError):
+        settle(place)
 
 
 def _locked(folder: Path) -> int:

@@ -31,7 +31,7 @@ from antennate.params.reading import Config, read_file
 from antennate.studies import dates, formats
 from antennate.studies.claim import Claim, claim
 from antennate.studies.processor import processor
-from antennate.studies.replaced import settle
+from antennate.studies.replaced import settle_if_free
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -110,8 +110,7 @@ class RunDirectory:
             BadInputError: It holds no run, or the path is none.
         """
         place = checks.path("path", path)
-        with contextlib.suppress(OSError, OutputError):  # it cannot be written, or is worked on
-            settle(place)
+        settle_if_free(place)
         if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
         return cls(Claim(place))
