@@ -16,7 +16,7 @@ import multiprocessing
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import mujoco.batch
@@ -101,7 +101,7 @@ def on_threads(config: TunnelConfig, trials: int, pool: Executor) -> list[TrialR
     def bodies(batch: int) -> tuple[Scene, Bodies]:
         size = -(-batch // CORES)
         made = [cpu_bodies(config)(len(range(batch)[i : i + size])) for i in range(0, batch, size)]
-        return made[0][0], Halves([part for _, part in made], size, pool)
+        return made[0][0], cast(Bodies, Halves([part for _, part in made], size, pool))
 
     return rows_of(config, range(trials), bodies=bodies)
 

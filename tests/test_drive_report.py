@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -120,6 +121,20 @@ def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
     assert made.session.tally.sent > 10
     assert report.worst is State.OFF
     assert "SUPPLY_OFF" in report.why
+
+
+def test_why_is_of_the_longest_time_in_the_worst_state() -> None:
+    """The board is silent for 0.25 s, and later a flex sensor is shorted for 0.7 s."""
+
+    def act(made: Rig, t: float) -> None:
+        silent(1.0, 1.25)(made, t)
+        made.robot.hold(0, 0.0 if 1.7 < t < 2.4 else math.nan)
+
+    config = CONFIG.model_copy(update={"duration": 2.5})
+    _, report = driven(act, config=config)
+    assert report.worst is State.HOLD
+    assert "SHORT_LO" in report.why
+    assert "STALE" not in report.why
 
 
 SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna board"

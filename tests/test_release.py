@@ -1,8 +1,9 @@
-"""Torque off whatever the bus does, and the command held before."""
+"""Torque on and off whatever the bus does, and the command held before."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pytest
@@ -15,6 +16,9 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.answers import SILENT, Answer, Span
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
@@ -275,3 +279,52 @@ def test_B19_a_release_on_purpose_is_no_loss_of_torque() -> None:
     assert not any(servo.torque for servo in made.robot.servos)
     assert Cause.STOPPED in causes
     assert not causes & {Cause.DISARMED, Cause.WATCHDOG}
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_packet_that_arming_lost_is_written_again(lost: int) -> None:
+    made = Servos()
+    for servo in made.twin.servos:
+        servo.set("goal_position", 3000)
+    write_all, written = made.bus.write_all, Counter[int]()
+
+    def lossy(address: int, data: Mapping[int, bytes]) -> None:
+        written[address] += 1
+        if written[address] > lost:
+            write_all(address, data)
+
+    made.bus.write_all = lossy  # type: ignore[method-assign]
+    bringup.enable(made.bus, IDS)
+    assert all(servo.torque for servo in made.twin.servos)
+    assert set(written.values()) == {1 + lost}
+
+
+def test_a_servo_that_takes_no_goal_is_named_with_what_it_has() -> None:
+    made = Servos()
+    made.twin.servos[5].set("goal_position", 3000)
+    write_all = made.bus.write_all
+
+    def deaf(address: int, data: Mapping[int, bytes]) -> None:
+        if others := {i: value for i, value in data.items() if i != 6}:
+            write_all(address, others)
+
+    made.bus.write_all = deaf  # type: ignore[method-assign]
+    with pytest.raises(BringUpError, match=r"goal_position of servos \[6\], they have 3000"):
+        bringup.enable(made.bus, IDS)
+    assert not any(servo.torque for servo in made.twin.servos)
+
+
+def test_a_hardware_error_keeps_its_name_while_its_register_does_not_answer() -> None:
+    made = Servos()
+    monitor = ServoMonitor(made.bus, tuple(IDS), made.link.now)
+    made.twin.servos[6].fail(1 << 5)
+    monitor.step()
+    assert monitor.errors == {7: "overload"}
+    read_all = made.bus.read_all
+
+    def without(ids: Sequence[int], span: Span, *rest: float) -> dict[int, Answer]:
+        return {7: SILENT} if span.address == 70 else read_all(ids, span, *rest)
+
+    made.bus.read_all = without  # type: ignore[method-assign]
+    monitor.step()
+    assert monitor.errors == {7: "overload"}

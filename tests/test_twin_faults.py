@@ -181,3 +181,8 @@ def test_a_fault_of_the_answers_is_taken_back() -> None:
         robot.advance(robot.t + 0.1)
         heard.append(bool(robot.bus.transmit(robot.t)))
     assert heard == [False, True]
+
+
+@pytest.mark.parametrize("text", ["servo:7=torque_enable:0", "servo:7=silent", "bus=latency:0.05"])
+def test_a_fault_is_told_as_it_was_asked_for(text: str) -> None:
+    assert str(read(text)) == text

@@ -72,7 +72,8 @@ def targets(
     """
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
     yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
-    yaw = np.minimum(np.maximum(yaw, -robot.yaw_limit), robot.yaw_limit)
+    largest = robot.yaw_limit
+    yaw = np.minimum(np.maximum(yaw, -largest), largest)
     if robot.legs.kind == "rolling":
         leg = (phase[:, None] - links)[:, :, None] + _SIDES
     elif lifting:

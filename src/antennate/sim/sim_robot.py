@@ -191,13 +191,16 @@ class SimRobot:
 
         What has become of the rows is looked at with the next tick, reading or question for
         failures, all of them at once: a physics step pushes everything else out of the cache.
-        Until then a world is changed by hand through `put_back` only.
+        For the same reason rows are stepped to and fro: the last of a tick are the first of the
+        next, while the cache still has them. Until the look a world is changed by hand through
+        `put_back` only.
         """
         while self._ticks * self._period < t - 1e-9:
             if self._moved:
                 self._look()
             self._ticks += 1
-            for i, row in self._rows.items():
+            rows = list(self._rows.items())
+            for i, row in rows if self._ticks % 2 else reversed(rows):
                 if row.commanded and i not in self._failures:
                     if not row.tick % row.chance.slip_ticks:
                         self._slip(row)

@@ -61,7 +61,8 @@ class Demand:
 
     def __str__(self) -> str:
         servo = f":{self.servo}" if self.servo else ""
-        size = f":{self.size:g}" if self.size else ""
+        register = self.what in XC430_W240.registers
+        size = f":{self.size:g}" if self.size or register else ""
         return f"{self.target}{servo}={self.what}{size}"
 
 

@@ -12,15 +12,33 @@ from antennate.hardware.safety.causes import DATA, Cause, Outputs, State
 
 
 @dataclass(slots=True)
+class _Spell:
+    """A time in one bad state; a cause found while it lasts makes it clearer."""
+
+    state: State
+    why: str
+    causes: set[Cause]
+    ticks: int = 0
+
+    def go_on(self, why: str, causes: set[Cause]) -> None:
+        """One more tick of it."""
+        more = causes == self.causes and len(why) > len(self.why)  # of the same causes, more servos
+        if more or not causes <= self.causes:
+            self.why = why
+        self.causes |= causes
+        self.ticks += 1
+
+
+@dataclass(slots=True)
 class Report:
     """How a drive went.
 
     Attributes:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
-        worst: Worst state since torque came on, and why. The short wait for the first decision is
-            left out, unless no command follows it. If torque never came on, HOLD if data are
-            missing at the end.
+        worst: Worst state since torque came on, and why, the longest time that it lasted. The short
+            wait for the first decision is left out, unless no command follows it. If torque never
+            came on, HOLD if data are missing at the end.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
         ended: What ended it.
@@ -37,7 +55,8 @@ class Report:
     walk: Walk = field(default_factory=Walk)
     _torque: bool = False
     _waits: str = ""
-    _causes: set[Cause] | None = None
+    _spell: _Spell | None = None
+    _longest: int = 0
 
     @property
     def safe(self) -> bool:
@@ -59,16 +78,17 @@ class Report:
         elif out.state >= max(self.worst, State.DEGRADED) and not _ordered(out):
             self._explain(out, why)
         else:
-            self._causes = None
+            self._spell = None
 
     def _explain(self, out: Outputs, why: str) -> None:
-        """Keep why the worst state began; a cause found while it lasts makes it clearer."""
-        causes = {active.cause for active in out.causes}
-        known = self._causes
-        if out.state > self.worst or (known is not None and not causes <= known):
-            self.worst, self.why, self._causes = out.state, why, causes | (known or set[Cause]())
-        elif causes == known and len(why) > len(self.why):  # of the same causes, more servos
-            self.why = why
+        """Keep why the worst state lasted longest."""
+        causes, spell = {active.cause for active in out.causes}, self._spell
+        if spell is None or out.state is not spell.state:
+            spell = _Spell(out.state, why, causes | (spell.causes if spell else set()))
+            self._spell = spell
+        spell.go_on(why, causes)
+        if (spell.state, spell.ticks) > (self.worst, self._longest):
+            self.worst, self.why, self._longest = spell.state, spell.why, spell.ticks
 
     def close(self, session: Session) -> None:
         """The last tick is over."""

@@ -120,7 +120,7 @@ class ServoMonitor(ActuatorState):
         if reply.alert:
             bits = self._one(servo, _ERRORS)
             words = hardware_errors(bits[0]) if bits else []
-            self.errors[servo] = ", ".join(words) or "alert"
+            self.errors[servo] = ", ".join(words) or self.errors.get(servo, "alert")
         else:
             self.errors.pop(servo, None)
 
