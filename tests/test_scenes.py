@@ -421,6 +421,36 @@ def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path, capsys):
     assert "expected room for the robot at the start" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(tmp_path, workers):
+    """The first trial is drawn before anything is run, so a scene without any trial is refused."""
+    lines = [
+        "import numpy as np",
+        "from antennate.sim.scenes.scene import Route",
+        "class Mine:",
+        "    random = True",
+        "    def draw(self, robot, rng):",
+        "        if rng.random() < 0.3:",
+        "            raise ValueError('no room for a stone')",
+        "        return Route(np.array([[0.0, 0.0], [1.0, 0.0]]))",
+    ]
+    (tmp_path / "mine.py").write_text("\n".join(lines))
+    words = ["tunnel", "--scene", f"{tmp_path / 'mine.py'}:Mine", "--trials", "9", "--no-figures"]
+    more = ["--controllers", "open", "closed", "--time-limit", "0.2", "--workers", workers]
+    assert main([*words, *more, "--out", str(tmp_path / "run")]) == 0
+    rows = RunDirectory.open(tmp_path / "run").rows()
+    reasons = {name: [r["reason"] for r in rows if r["controller"] == name] for name in more[1:3]}
+    assert reasons["open"] == reasons["closed"]
+    lost = [row for row in rows if "no room for a stone" in str(row["reason"])]
+    assert 0 < len(lost) < 18
+    assert {row["outcome"] for row in lost} == {"invalid"}
+    assert {row["outcome"] for row in rows if row not in lost} == {"timeout"}
+    assert len(rows) == 18
+    lines[5] = "        if True:"
+    (tmp_path / "mine.py").write_text("\n".join(lines))
+    assert main([*words, "--out", str(tmp_path / "none")]) == 2
+
+
 @pytest.mark.parametrize(
     ("answer", "told"),
     [

@@ -132,6 +132,8 @@ class _Rows:
         """
         config = self._config
         phases = [self._place(row) for row in range(self._batch)]
+        if not self._monitors:
+            return
         try:
             made = make(self._name, config.control, config.robot, self._batch)
         except ConfigError as error:
@@ -139,8 +141,7 @@ class _Rows:
         control = CheckedController(made, config.robot, self._batch)
         decisions = Decisions(config.robot, made, self._batch)
         for row, phase in enumerate(phases):
-            control.reset(np.array([row]), phase)
-            self._log(row, phase, decisions)
+            self._reset(row, phase, control, decisions)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._logs:
@@ -150,17 +151,30 @@ class _Rows:
             if self._looks is not None:
                 self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
-                if self._waiting:
-                    phase = self._place(row)
-                    control.reset(np.array([row]), phase)
-                    self._log(row, phase, decisions)
+                self._reset(row, self._place(row), control, decisions)
             return bool(self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
 
-    def _place(self, row: int) -> float:
-        """Put the next trial into a row; its gait phase [rad]."""
-        config, trial = self._config, self._waiting.pop(0)
+    def _place(self, row: int) -> float | None:
+        """Put the next trial whose scene can be drawn into a row; its gait phase [rad], if any."""
+        while self._waiting:
+            trial = self._waiting.pop(0)
+            try:
+                return self._begin(row, trial)
+            except SceneError as error:
+                key = self._config.seed, trial, self._name
+                lost = TrialResult(*key, "invalid", self._config.time_limit, reason=str(error))
+                self._emit((lost, None))
+        return None
+
+    def _begin(self, row: int, trial: int) -> float:
+        """Put a trial into a row; its gait phase [rad].
+
+        Raises:
+            SceneError: The scene cannot be drawn.
+        """
+        config = self._config
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
@@ -174,6 +188,14 @@ class _Rows:
         except SceneError as error:
             self._blocked[row] = str(error)
         return start.phase
+
+    def _reset(
+        self, row: int, phase: float | None, control: CheckedController, decisions: Decisions
+    ) -> None:
+        """Let the controller, and the log, begin with the trial that was put into a row, if any."""
+        if phase is not None:
+            control.reset(np.array([row]), phase)
+            self._log(row, phase, decisions)
 
     def log_of(self, trial: int) -> Path:
         """The log of a trial."""
