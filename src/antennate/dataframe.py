@@ -19,7 +19,8 @@ def from_columns(columns: Mapping[str, Any]) -> Any:
         import pandas
     except ImportError:
         raise MissingPackageError(
-            "to_dataframe: expected pandas, found none; install it with `pip install pandas`"
+            "to_dataframe: expected pandas, found none; install it with `pip install pandas`, or "
+            "in a clone `uv sync --extra pandas`"
         ) from None
     return pandas.DataFrame(dict(columns))
 
