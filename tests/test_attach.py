@@ -187,3 +187,5 @@ def test_what_cannot_be_attached_is_one_line() -> None:
         with pytest.raises(ConfigError, match=r"names: expected antennae of . hinges") as error:
             AntennaReader(model, names, kind, 0.01)
         assert "\n" not in str(error.value)
+    with pytest.raises(ConfigError, match="found one of 4 hinges for 6"):
+        AntennaReader(model, [name], AntennaSpec(active_coils=(3.0, 6.0, 9.0, 9.0)), 0.01)

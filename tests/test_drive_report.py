@@ -19,6 +19,7 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.lateness import late_sentence
+from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
@@ -137,6 +138,29 @@ def test_why_is_of_the_longest_time_in_the_worst_state() -> None:
     assert "STALE" not in report.why
 
 
+def test_why_is_of_a_fault_rather_than_of_a_key_that_was_let_go() -> None:
+    """The board is silent for 0.3 s; later nobody holds the key for longer."""
+    held = True
+
+    def act(made: Rig, t: float) -> None:
+        nonlocal held
+        silent(1.0, 1.3)(made, t)
+        held = not 1.8 < t < 2.6
+
+    made = rig(TwinConfig())
+    config = CONFIG.model_copy(update={"duration": 2.5})
+    report = drive(
+        made.session,
+        config,
+        arm=True,
+        on_tick=lambda session, t: act(made, t),
+        operator=Operator(pressed=lambda: held),
+    )
+    assert report.worst is State.HOLD
+    assert "STALE" in report.why
+    assert "RELEASED" not in report.why
+
+
 SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna board"
 
 
@@ -145,7 +169,7 @@ SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna 
     [
         ("1.3s", False, True, SILENT),
         ("1.3s", True, True, SILENT),
-        ("1.55s", False, False, "no command was sent; worst state HOLD (STALE: no fresh"),
+        ("1.55s", False, False, "no command was sent; worst state HOLD for"),
     ],
 )
 def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(

@@ -146,6 +146,23 @@ def test_killed_before_its_first_trial_the_old_run_is_there_again(
         assert files() == before
 
 
+def test_the_log_of_a_killed_first_trial_is_read_and_not_removed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The old run is there again for the next command that takes the folder."""
+    before = files()
+    killed_once(Path("begun"), slow_study(free=0))
+    new = Path("run/logs/open-0.mcap")
+    new.parent.mkdir(exist_ok=True)
+    new.write_bytes(b"a log that was begun")
+    for words in (["log", "info"], ["log", "recover"], ["replay"], ["view"]):
+        assert main([*words, "run"]) == 2  # it is no whole log
+        assert "run/logs/open-0.mcap" in capsys.readouterr().err
+        assert new.read_bytes() == b"a log that was begun"
+    assert RunDirectory.open("run").rows()
+    assert files() == before
+
+
 def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
     killed_once(Path("begun"), slow_study(free=1))
     process = program(

@@ -154,3 +154,9 @@ def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:
     config.write_text('[robot]\nbase = "mine.toml"\nmass = 1.5\n[robot.yaw]\nfastest = 2.0\n')
     found = read_file(config, TunnelConfig).robot
     assert (found.links, found.mass, found.yaw.limit, found.yaw.fastest) == (4, 1.5, 0.4, 2.0)
+
+
+@pytest.mark.parametrize("other", ["scuttle", RobotSpec, None])
+def test_what_is_no_robot_is_said_so(other: object) -> None:
+    with pytest.raises(AssertionError, match="expected a RobotSpec, found"):
+        check_robot(other)  # type: ignore[arg-type]

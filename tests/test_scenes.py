@@ -146,6 +146,10 @@ def test_a_sound_one_passes():
         (Drawing(lambda rng: Elsewhere()), "progress 0 m at the start"),
         (Drawing(lambda rng: Backwards()), "to grow"),
         (Drawing(lambda rng: NeverThere()), "success past the exit"),
+        (Drawing, "a scene, an object with draw and random"),
+        ("tunnel", "a scene, an object with draw and random"),
+        (Drawing(lambda rng: 7), "an instance with start, length"),
+        (Drawing(lambda rng: 1 / 0), "draw to work, found: ZeroDivisionError"),
         (Drawing(lambda rng: AtOnce()), "no success at the start"),
         (Drawing(lambda rng: Endless()), "to have left"),
         (Drawing(lambda rng: GoneAtOnce()), "a start inside"),
@@ -421,8 +425,16 @@ def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path, capsys):
     assert "expected room for the robot at the start" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
-def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(tmp_path, workers):
+@pytest.mark.parametrize(
+    ("workers", "ends", "told"),
+    [
+        ("1", "raise ValueError('no room for a stone')", "ValueError: no room for a stone"),
+        ("2", "raise SystemExit(3)", "SystemExit: 3"),
+    ],
+)
+def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(
+    tmp_path, workers, ends, told
+):
     """The first trial is drawn before anything is run, so a scene without any trial is refused."""
     lines = [
         "import numpy as np",
@@ -431,9 +443,10 @@ def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(tmp_p
         "    random = True",
         "    def draw(self, robot, rng):",
         "        if rng.random() < 0.3:",
-        "            raise ValueError('no room for a stone')",
+        "",
         "        return Route(np.array([[0.0, 0.0], [1.0, 0.0]]))",
     ]
+    lines[6] = f"            {ends}"
     (tmp_path / "mine.py").write_text("\n".join(lines))
     words = ["tunnel", "--scene", f"{tmp_path / 'mine.py'}:Mine", "--trials", "9", "--no-figures"]
     more = ["--controllers", "open", "closed", "--time-limit", "0.2", "--workers", workers]
@@ -441,7 +454,7 @@ def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(tmp_p
     rows = RunDirectory.open(tmp_path / "run").rows()
     reasons = {name: [r["reason"] for r in rows if r["controller"] == name] for name in more[1:3]}
     assert reasons["open"] == reasons["closed"]
-    lost = [row for row in rows if "no room for a stone" in str(row["reason"])]
+    lost = [row for row in rows if told in str(row["reason"])]
     assert 0 < len(lost) < 18
     assert {row["outcome"] for row in lost} == {"invalid"}
     assert {row["outcome"] for row in rows if row not in lost} == {"timeout"}

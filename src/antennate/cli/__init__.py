@@ -29,7 +29,7 @@ ROBOT_COMMANDS = {
     "report": "A run, or two side by side, as one page to read, print and send",
     "merge": "The shards of a run as the run that they are parts of",
 }
-_HELP = {"-h", "--help", "--help-all", "--completion"}
+_HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

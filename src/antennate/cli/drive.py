@@ -209,7 +209,9 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentences(result: Mapping[str, Any]) -> str:
-    cures = what_to_do(f"{result['refusal']}; {result['why']}") if _failed(result) else []
+    held = result["worst_state"] == State.HOLD.name and result.get("worst_s", 0.0) >= _LONG
+    told = f"{result['refusal']}; {result['why']}" if held or _failed(result) else ""
+    cures = what_to_do(told)
     return "\n".join([_sentence(result), *late_sentence(result), *cures])
 
 
@@ -273,6 +275,10 @@ def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
         yield Operator(stop, pressed, arrived or (lambda: False))
 
 
+_LONG = 1.0
+"""Time in HOLD from which on somebody should look at its cause [s] (assumed)."""
+
+
 def _failed(result: Mapping[str, Any]) -> bool:
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
     return fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
@@ -299,7 +305,8 @@ def _sentence(result: Mapping[str, Any]) -> str:
     state = result["worst_state"]
     causes = [cause.removeprefix(f"{state} ") for cause in result["why"].split("; ")]
     why = f" ({'; '.join(causes)})" if result["why"] else ""
-    worst = f"worst state {state}{why}"
+    time = result.get("worst_s")  # results of older versions have none
+    worst = f"worst state {state}{f' for {time:.1f} s' if time else ''}{why}"
     torque = _torque(result)
     if result["refusal"]:
         more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""

@@ -87,7 +87,8 @@ def log_of(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
-    settle_if_free(path)
+    if not any((path / LOGS).glob("*.mcap")):  # to settle would remove those of a killed run
+        settle_if_free(path)
     every = sorted((path / LOGS).glob("*.mcap"))
     logs = [each for each in every if _original(each) not in every]
     logs = logs or [each for each in [path / LOG] if each.exists()]

@@ -149,6 +149,7 @@ class AntennaReader:
             checks.text("names", name)
         self._angle = _sensor_addresses(model, names, "angle", antenna.hinges)
         self._touch = _sensor_addresses(model, names, "touch", antenna.hinges)
+        _require_no_more(model, names, antenna.hinges)
         self._covered = antenna.sensed_hinges
         self._sensor = antenna.sensor
         self._chain = SensorChain(antenna.sensor, (1, len(names)), period)
@@ -195,3 +196,19 @@ def _sensor_addresses(model: mujoco.MjModel, names: Sequence[str], kind: str, co
             f"names: expected antennae of {count} hinges that attach_antenna added, found "
             f"{', '.join(names)}: {str(error.args[0]).splitlines()[0]}"
         ) from None
+
+
+def _require_no_more(model: mujoco.MjModel, names: Sequence[str], count: int) -> None:
+    """Check that no antenna has more hinges than these.
+
+    Raises:
+        ConfigError: One has.
+    """
+    known = {model.sensor(i).name for i in range(model.nsensor)}
+    for name in names:
+        more = sum(f"{name}/angle{i}" in known for i in range(count, model.nsensor))
+        if more:
+            raise ConfigError(
+                f"antenna: expected the AntennaSpec that was attached as {name}, found one of "
+                f"{count} hinges for {count + more}"
+            )

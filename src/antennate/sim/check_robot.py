@@ -31,6 +31,7 @@ def check_robot(robot: RobotSpec) -> None:
     Raises:
         AssertionError: Something is otherwise than expected.
     """
+    expect(isinstance(robot, RobotSpec), "a RobotSpec", repr(robot))
     _check_numbers(robot)
     world = World(compile_world(PhysicsParams(), robot), robot)
     mass = float(world.model.body_mass.sum())

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from antennate.control.expect import expect
-from antennate.errors import AntennateError
+from antennate.errors import AntennateError, raised
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
-from antennate.sim.trial import make_world, place_at_start, require_room
+from antennate.sim.trial import MEMBERS, make_world, place_at_start, require_room
 from antennate.types import Floats
 
 _SEEDS = (0, 1, 2)
@@ -43,6 +43,8 @@ def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
         AssertionError: It does not; the text says what was expected and found.
     """
     robot = robot or RobotSpec()
+    fits = hasattr(scene, "draw") and hasattr(scene, "random") and not isinstance(scene, type)
+    expect(fits, "a scene, an object with draw and random", repr(scene))
     models = [_checked_model(_draw(scene, robot, seed), robot) for seed in _SEEDS]
     for seed, model in zip(_SEEDS, models, strict=True):
         again = _checked_model(_draw(scene, robot, seed), robot)
@@ -58,7 +60,13 @@ def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
 
 
 def _draw(scene: Scene, robot: RobotSpec, seed: int) -> SceneInstance:
-    return scene.draw(robot, np.random.default_rng(seed))
+    try:
+        drawn = scene.draw(robot, np.random.default_rng(seed))
+    except Exception as error:
+        raise AssertionError(f"expected draw to work, found: {raised(error)}") from error
+    lacking = [name for name in MEMBERS if not hasattr(drawn, name)]
+    expect(not lacking, f"an instance with {', '.join(MEMBERS)} from draw", repr(drawn))
+    return drawn
 
 
 def _checked_model(drawn: SceneInstance, robot: RobotSpec) -> bytes:
@@ -73,6 +81,8 @@ def _checked_model(drawn: SceneInstance, robot: RobotSpec) -> bytes:
         world.step(_SETTLE)
     except AntennateError as error:
         raise AssertionError(f"expected the robot to stand at the start, found: {error}") from error
+    except Exception as error:
+        raise AssertionError(f"expected build to work, found: {raised(error)}") from error
     return saved.tobytes()
 
 
@@ -100,6 +110,8 @@ def _check_exit(drawn: SceneInstance) -> None:
     expect(bool(np.hypot(*along) > 0.0), "an exit line with a length", "none")
     normal = np.array([-along[1], along[0]]) / np.hypot(*along)
     sides = [middle + _NEAR * normal, middle - _NEAR * normal]
+    ways = [drawn.progress(side) for side in sides]
+    expect(bool(np.isfinite(ways).all()), "finite progress about the exit", f"{ways} m")
     before, past = sorted(sides, key=drawn.progress)
     expect(drawn.succeeded(past), f"success past the exit, at {_shown(past)}", "none")
     expect(not drawn.succeeded(before), f"no success before it, at {_shown(before)}", "success")

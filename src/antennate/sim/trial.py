@@ -31,7 +31,7 @@ LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
-_MEMBERS = ("start", "length", "exit", "build", "progress", "succeeded", "left")
+MEMBERS = ("start", "length", "exit", "build", "progress", "succeeded", "left")
 """What a SceneInstance has."""
 
 
@@ -154,7 +154,7 @@ def check_start(config: TrialConfig) -> None:
 def _drawn(config: TrialConfig, scene: Scene, rng: np.random.Generator) -> SceneInstance:
     with _errors_of(config.scene):
         drawn = scene.draw(config.robot, rng)
-        lacking = [name for name in _MEMBERS if not hasattr(drawn, name)]
+        lacking = [name for name in MEMBERS if not hasattr(drawn, name)]
     if lacking:
         raise SceneError(
             f"scene {config.scene!r}: expected draw to return a SceneInstance, found "
@@ -168,9 +168,9 @@ def _errors_of(name: str) -> Iterator[None]:
     """Name the scene in whatever its code raises."""
     try:
         yield
-    except AntennateError:
+    except (AntennateError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:  # SystemExit too
         raise SceneError(f"scene {name!r} failed: {raised(error)}") from error
 
 

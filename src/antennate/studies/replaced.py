@@ -87,16 +87,20 @@ class Replaced:
             self._store.close()
 
 
-def settle(place: Path) -> None:
+def settle(place: Path, sure: bool = False) -> None:
     """End what a killed process has left half replaced in a folder.
 
+    Args:
+        place: The folder.
+        sure: Whether it must be certain that the process is dead; without locks it never is.
+
     Raises:
-        OSError: A file cannot be moved.
+        OSError: A file cannot be moved, or, if it must be sure, there are no locks.
         OutputError: The process lives.
     """
     for folder in [place / name for name in (_MOVING, _ASIDE, _GONE)]:
         if is_folder(folder):
-            lock = _locked(folder)
+            lock = _locked(folder, sure)
             try:
                 _settle(place)
             finally:
@@ -104,21 +108,28 @@ def settle(place: Path) -> None:
 
 
 def settle_if_free(place: Path) -> None:
-    """The same before a folder is read: unless it cannot be written, or another process lives."""
+    """The same before a folder is read, unless it cannot be written or another process may live."""
     with contextlib.suppress(OSError, OutputError):
-        settle(place)
+        settle(place, sure=True)
 
 
-def _locked(folder: Path) -> int:
-    """A lock on a folder, which the system frees when this process ends."""
+def _locked(folder: Path, sure: bool = False) -> int:
+    """A lock on a folder, which the system frees when this process ends.
+
+    Args:
+        folder: Where.
+        sure: Whether a file system without locks is an error.
+    """
     lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(lock)
         raise nobody_else(folder.parent) from None
-    except OSError:
-        pass  # a file system without locks
+    except OSError:  # a file system without locks
+        if sure:
+            os.close(lock)
+            raise
     return lock
 
 

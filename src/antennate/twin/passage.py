@@ -57,4 +57,4 @@ class Passage:
         length = self._scene.length
         if self.passed < math.inf:
             return f"the head passed the exit after {self.passed:.1f} s of walking"
-        return f"the head came {self.progress:.2f} m of {length:.2f} m"
+        return f"the head came {min(self.progress, length):.2f} m of {length:.2f} m"

@@ -20,6 +20,13 @@ class _Spell:
     causes: set[Cause]
     ticks: int = 0
 
+    @property
+    def rank(self) -> tuple[State, bool, int]:
+        """What counts more: a worse state, one that is not the operator's wish, a longer one."""
+        causes = {cause for cause in self.causes if cause.severity is self.state}
+        wished = causes - {Cause.UNKNOWN_CONTACT} == {Cause.RELEASED}
+        return self.state, not wished, self.ticks
+
     def go_on(self, why: str, causes: set[Cause]) -> None:
         """One more tick of it."""
         more = causes == self.causes and len(why) > len(self.why)  # of the same causes, more servos
@@ -56,7 +63,7 @@ class Report:
     _torque: bool = False
     _waits: str = ""
     _spell: _Spell | None = None
-    _longest: int = 0
+    _worst: tuple[State, bool, int] = (State.OK, False, 0)
 
     @property
     def safe(self) -> bool:
@@ -87,8 +94,8 @@ class Report:
             spell = _Spell(out.state, why, causes | (spell.causes if spell else set()))
             self._spell = spell
         spell.go_on(why, causes)
-        if (spell.state, spell.ticks) > (self.worst, self._longest):
-            self.worst, self.why, self._longest = spell.state, spell.why, spell.ticks
+        if spell.rank > self._worst:
+            self.worst, self.why, self._worst = spell.state, spell.why, spell.rank
 
     def close(self, session: Session) -> None:
         """The last tick is over."""
@@ -105,6 +112,7 @@ class Report:
         board, answers = session.board, session.actuators.tally
         return {
             "worst_state": self.worst.name,
+            "worst_s": round(self._worst[2] * session.period, 3),
             "why": self.why,
             "refusal": self.refusal,
             "ended": self.ended,

@@ -80,9 +80,13 @@ def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     Raises:
         BringUpError: A servo did not answer, or refused: a tripped bus watchdog locks goals.
     """
-    present = read_register(bus, ids, _COMMON["present_position"])
-    _write_checked(bus, _COMMON["goal_position"], present)
-    return present
+    register, wrong = _COMMON["goal_position"], dict[int, int]()
+    for _ in range(_WRITES):
+        present = read_register(bus, ids, _COMMON["present_position"])  # it may be moved by hand
+        wrong = _written(bus, register, present)
+        if not wrong:
+            return present
+    raise _unwritten(register, wrong)
 
 
 def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -> None:
@@ -134,9 +138,15 @@ def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     Raises:
         BringUpError: A servo did not take it; those that did keep holding their place.
     """
-    present = hold_here(bus, ids)
-    _write_checked(bus, _COMMON["torque_enable"], dict.fromkeys(ids, 1))
-    return present
+    register, left = _COMMON["torque_enable"], dict.fromkeys(ids, 1)
+    wrong: dict[int, int] = {}
+    for _ in range(_WRITES):
+        present = hold_here(bus, ids)
+        wrong = _written(bus, register, left)
+        if not wrong:
+            return present
+        left = dict.fromkeys(wrong, 1)
+    raise _unwritten(register, wrong)
 
 
 def disable(
@@ -178,20 +188,33 @@ def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int,
 
 
 def _write_checked(bus: Bus, register: Register, values: Mapping[int, int]) -> None:
-    """Write a register of each servo, and again where another value is read back.
-
-    A packet for all servos has no answer, so one lost byte of it is seen only here.
-    """
-    left = dict(values)
-    there: dict[int, int] = {}
+    """Write a register of each servo, and again where another value is read back."""
+    left, wrong = dict(values), dict[int, int]()
     for _ in range(_WRITES):
-        bus.write_all(register.address, {i: register.encode(v) for i, v in left.items()})
-        there = read_register(bus, list(left), register)
-        left = {i: value for i, value in left.items() if there[i] != value}
-        if not left:
+        wrong = _written(bus, register, left)
+        if not wrong:
             return
-    found = ", ".join(map(str, sorted({there[i] for i in left})))
-    raise BringUpError(f"could not write {register.name} of servos {[*left]}, they have {found}")
+        left = {i: values[i] for i in wrong}
+    raise _unwritten(register, wrong)
+
+
+def _written(bus: Bus, register: Register, values: Mapping[int, int]) -> dict[int, int]:
+    """Write a register of each servo once; those that have another value then, and that value.
+
+    A packet for all servos has no answer, so one lost byte of it is seen only by reading.
+    """
+    bus.write_all(register.address, {i: register.encode(v) for i, v in values.items()})
+    there = read_register(bus, list(values), register)
+    return {i: there[i] for i, value in values.items() if there[i] != value}
+
+
+def _unwritten(register: Register, wrong: Mapping[int, int]) -> BringUpError:
+    """The error of servos that kept other values."""
+    by_value: dict[int, list[int]] = {}
+    for servo, value in wrong.items():
+        by_value.setdefault(value, []).append(servo)
+    found = ", ".join(f"{value} in servos {ids}" for value, ids in by_value.items())
+    return BringUpError(f"could not write {register.name}, found {found}")
 
 
 def _fault(present: Present | None, model: int) -> str:

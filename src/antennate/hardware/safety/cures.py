@@ -43,7 +43,7 @@ CURES = MappingProxyType(
         Cause.REPEATED_FAILURES: _CODE,
         Cause.REBOOT_LOOP: _BOARD,
         Cause.SILENT_SERVO: f"close other programs; {_BUS}",
-        Cause.SERVO_ERROR: "switch the servos off; let them cool, free what blocks them",
+        Cause.SERVO_ERROR: "switch the servos off; free them, let them cool; is the supply right?",
         Cause.BUS_ERROR: f"check the adapter of the servo bus and its cable; {_BUS}",
         Cause.WATCHDOG: f"close other programs; then {_ARM}",
         Cause.DISARMED: f"{_BUS}; then {_ARM}",
