@@ -161,14 +161,7 @@ def _figure(log: Path) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class _Record:
-    """What the log begins with, its first file, whether it is required, and the way to a page.
-
-    Attributes:
-        header: What the log begins with.
-        log: Its first file.
-        required: Whether the robot may walk only with it.
-        page: The file that leads to a live view, None without one.
-    """
+    """What the log begins with, its first file, whether it is required, and the file of a page."""
 
     header: Header
     log: Path
