@@ -110,6 +110,7 @@ def test_a_controller_that_never_decides_is_a_hold() -> None:
     assert made.session.tally.sent == 0
     assert report.worst is State.HOLD
     assert "UNKNOWN_CONTACT" in report.why
+    assert report.result(made.session)["worst_s"] == 0.0  # none of a lesser state
 
 
 def test_B13_torque_that_went_off_while_walking_is_the_worst() -> None:
@@ -132,10 +133,11 @@ def test_why_is_of_the_longest_time_in_the_worst_state() -> None:
         made.robot.hold(0, 0.0 if 1.7 < t < 2.4 else math.nan)
 
     config = CONFIG.model_copy(update={"duration": 2.5})
-    _, report = driven(act, config=config)
+    made, report = driven(act, config=config)
     assert report.worst is State.HOLD
     assert "SHORT_LO" in report.why
     assert "STALE" not in report.why
+    assert report.result(made.session)["worst_s"] == pytest.approx(0.7, abs=0.2)
 
 
 def test_why_is_of_a_fault_rather_than_of_a_key_that_was_let_go() -> None:

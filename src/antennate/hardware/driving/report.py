@@ -43,9 +43,10 @@ class Report:
     Attributes:
         timing: How well the pace was kept, None if no tick was run.
         before: The same up to the first tick with torque, None if it never came on.
-        worst: Worst state since torque came on, and why, the longest time that it lasted. The short
-            wait for the first decision is left out, unless no command follows it. If torque never
-            came on, HOLD if data are missing at the end.
+        worst: Worst state since torque came on. The short wait for the first decision is left out,
+            unless no command follows it. If torque never came on, HOLD if data are missing at the
+            end.
+        why: The causes of the longest time in that state, an operator's key that was let go last.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
         ended: What ended it.
@@ -101,11 +102,15 @@ class Report:
         """The last tick is over."""
         self.timing = None if session.timing is None else session.timing.report()
         if self.before is None and self._waits and self.worst < State.HOLD:
-            self.worst, self.why = State.HOLD, self._waits
+            self._wait(self._waits)
         causes = () if session.outputs is None else session.outputs.causes
         missing = [each.text for each in causes if each.present and each.cause in DATA]
         if not self._torque and missing:
-            self.worst, self.why = State.HOLD, "; ".join(missing)
+            self._wait("; ".join(missing))
+
+    def _wait(self, why: str) -> None:
+        """It is a HOLD, of which no time is known."""
+        self.worst, self.why, self._worst = State.HOLD, why, (State.HOLD, True, 0)
 
     def result(self, session: Session) -> dict[str, Any]:
         """All of it as plain numbers and words, for result.json."""
