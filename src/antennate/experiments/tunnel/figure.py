@@ -96,7 +96,8 @@ def _panels(rows: int, columns: int, sides: Sequence[Floats]) -> tuple[Figure, A
     if rows == 1:
         figure = style.canvas(style.WIDTH, 1.5 + columns * (height + 0.3))
         return figure, figure.subplots(columns, 1, squeeze=False).T
-    figure = style.canvas(max(0.5 + width * columns, style.WIDTH), 1.5 + rows * height)
+    around = 1.5 + 0.25 * max(0, SHOWN_TRIALS - rows)  # few rows have little room to give away
+    figure = style.canvas(max(0.5 + width * columns, style.WIDTH), around + rows * height)
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
