@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from antennate import __version__
+from antennate.distributions import engines
 from antennate.errors import LogError
 from antennate.params.base import Strict
 from antennate.params.control import ControlParams
@@ -41,7 +42,7 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
         "python": platform.python_version(),
         "numpy": metadata.version("numpy"),
         "scipy": metadata.version("scipy"),
-        "mujoco": metadata.version("mujoco-core"),
+        "mujoco": next(iter(engines().values()), "none"),
         "platform": f"{platform.system()} {platform.machine()}",
     }
     for name in packages:
