@@ -32,6 +32,21 @@ class Tally:
     drained: int = 0
 
 
+@dataclass(slots=True)
+class JointFaults:
+    """What joints do wrong since torque came on, in words by the id of their servo.
+
+    Attributes:
+        behind: Joints that do not follow their goals.
+        outside: Joints that are beyond their limits.
+        leaps: Joints that have moved faster than they can.
+    """
+
+    behind: dict[int, str] = field(default_factory=dict[int, str])
+    outside: dict[int, str] = field(default_factory=dict[int, str])
+    leaps: dict[int, str] = field(default_factory=dict[int, str])
+
+
 @dataclass
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
@@ -41,6 +56,8 @@ class ActuatorState:
         errors: Hardware errors in words, by id.
         watchdogs: Ids stopped by their watchdog.
         disarmed: Ids that have lost their torque or their watchdog while they were to have it.
+        modes: Wrong operating modes in words, by id.
+        joints: What joints do wrong.
         supply: Voltage [V], NaN if it is not known.
         angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
             not answered yet; empty if they are not read.
@@ -52,6 +69,8 @@ class ActuatorState:
     errors: dict[int, str] = field(default_factory=dict[int, str])
     watchdogs: tuple[int, ...] = ()
     disarmed: tuple[int, ...] = ()
+    modes: dict[int, str] = field(default_factory=dict[int, str])
+    joints: JointFaults = field(default_factory=JointFaults)
     supply: float = math.nan
     angles: tuple[float, ...] = ()
     bus_error: str = ""

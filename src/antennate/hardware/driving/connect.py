@@ -96,7 +96,9 @@ def prepare(
     board.count_anew(clock.now())
     return Session(
         board=board,
-        actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
+        actuators=DynamixelActuators(
+            master, Joints(config.robot), clock.now, config.limits.following
+        ),
         clock=clock,
         controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,

@@ -89,6 +89,18 @@ def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     raise _unwritten(register, wrong)
 
 
+def require_modes(bus: Bus, modes: Mapping[int, int]) -> None:
+    """All ids are in these operating modes: another program may have changed one since.
+
+    Raises:
+        BringUpError: One did not answer, or is in another mode.
+    """
+    found = read_register(bus, list(modes), _COMMON["operating_mode"])
+    if wrong := {i: found[i] for i, mode in modes.items() if found[i] != mode}:
+        wanted = {i: modes[i] for i in wrong}
+        raise BringUpError(f"expected operating modes {wanted} by id, found {wrong}")
+
+
 def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -> None:
     """Clear the bus watchdogs, hold the present position, and arm them.
 
@@ -120,8 +132,8 @@ def limit_speed(bus: Bus, velocities: Mapping[int, int]) -> None:
     _write_checked(bus, _COMMON["profile_velocity"], velocities)
 
 
-def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> None:
-    """Let each servo use all of the PWM that its EEPROM allows.
+def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
+    """Let each servo use all of the PWM that its EEPROM allows: that, by id.
 
     Goal PWM bounds the force in every mode of position. It stays as it is written until the supply
     goes off, so that a `jog` that was killed would leave a joint without force.
@@ -129,7 +141,9 @@ def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> None:
     Raises:
         BringUpError: A servo did not take it.
     """
-    _write_checked(bus, _COMMON["goal_pwm"], read_register(bus, ids, _COMMON["pwm_limit"]))
+    limits = read_register(bus, ids, _COMMON["pwm_limit"])
+    _write_checked(bus, _COMMON["goal_pwm"], limits)
+    return limits
 
 
 def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:

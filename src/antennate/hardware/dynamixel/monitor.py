@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 
-from antennate.hardware.actuators import ActuatorState
-from antennate.hardware.dynamixel.answers import MOTION_BUDGET, POSITION, Answer, Span, Value
+from antennate.hardware.actuators import ActuatorState, JointFaults
+from antennate.hardware.dynamixel.answers import (
+    DRIVE,
+    MOTION_BUDGET,
+    POSITION,
+    Answer,
+    Span,
+    Value,
+)
 from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
@@ -18,6 +25,8 @@ _WATCHDOG = XC430_W240["bus_watchdog"]
 _TORQUE = XC430_W240["torque_enable"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
+_PWM = XC430_W240["present_pwm"]
+_MODE = XC430_W240["operating_mode"]
 _VOLT = 0.1
 _ALONE = 0.003
 """Time for one servo asked alone [s]: the rest of the tick (assumed)."""
@@ -31,11 +40,18 @@ SUPPLY_AGE = 4.0
 class ServoMonitor(ActuatorState):
     """Reads all positions every tick, and one servo's watchdog, torque and the supply in turn.
 
-    The first servo tells the voltage of the supply. All but the positions waits for the next tick
-    if they took the whole budget of time [s].
+    The first servo tells the voltage of the supply. One more servo tells its operating mode, or its
+    drive where somebody wants to know it. All but the positions waits for the next tick if they
+    took the whole budget of time [s].
+
+    Args:
+        modes: Operating modes by id that are watched while armed.
 
     Attributes:
         positions: Newest position by id [ticks].
+        read_at: When positions were last read [s].
+        drive: Id, Present PWM [counts] and position [ticks] of a servo that was asked for its drive
+            in this tick, None if none was.
         armed: Whether torque and watchdogs are to be on; see `arm`.
         loose: Id of a servo whose torque is off on purpose, None if there is none.
     """
@@ -46,11 +62,15 @@ class ServoMonitor(ActuatorState):
         ids: tuple[int, ...],
         clock: Callable[[], float],
         budget: float = MOTION_BUDGET,
+        modes: Mapping[int, int] | None = None,
     ) -> None:
         super().__init__(missed=dict.fromkeys(ids, 0))
         self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
-        self._turn = cycle(range(len(ids)))
-        self._waited = 0
+        self._turn, self._next_mode = cycle(range(len(ids))), cycle((modes or {}).items())
+        self._has_modes, self._asked = bool(modes), 0
+        self._waited = self._waited_more = 0
+        self.read_at = -math.inf
+        self.drive: tuple[int, int, int] | None = None
         self.positions: dict[int, int] = {}
         self.armed = False
         self.loose: int | None = None
@@ -61,13 +81,18 @@ class ServoMonitor(ActuatorState):
         self.armed = armed
         self.loose = None
         self.disarmed = ()
+        self.modes, self.joints = {}, JointFaults()
         if armed:
             self.watchdogs = ()
 
-    def step(self) -> None:
-        """Read all positions, and one servo's watchdog and torque. A bus error is kept."""
+    def step(self, suspects: Sequence[int] = ()) -> None:
+        """Read all positions, and one servo's watchdog and torque. A bus error is kept.
+
+        One of `suspects`, ids, tells its drive, in every second tick.
+        """
+        self.drive = None
         try:
-            self._look()
+            self._look(suspects)
             self.bus_error = ""
         except PortError as error:
             self.bus_error = str(error)
@@ -75,9 +100,10 @@ class ServoMonitor(ActuatorState):
         if self._clock() - self._measured > SUPPLY_AGE:
             self.supply = math.nan
 
-    def _look(self) -> None:
+    def _look(self, suspects: Sequence[int]) -> None:
         end = self._clock() + self._budget
         answers = self._bus.read_all(self._ids, POSITION, self._budget)
+        self.read_at = self._clock()
         dead = not any(isinstance(reply, Value) for reply in answers.values())
         for servo, reply in answers.items():
             self._note(servo, reply, dead)
@@ -93,6 +119,26 @@ class ServoMonitor(ActuatorState):
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
             self._measured = self._clock()
+        self._waited_more += 1
+        if self.armed and (self._clock() + _ALONE <= end or self._waited_more >= _PATIENCE):
+            self._waited_more = 0
+            self._more(suspects)
+
+    def _more(self, suspects: Sequence[int]) -> None:
+        """The drive of one suspect, or the operating mode of the next servo."""
+        self._asked += 1
+        if suspects and (self._asked % 2 or not self._has_modes):
+            servo = suspects[self._asked // 2 % len(suspects)]
+            if (data := self._one(servo, DRIVE)) is not None:
+                pwm, position = data[: _PWM.size], data[-_POSITION.size :]
+                self.drive = servo, _PWM.decode(pwm), _POSITION.decode(position)
+        elif self._has_modes:
+            servo, mode = next(self._next_mode)
+            data = None if self.missed[servo] else self._one(servo, Span(_MODE.address, _MODE.size))
+            if data is not None and (found := _MODE.decode(data)) != mode:
+                self.modes[servo] = f"mode {found} where {mode} is due"
+            elif data is not None:
+                self.modes.pop(servo, None)
 
     def guard(self, servo: int) -> None:
         """Whether a servo still has the watchdog and the torque that it was given."""

@@ -1,0 +1,199 @@
+"""Whether joints do as they are told, judged by the model of their servos.
+
+A joint may be behind its goal for a good reason: something holds it, and its servo pushes with all
+it has. So a joint that is behind is asked for its drive, Present PWM. The position loop gives
+gain · error up to the bound of the drive; a servo that gives much less is not driven, or tells a
+wrong position. A joint that is behind and does not move at all for a gait cycle is stuck, or its
+gear, its encoder or a wire of its motor is broken, which no register tells.
+
+The goal is as near as any of the last few ticks was: goals take time to arrive and may get lost.
+Nothing here reads a clock or a port.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.hardware.actuators import JointFaults
+from antennate.hardware.dynamixel.tables import POSITION_UNIT
+from antennate.hardware.joints import Joints
+from antennate.params.safety import FollowingParams
+from antennate.robots.servos import FULL_DRIVE
+from antennate.types import Floats
+
+_GOALS = 3
+"""Ticks of which the nearest goal counts: one on its way, one lost (assumed)."""
+_READINGS = 3
+"""Readings of the drive in a row that must all be wrong: chance spoils single ones (assumed)."""
+_AGE = 0.1
+"""Oldest that a position may be when it is read [s]: the watchdog of a servo."""
+
+
+@dataclass(slots=True)
+class Margins:
+    """How near a robot has come to each bound, as a share of it; at 1 the cause is named.
+
+    Attributes:
+        behind: Time in a row for which a joint drove too little.
+        stuck: Time in a row for which a joint that is behind did not move.
+        outside: How far a joint was beyond its limit.
+        speed: Way of a joint from one reading to the next.
+    """
+
+    behind: float = 0.0
+    stuck: float = 0.0
+    outside: float = 0.0
+    speed: float = 0.0
+
+
+class Following:
+    """Watches all joints of one robot from the moment that torque comes on.
+
+    Args:
+        joints: The joints.
+        params: When a joint does not follow.
+
+    Attributes:
+        faults: What is wrong.
+        margins: How near it came to that.
+        suspects: Places in the robot's order of joints whose drive should be read.
+    """
+
+    def __init__(self, joints: Joints, params: FollowingParams) -> None:
+        robot = joints.robot
+        kinds = [robot.servos.of(name) for name in robot.servo_names]
+        self._params, self._ids, self._names = params, joints.ids, robot.joint_names
+        self._gain: Floats = np.array([kind.position_gain * POSITION_UNIT for kind in kinds])
+        fastest = np.array([kind.no_load_speed for kind in kinds])
+        self._fastest: Floats = params.overspeed * fastest / POSITION_UNIT
+        zero, reach = np.array(robot.zeros, float), np.array(robot.limits) / POSITION_UNIT
+        self._low: Floats = zero - reach
+        self._high: Floats = zero + reach
+        self.disarm()
+
+    def arm(self, stood: Floats, pwm: Mapping[int, int]) -> None:
+        """Torque came on with the joints there [ticks] and these bounds of the drive by id."""
+        self.disarm()
+        self.margins = Margins()
+        self._most: Floats = np.array([pwm[servo] for servo in self._ids]) / FULL_DRIVE
+        self._least = np.minimum(self._low, stood), np.maximum(self._high, stood)
+
+    def disarm(self) -> None:
+        """Torque is off, or about to come on anew."""
+        self.faults, self.margins = JointFaults(), Margins()
+        self.rest()
+
+    def rest(self) -> None:
+        """Joints may be anywhere from now on, as while legs forget their turns."""
+        count = len(self._ids)
+        self.suspects: list[int] = []
+        self._goals: deque[Floats] = deque(maxlen=_GOALS)
+        self._behind: Floats = np.zeros(count)
+        self._wrong = [0] * count
+        self._since: Floats = np.full(count, math.nan)
+        self._place: Floats = np.full(count, math.nan)
+        self._rested: Floats = np.full(count, math.nan)
+        self._before: Floats = np.full(count, math.nan)
+        self._read: Floats = np.full(count, math.nan)
+
+    def step(self, span: tuple[float, float], goals: Floats, positions: Floats) -> None:
+        """Judge the positions of a tick.
+
+        Args:
+            span: Times before and after they were read [s].
+            goals: The goals last sent [ticks], shape (n,).
+            positions: Of the joints [ticks], NaN for one that did not answer, shape (n,).
+        """
+        self._goals.append(goals.copy())
+        self._leap(span, positions)
+        self._leave(positions)
+        near, far = np.min(self._goals, axis=0), np.max(self._goals, axis=0)
+        with np.errstate(invalid="ignore"):
+            behind = np.clip(positions, near, far) - positions
+            due = self._due(behind) > self._params.shortfall
+            moved = ~(abs(positions - self._place) <= self._params.still / POSITION_UNIT)
+        known = np.isfinite(positions)
+        self._behind = np.where(known, behind, self._behind)
+        self._place = np.where(known & (moved | ~due), positions, self._place)
+        self._rested = np.where(known & (moved | ~due), span[1], self._rested)
+        self.suspects = np.flatnonzero(due).tolist()
+        for at in np.flatnonzero(known & ~due).tolist():
+            self._wrong[at] = 0
+        self._stick(span[1])
+
+    def drive(self, now: float, at: int, pwm: int, position: int) -> None:
+        """Judge the drive of a joint that is behind.
+
+        Args:
+            now: When it was read [s].
+            at: Place of the joint in the robot's order.
+            pwm: Present PWM [counts].
+            position: Its position then [ticks].
+        """
+        params = self._params
+        goals = [goal[at] for goal in self._goals]
+        behind = min(max(position, min(goals)), max(goals)) - position
+        due = float(self._due(np.full(len(self._ids), behind))[at])
+        given = math.copysign(1.0, behind) * pwm / FULL_DRIVE
+        if due - given <= params.shortfall:
+            self._wrong[at] = 0
+            return
+        if not self._wrong[at]:
+            self._since[at] = now
+        self._wrong[at] += 1
+        share = (now - float(self._since[at])) / params.time
+        self.margins.behind = max(self.margins.behind, share)
+        if share >= 1.0 and self._wrong[at] >= _READINGS:
+            self._tell(
+                self.faults.behind,
+                at,
+                f"is {self._radians(behind)} behind and drives with {given:.0%} of {due:.0%}",
+            )
+
+    def _due(self, behind: Floats) -> Floats:
+        """Least drive for these errors [full drives], shape (n,)."""
+        return np.minimum(self._params.share * self._gain * abs(behind), self._most)
+
+    def _stick(self, now: float) -> None:
+        with np.errstate(invalid="ignore"):
+            stuck = (now - self._rested) / self._params.stuck_time
+        self.margins.stuck = max(self.margins.stuck, float(np.nanmax(stuck, initial=0.0)))
+        for at in np.flatnonzero(stuck >= 1.0).tolist():
+            behind = self._radians(self._behind[at])
+            time = f"{self._params.stuck_time:g} s"
+            self._tell(self.faults.behind, at, f"is {behind} behind and has not moved for {time}")
+
+    def _leave(self, positions: Floats) -> None:
+        """A joint may be pushed beyond its limit as far as its drive is not yet full."""
+        low, high = self._least
+        with np.errstate(invalid="ignore"):
+            beyond = np.maximum(low - positions, positions - high) * self._gain
+        self.margins.outside = max(self.margins.outside, float(np.nanmax(beyond, initial=0.0)))
+        for at in np.flatnonzero(beyond >= 1.0).tolist():
+            away = self._radians(beyond[at] / self._gain[at])
+            self._tell(self.faults.outside, at, f"is {away} beyond its limit")
+
+    def _leap(self, span: tuple[float, float], positions: Floats) -> None:
+        began, ended = span
+        way = abs(positions - self._before)
+        time = ended - self._read + _AGE
+        leap = way / (self._fastest * time)
+        self.margins.speed = max(self.margins.speed, float(np.nanmax(leap, initial=0.0)))
+        for at in np.flatnonzero(leap >= 1.0).tolist():
+            text = f"has gone {self._radians(way[at])} in {1e3 * (ended - self._read[at]):.0f} ms"
+            self._tell(self.faults.leaps, at, text)
+        known = np.isfinite(positions)
+        self._before = np.where(known, positions, self._before)
+        self._read = np.where(known, began, self._read)
+
+    def _tell(self, faults: dict[int, str], at: int, text: str) -> None:
+        faults.setdefault(self._ids[at], f"{self._names[at]} {text}")
+
+    @staticmethod
+    def _radians(ticks: float) -> str:
+        return f"{abs(ticks) * POSITION_UNIT:.2f} rad"
