@@ -44,9 +44,7 @@ class Trial:
         self._config, self._body, self._joints = config, body, Joints(config.robot)
         self._control = make_controller(name, config.control, config.robot)
         self._control.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(
-            config.seed, number, name, start.scene, [], config.time_limit
-        )
+        self._monitor = TrialMonitor(config.seed, number, name, start.scene, [], config.time_limit)
         kinds = [config.robot.servos.of(kind) for kind in config.robot.servo_names]
         self._stall = np.array([kind.stall_torque for kind in kinds])
         self.following = Following(self._joints, FollowingParams())

@@ -33,6 +33,10 @@ def healthy(now: float, **changes: Any) -> Inputs:
         "maneuver": Maneuver.FORWARD,
         "contact": (Contact.FREE, Contact.FREE),
         "supply": 12.0,
+        "behind": {},
+        "outside": {},
+        "leaps": {},
+        "modes": {},
     }
     return Inputs(**(settings | changes))
 

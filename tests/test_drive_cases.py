@@ -58,6 +58,25 @@ def test_B1_B3_B11_B12_one_bad_servo_is_a_fault_that_names_it(cases: Any, case: 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "case",
+    [
+        "leg cut",
+        "yaw cut",
+        "leg frozen",
+        "yaw frozen",
+        "yaw out of limits",
+        "leg leaps",
+        "mode changed",
+    ],
+)
+def test_B20_B21_B22_B23_a_joint_that_does_wrong_is_a_fault_that_names_it(
+    cases: Any, case: str
+) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["BER 1e-5", "BER 1e-4", "BER 1e-3", "BER 1e-2"])
 def test_L1_wrong_bits_on_both_wires(cases: Any, case: str) -> None:
     as_documented(cases, case)

@@ -47,6 +47,23 @@ class JointFaults:
     leaps: dict[int, str] = field(default_factory=dict[int, str])
 
 
+@dataclass(slots=True)
+class Margins:
+    """How near joints have come to each bound since torque came on, as a share of it.
+
+    Attributes:
+        behind: Time in a row for which a joint that is behind drove too little.
+        stuck: Time in a row for which a joint that is behind did not move.
+        outside: How far a joint was beyond its limit.
+        speed: Way of a joint from one reading to the next.
+    """
+
+    behind: float = 0.0
+    stuck: float = 0.0
+    outside: float = 0.0
+    speed: float = 0.0
+
+
 @dataclass
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
@@ -58,6 +75,7 @@ class ActuatorState:
         disarmed: Ids that have lost their torque or their watchdog while they were to have it.
         modes: Wrong operating modes in words, by id.
         joints: What joints do wrong.
+        margins: How near they have come to that.
         supply: Voltage [V], NaN if it is not known.
         angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
             not answered yet; empty if they are not read.
@@ -71,6 +89,7 @@ class ActuatorState:
     disarmed: tuple[int, ...] = ()
     modes: dict[int, str] = field(default_factory=dict[int, str])
     joints: JointFaults = field(default_factory=JointFaults)
+    margins: Margins = field(default_factory=Margins)
     supply: float = math.nan
     angles: tuple[float, ...] = ()
     bus_error: str = ""

@@ -184,4 +184,4 @@ class DynamixelActuators:
         if state.drive is not None:
             servo, pwm, position = state.drive
             following.drive(self._now(), self.joints.ids.index(servo), pwm, position)
-        state.joints = following.faults
+        state.joints, state.margins = following.faults, following.margins

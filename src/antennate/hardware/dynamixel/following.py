@@ -15,11 +15,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.hardware.actuators import JointFaults
+from antennate.hardware.actuators import JointFaults, Margins
 from antennate.hardware.dynamixel.tables import POSITION_UNIT
 from antennate.hardware.joints import Joints
 from antennate.params.safety import FollowingParams
@@ -32,23 +31,6 @@ _READINGS = 3
 """Readings of the drive in a row that must all be wrong: chance spoils single ones (assumed)."""
 _AGE = 0.1
 """Oldest that a position may be when it is read [s]: the watchdog of a servo."""
-
-
-@dataclass(slots=True)
-class Margins:
-    """How near a robot has come to each bound, as a share of it; at 1 the cause is named.
-
-    Attributes:
-        behind: Time in a row for which a joint drove too little.
-        stuck: Time in a row for which a joint that is behind did not move.
-        outside: How far a joint was beyond its limit.
-        speed: Way of a joint from one reading to the next.
-    """
-
-    behind: float = 0.0
-    stuck: float = 0.0
-    outside: float = 0.0
-    speed: float = 0.0
 
 
 class Following:

@@ -33,6 +33,8 @@ _ALONE = 0.003
 _PATIENCE = 10
 """Ticks after which watchdog and supply are read even if time is short: a round of all 19 then
 takes 2 s at the slowest (assumed)."""
+_PATIENCE_BEHIND = 3
+"""The same for the drive of a joint that is behind: then three readings take 0.1 s (assumed)."""
 SUPPLY_AGE = 4.0
 """Age from which on the supply is not known [s]: two such rounds (assumed)."""
 
@@ -66,9 +68,9 @@ class ServoMonitor(ActuatorState):
     ) -> None:
         super().__init__(missed=dict.fromkeys(ids, 0))
         self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
-        self._turn, self._next_mode = cycle(range(len(ids))), cycle((modes or {}).items())
-        self._has_modes, self._asked = bool(modes), 0
-        self._waited = self._waited_more = 0
+        self._modes = modes or {}
+        self._turn, self._mode_turn = cycle(range(len(ids))), cycle(self._modes)
+        self._waited = self._waited_more = self._asked = 0
         self.read_at = -math.inf
         self.drive: tuple[int, int, int] | None = None
         self.positions: dict[int, int] = {}
@@ -88,7 +90,7 @@ class ServoMonitor(ActuatorState):
     def step(self, suspects: Sequence[int] = ()) -> None:
         """Read all positions, and one servo's watchdog and torque. A bus error is kept.
 
-        One of `suspects`, ids, tells its drive, in every second tick.
+        One of `suspects`, ids of joints that are behind, tells its drive in every second tick.
         """
         self.drive = None
         try:
@@ -108,10 +110,18 @@ class ServoMonitor(ActuatorState):
         for servo, reply in answers.items():
             self._note(servo, reply, dead)
         self._waited += 1
-        if self._clock() + _ALONE > end and self._waited < _PATIENCE:
-            return
-        self._waited = 0
-        at = next(self._turn)
+        if self._clock() + _ALONE <= end or self._waited >= _PATIENCE:
+            self._waited = 0
+            self._next(next(self._turn))
+        self._waited_more += 1
+        short = self._clock() + _ALONE > end
+        patience = _PATIENCE_BEHIND if suspects else _PATIENCE
+        if self.armed and (not short or self._waited_more >= patience):
+            self._waited_more = 0
+            self._more(suspects, short)
+
+    def _next(self, at: int) -> None:
+        """Watchdog and torque of the servo whose turn it is, the supply with the first."""
         servo = self._ids[at]
         if self.missed[servo]:
             return
@@ -119,21 +129,18 @@ class ServoMonitor(ActuatorState):
         if at == 0 and (volts := self._one(servo, Span(_VOLTAGE.address, 2))) is not None:
             self.supply = _VOLT * _VOLTAGE.decode(volts)
             self._measured = self._clock()
-        self._waited_more += 1
-        if self.armed and (self._clock() + _ALONE <= end or self._waited_more >= _PATIENCE):
-            self._waited_more = 0
-            self._more(suspects)
 
-    def _more(self, suspects: Sequence[int]) -> None:
+    def _more(self, suspects: Sequence[int], short: bool) -> None:
         """The drive of one suspect, or the operating mode of the next servo."""
         self._asked += 1
-        if suspects and (self._asked % 2 or not self._has_modes):
+        if suspects and (short or self._asked % 2 or not self._modes):
             servo = suspects[self._asked // 2 % len(suspects)]
             if (data := self._one(servo, DRIVE)) is not None:
                 pwm, position = data[: _PWM.size], data[-_POSITION.size :]
                 self.drive = servo, _PWM.decode(pwm), _POSITION.decode(position)
-        elif self._has_modes:
-            servo, mode = next(self._next_mode)
+        elif self._modes:
+            servo = next(self._mode_turn)
+            mode = self._modes[servo]
             data = None if self.missed[servo] else self._one(servo, Span(_MODE.address, _MODE.size))
             if data is not None and (found := _MODE.decode(data)) != mode:
                 self.modes[servo] = f"mode {found} where {mode} is due"
