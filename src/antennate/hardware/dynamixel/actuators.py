@@ -171,8 +171,9 @@ class DynamixelActuators:
         ticks = np.array([state.positions.get(servo, math.nan) for servo in ids])
         state.angles = tuple(self.joints.angles(ticks).tolist())
         if self._goals is not None:
-            missed = np.array([state.missed[servo] > 0 for servo in ids])
-            self._judge((began, state.read_at), np.where(missed, math.nan, ticks))
+            idle = {*state.watchdogs, *state.disarmed}  # which is why they do not follow
+            unknown = np.array([state.missed[servo] > 0 or servo in idle for servo in ids])
+            self._judge((began, state.read_at), np.where(unknown, math.nan, ticks))
 
     def _judge(self, span: tuple[float, float], ticks: Floats) -> None:
         """Whether joints follow, unless they stand for legs that forget their turns."""

@@ -61,7 +61,6 @@ class Following:
     def arm(self, stood: Floats, pwm: Mapping[int, int]) -> None:
         """Torque came on with the joints there [ticks] and these bounds of the drive by id."""
         self.disarm()
-        self.margins = Margins()
         self._most: Floats = np.array([pwm[servo] for servo in self._ids]) / FULL_DRIVE
         self._least = np.minimum(self._low, stood), np.maximum(self._high, stood)
 
@@ -75,7 +74,6 @@ class Following:
         count = len(self._ids)
         self.suspects: list[int] = []
         self._goals: deque[Floats] = deque(maxlen=_GOALS)
-        self._behind: Floats = np.zeros(count)
         self._wrong = [0] * count
         self._since: Floats = np.full(count, math.nan)
         self._place: Floats = np.full(count, math.nan)
@@ -100,13 +98,12 @@ class Following:
             due = self._due(behind) > self._params.shortfall
             moved = ~(abs(positions - self._place) <= self._params.still / POSITION_UNIT)
         known = np.isfinite(positions)
-        self._behind = np.where(known, behind, self._behind)
         self._place = np.where(known & (moved | ~due), positions, self._place)
         self._rested = np.where(known & (moved | ~due), span[1], self._rested)
         self.suspects = np.flatnonzero(due).tolist()
         for at in np.flatnonzero(known & ~due).tolist():
             self._wrong[at] = 0
-        self._stick(span[1])
+        self._stick(span[1], behind)
 
     def drive(self, now: float, at: int, pwm: int, position: int) -> None:
         """Judge the drive of a joint that is behind.
@@ -120,7 +117,7 @@ class Following:
         params = self._params
         goals = [goal[at] for goal in self._goals]
         behind = min(max(position, min(goals)), max(goals)) - position
-        due = float(self._due(np.full(len(self._ids), behind))[at])
+        due = min(params.share * float(self._gain[at]) * abs(behind), float(self._most[at]))
         given = math.copysign(1.0, behind) * pwm / FULL_DRIVE
         if due - given <= params.shortfall:
             self._wrong[at] = 0
@@ -141,14 +138,14 @@ class Following:
         """Least drive for these errors [full drives], shape (n,)."""
         return np.minimum(self._params.share * self._gain * abs(behind), self._most)
 
-    def _stick(self, now: float) -> None:
-        with np.errstate(invalid="ignore"):
-            stuck = (now - self._rested) / self._params.stuck_time
-        self.margins.stuck = max(self.margins.stuck, float(np.nanmax(stuck, initial=0.0)))
-        for at in np.flatnonzero(stuck >= 1.0).tolist():
-            behind = self._radians(self._behind[at])
-            time = f"{self._params.stuck_time:g} s"
-            self._tell(self.faults.behind, at, f"is {behind} behind and has not moved for {time}")
+    def _stick(self, now: float, behind: Floats) -> None:
+        for at in self.suspects:
+            stuck = (now - float(self._rested[at])) / self._params.stuck_time
+            self.margins.stuck = max(self.margins.stuck, stuck)
+            if stuck >= 1.0:
+                away, time = self._radians(behind[at]), f"{self._params.stuck_time:g} s"
+                text = f"is {away} behind and has not moved for {time}"
+                self._tell(self.faults.behind, at, text)
 
     def _leave(self, positions: Floats) -> None:
         """A joint may be pushed beyond its limit as far as its drive is not yet full."""
