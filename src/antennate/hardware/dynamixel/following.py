@@ -49,7 +49,10 @@ class Following:
     def __init__(self, joints: Joints, params: FollowingParams) -> None:
         robot = joints.robot
         kinds = [robot.servos.of(name) for name in robot.servo_names]
-        self._params, self._ids, self._names = params, joints.ids, robot.joint_names
+        self._ids, self._names = joints.ids, robot.joint_names
+        self._share, self._shortfall = params.share, params.shortfall
+        self._time, self._stuck_time = params.time, params.stuck_time
+        self._still = params.still / POSITION_UNIT
         self._gain: Floats = np.array([kind.position_gain * POSITION_UNIT for kind in kinds])
         fastest = np.array([kind.no_load_speed for kind in kinds])
         self._fastest: Floats = params.overspeed * fastest / POSITION_UNIT
@@ -95,8 +98,8 @@ class Following:
         near, far = np.min(self._goals, axis=0), np.max(self._goals, axis=0)
         with np.errstate(invalid="ignore"):
             behind = np.clip(positions, near, far) - positions
-            due = self._due(behind) > self._params.shortfall
-            moved = ~(abs(positions - self._place) <= self._params.still / POSITION_UNIT)
+            due = self._due(behind) > self._shortfall
+            moved = ~(abs(positions - self._place) <= self._still)
         known = np.isfinite(positions)
         self._place = np.where(known & (moved | ~due), positions, self._place)
         self._rested = np.where(known & (moved | ~due), span[1], self._rested)
@@ -114,18 +117,17 @@ class Following:
             pwm: Present PWM [counts].
             position: Its position then [ticks].
         """
-        params = self._params
         goals = [goal[at] for goal in self._goals]
         behind = min(max(position, min(goals)), max(goals)) - position
-        due = min(params.share * float(self._gain[at]) * abs(behind), float(self._most[at]))
+        due = min(self._share * float(self._gain[at]) * abs(behind), float(self._most[at]))
         given = math.copysign(1.0, behind) * pwm / FULL_DRIVE
-        if due - given <= params.shortfall:
+        if due - given <= self._shortfall:
             self._wrong[at] = 0
             return
         if not self._wrong[at]:
             self._since[at] = now
         self._wrong[at] += 1
-        share = (now - float(self._since[at])) / params.time
+        share = (now - float(self._since[at])) / self._time
         self.margins.behind = max(self.margins.behind, share)
         if share >= 1.0 and self._wrong[at] >= _READINGS:
             self._tell(
@@ -136,14 +138,14 @@ class Following:
 
     def _due(self, behind: Floats) -> Floats:
         """Least drive for these errors [full drives], shape (n,)."""
-        return np.minimum(self._params.share * self._gain * abs(behind), self._most)
+        return np.minimum(self._share * self._gain * abs(behind), self._most)
 
     def _stick(self, now: float, behind: Floats) -> None:
         for at in self.suspects:
-            stuck = (now - float(self._rested[at])) / self._params.stuck_time
+            stuck = (now - float(self._rested[at])) / self._stuck_time
             self.margins.stuck = max(self.margins.stuck, stuck)
             if stuck >= 1.0:
-                away, time = self._radians(behind[at]), f"{self._params.stuck_time:g} s"
+                away, time = self._radians(behind[at]), f"{self._stuck_time:g} s"
                 text = f"is {away} behind and has not moved for {time}"
                 self._tell(self.faults.behind, at, text)
 
