@@ -51,7 +51,7 @@ def require_device(name: str | None) -> Any:
         device = warp.get_device(name) if name else warp.get_preferred_device()
     except Exception as error:
         raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
-    if name is None and not device.is_cuda:
+    if name is None and not (device and device.is_cuda):
         raise ConfigError(
             "--engine warp: expected a GPU with CUDA, found none; without one the usual engine is "
             'much faster, and device "cpu" is there for tests'
