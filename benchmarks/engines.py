@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 from measuring import in_turn, ratios, spread
-from numpy._core import _multiarray_umath as instructions
 
 from antennate.studies.statistics import compare
 
@@ -79,8 +78,8 @@ def engines() -> dict[str, str]:
 
 def old_instructions() -> str:
     """All sets of processor instructions that NumPy can do without."""
-    usable = instructions.__cpu_features__
-    return " ".join(name for name in instructions.__cpu_dispatch__ if usable[name])
+    config: Any = np.show_config(mode="dicts")
+    return " ".join(config["SIMD Extensions"]["found"])
 
 
 def trials_of(python: str, quick: bool) -> dict[str, Any]:
@@ -182,6 +181,13 @@ def differing(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> dict[st
         "difference_s": round(paired.time_difference_s, 2),
         "difference_95": [round(end, 2) for end in paired.time_difference_95 or ()],
     }
+
+
+def measure_agreement(quick: bool) -> dict[str, Any]:
+    """How far two engines and two sets of instructions disagree on the default tunnel."""
+    return agreement(
+        argparse.Namespace(trials=4 if quick else 200, workers=2, controllers=CONTROLLERS)
+    )
 
 
 def main() -> None:
