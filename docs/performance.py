@@ -363,8 +363,9 @@ def engines(figures: Figures) -> str:
 {ENGINES_HEAD}
 {table(columns, rows)}
 A physics step takes {told(steps[locked])} µs on {locked} and {told(steps[other])} µs on {other}:
-**{told(figures["step_over_other"])} times** as long. The locked engine is {locked}, since other packages need it
-beside ours; [how to take the other one](install.md#beside-other-packages-of-the-engine).
+**{told(figures["step_over_other"])} times** as long. The locked engine is {locked}, since other
+packages need it beside ours; [how to take the other
+one](install.md#beside-other-packages-of-the-engine).
 """
 
 
@@ -384,17 +385,19 @@ def agreement(figures: Figures) -> str:
         )
         for one in figures["pairs"]
     ]
+    most = max(one["other_end"] for one in figures["pairs"])
     widest = max(figures["pairs"], key=lambda one: abs(one["difference_s"]))
     return f"""\
 {AGREEMENT_HEAD}
-{figures["trials"]} trials of the default `tunnel`, seed {figures["seed"]}: successes and restricted mean time.
-*Old instructions*: NumPy without {figures["old_instructions"]}.
+{figures["trials"]} trials of the default `tunnel`, seed {figures["seed"]}: successes and
+restricted mean time. *Old instructions*: NumPy without {figures["old_instructions"]}.
 
 {table(("way", *names), ways)}
 {table(("controller", "first", "second", "other end", "difference of time, 95 % [s]"), pairs)}
-No two ways give the same numbers: the last bits of a sum differ, and each collision amplifies that. The largest
-difference of restricted mean times is {abs(widest["difference_s"])} s, the most trials that end in another way
-are {max(one["other_end"] for one in figures["pairs"])} of {figures["trials"]}. **A difference between controllers that is not larger than this is a tie.**
+No two ways give the same numbers: the last bits of a sum differ, and each collision amplifies that.
+The largest difference of restricted mean times is {abs(widest["difference_s"])} s, the most trials
+that end in another way are {most} of {figures["trials"]}.
+**A difference between controllers that is not larger than this is a tie.**
 """
 
 
