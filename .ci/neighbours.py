@@ -14,9 +14,11 @@ from dm_control import suite
 import antennate
 
 ARM = """
-<mujoco><worldbody><body><joint axis="0 0 1"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+<mujoco><worldbody>
+<body><joint axis="0 0 1"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
 <body pos=".3 0 0"><joint axis="0 0 1"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
-<site name="tip" pos=".3 0 0"/></body></body></worldbody></mujoco>
+<site name="tip" pos=".3 0 0"/></body></body>
+</worldbody></mujoco>
 """
 
 
