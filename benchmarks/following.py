@@ -73,11 +73,11 @@ class Trial:
         return not self.status
 
 
-def trials(seed: int, count: int, name: str) -> Iterator[dict[str, Any]]:
+def trials(seed: int, numbers: range, name: str) -> Iterator[dict[str, Any]]:
     """Each trial: how it ended, its margins, and the causes that were named."""
     config = TunnelConfig(seed=seed)
     body = SimRobot(1, config.robot, config.control.period, config.physics.timestep)
-    for number in range(count):
+    for number in numbers:
         trial = Trial(config, body, name, number)
         faults = {key: words for key, words in asdict(trial.following.faults).items() if words}
         margins = {key: round(share, 4) for key, share in asdict(trial.following.margins).items()}
@@ -95,12 +95,13 @@ def main() -> None:
     """Run the trials and print the largest share of each bound."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--trials", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--controller", default="closed")
     parser.add_argument("--json", action="store_true", help="print one JSON object and no lines")
     args = parser.parse_args()
     rows: list[dict[str, Any]] = []
-    for row in trials(args.seed, args.trials, args.controller):
+    for row in trials(args.seed, range(args.first, args.first + args.trials), args.controller):
         rows.append(row)
         if not args.json:
             print(row, flush=True)
