@@ -34,6 +34,7 @@ from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.params.safety import FollowingParams
+from antennate.robots.servos import FULL_DRIVE
 from antennate.robots.spec import RobotSpec
 
 does_wrong = (
@@ -383,8 +384,10 @@ SERVOS = [
         "limit of a joint",
         put(Following, "_leave", constant(None)),
         partial(
-            test_following.test_B21_a_joint_may_be_pushed_beyond_its_limit_until_its_drive_is_full,
+            test_following.test_B21_a_joint_is_pushed_beyond_its_limit_for_a_moment_and_at_full_drive,
             1.03,
+            205,
+            FULL_DRIVE,
             True,
             1,
         ),

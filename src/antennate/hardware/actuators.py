@@ -54,7 +54,7 @@ class Margins:
     Attributes:
         behind: Time in a row for which a joint that is behind drove too little.
         stuck: Time in a row for which a joint that is behind did not move.
-        outside: How far a joint was beyond its limit.
+        outside: Time in a row for which a joint was beyond its limit and the error of full drive.
         speed: Way of a joint from one reading to the next.
     """
 

@@ -6,6 +6,10 @@ gain · error up to the bound of the drive; a servo that gives much less is not 
 wrong position. A joint that is behind and does not move at all for a gait cycle is stuck, or its
 gear, its encoder or a wire of its motor is broken, which no register tells.
 
+The goal of a joint is within its limit. Beyond it by more than the error of full drive, a joint is
+overpowered, as a body that pushes in a corner may be for a moment. It is named if its servo gives
+less than that, too, or if it stays there for a gait cycle.
+
 The goal is as near as any of the last few ticks was: goals take time to arrive and may get lost.
 Nothing here reads a clock or a port.
 """
@@ -81,6 +85,8 @@ class Following:
         self._since: Floats = np.full(count, math.nan)
         self._place: Floats = np.full(count, math.nan)
         self._rested: Floats = np.full(count, math.nan)
+        self._within: Floats = np.full(count, math.nan)
+        self._beyond: Floats = np.zeros(count)
         self._before: Floats = np.full(count, math.nan)
         self._read: Floats = np.full(count, math.nan)
 
@@ -94,7 +100,7 @@ class Following:
         """
         self._goals.append(goals.copy())
         self._leap(span, positions)
-        self._leave(positions)
+        self._leave(span[1], positions)
         near, far = np.min(self._goals, axis=0), np.max(self._goals, axis=0)
         with np.errstate(invalid="ignore"):
             behind = np.clip(positions, near, far) - positions
@@ -135,6 +141,8 @@ class Following:
                 at,
                 f"is {self._radians(behind)} behind and drives with {given:.0%} of {due:.0%}",
             )
+            if self._beyond[at] * self._gain[at] >= 1.0:
+                self._tell_beyond(at)
 
     def _due(self, behind: Floats) -> Floats:
         """Least drive for these errors [full drives], shape (n,)."""
@@ -149,15 +157,22 @@ class Following:
                 text = f"is {away} behind and has not moved for {time}"
                 self._tell(self.faults.behind, at, text)
 
-    def _leave(self, positions: Floats) -> None:
-        """A joint may be pushed beyond its limit as far as its drive is not yet full."""
+    def _leave(self, now: float, positions: Floats) -> None:
+        """Whether joints are beyond their limits by more than the error of full drive."""
         low, high = self._least
         with np.errstate(invalid="ignore"):
-            beyond = np.maximum(low - positions, positions - high) * self._gain
-        self.margins.outside = max(self.margins.outside, float(np.nanmax(beyond, initial=0.0)))
-        for at in np.flatnonzero(beyond >= 1.0).tolist():
-            away = self._radians(beyond[at] / self._gain[at])
-            self._tell(self.faults.outside, at, f"is {away} beyond its limit")
+            self._beyond = np.maximum(low - positions, positions - high)
+            inside = self._beyond * self._gain < 1.0
+        self._within = np.where(inside | np.isnan(self._within), now, self._within)
+        for at in np.flatnonzero(np.isfinite(positions) & ~inside).tolist():
+            share = (now - float(self._within[at])) / self._stuck_time
+            self.margins.outside = max(self.margins.outside, share)
+            if share >= 1.0:
+                self._tell_beyond(at)
+
+    def _tell_beyond(self, at: int) -> None:
+        text = f"is {self._radians(self._beyond[at])} beyond its limit"
+        self._tell(self.faults.outside, at, text)
 
     def _leap(self, span: tuple[float, float], positions: Floats) -> None:
         began, ended = span
