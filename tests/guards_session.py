@@ -27,9 +27,10 @@ from antennate.hardware.driving import session
 from antennate.hardware.driving.decision import StepResult
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.dynamixel import bringup, monitor
+from antennate.hardware.dynamixel import monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import torque
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
 
@@ -103,12 +104,12 @@ SESSION = [
     ),
     Guard(
         "watchdog of a joint moved by keys",
-        put(bringup, "arm_watchdogs", constant(None)),
+        put(torque, "arm_watchdogs", constant(None)),
         test_jog.test_a_program_that_dies_leaves_a_joint_that_stands,
     ),
     Guard(
         "speed and force of a joint moved by keys",
-        put(bringup, "limit_speed", constant(None)),
+        put(torque, "limit_speed", constant(None)),
         test_jog.test_it_turns_by_its_step_slowly_and_lets_go,
     ),
     Guard(

@@ -27,6 +27,7 @@ from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.packets import Status, StatusError
 from antennate.hardware.dynamixel.tables import XL330_M288
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import torque
 from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.twin.registers import Servo
 
@@ -478,7 +479,7 @@ def torque_on(times: int) -> None:
         rig = Rig()
         for servo in rig.twin.servos:
             servo.set("goal_position", int(rng.integers(0, 4096)))
-        bringup.enable(rig.bus, IDS)
+        torque.enable(rig.bus, IDS)
         for _ in range(50):
             rig.link.sleep(0.01)
             for servo in rig.twin.servos:
@@ -498,17 +499,17 @@ def test_B10_torque_goes_on_without_a_jump_a_thousand_times() -> None:
 
 def test_B9_latched_watchdogs_are_seen_and_rearmed_in_place() -> None:
     rig = Rig()
-    bringup.arm_watchdogs(rig.bus, IDS)
-    bringup.enable(rig.bus, IDS)
+    torque.arm_watchdogs(rig.bus, IDS)
+    torque.enable(rig.bus, IDS)
     rig.bus.write_all(116, {i: (100 * i + 500).to_bytes(4, "little") for i in IDS})
     rig.link.sleep(0.5)
     watchdog = Span(98, 1)
     said = rig.bus.read_all(IDS, watchdog)
     assert set(said.values()) == {Value(b"\xff", alert=False)}
     with pytest.raises(BringUpError, match="goal_position"):
-        bringup.hold_here(rig.bus, IDS)
+        torque.hold_here(rig.bus, IDS)
     before = [servo.position for servo in rig.twin.servos]
-    bringup.arm_watchdogs(rig.bus, IDS)
+    torque.arm_watchdogs(rig.bus, IDS)
     assert [servo.get("bus_watchdog") for servo in rig.twin.servos] == [5] * 19
     assert [servo.position for servo in rig.twin.servos] == pytest.approx(before, abs=1.0)
 
@@ -528,7 +529,7 @@ def test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand() -> No
         write_all(address, data)
 
     rig.bus.write_all = note  # type: ignore[method-assign]
-    bringup.arm_watchdogs(rig.bus, IDS)
+    torque.arm_watchdogs(rig.bus, IDS)
     assert written == [(98, 0), (116, 700), (98, 5)]
     assert [servo.get("goal_position") for servo in rig.twin.servos] == [100 * i for i in IDS]
 
@@ -538,7 +539,7 @@ def test_B9_extended_mode_with_an_offset_is_refused() -> None:
     rig.servo(8).set("operating_mode", 4)
     rig.servo(8).set("homing_offset", 100)
     with pytest.raises(BringUpError, match=r"\[8\]"):
-        bringup.arm_watchdogs(rig.bus, IDS)
+        torque.arm_watchdogs(rig.bus, IDS)
 
 
 def test_an_answer_with_another_id_is_no_answer() -> None:
@@ -573,7 +574,7 @@ def test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing() -> None:
 
 def test_B19_torque_off_is_confirmed_and_what_did_not_is_named() -> None:
     rig = Rig(loss=0.05)
-    bringup.enable(rig.bus, IDS)
+    torque.enable(rig.bus, IDS)
     rig.twin.trouble[6] = Trouble(Fault.SILENT)
-    assert bringup.disable(rig.bus, IDS) == [6]
+    assert torque.disable(rig.bus, IDS) == [6]
     assert [servo.torque for servo in rig.twin.servos] == [i == 6 for i in IDS]

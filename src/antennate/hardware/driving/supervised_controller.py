@@ -67,11 +67,16 @@ class SupervisedController:
         self.command = self._step(frame)
         return self.command
 
+    def hold(self) -> None:
+        """Decide to stand still, without asking the controller."""
+        self.result = StepResult()
+        self.result.asked, self.result.decided_at = False, self.now()
+
     def _step(self, frame: AntennaFrame) -> JointCommand:
         due = self._due() or not self.sound
         result = self.result = StepResult()
         if self._sound_command is not None and (self.standing or not due):
-            result.asked, result.decided_at = False, self.now()
+            self.hold()
             return self._sound_command
         self.sound = False
         try:

@@ -17,6 +17,7 @@ _READS = 6
 chance whole once in 2^16 (assumed)."""
 _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
 """What differs between two servos of one id: the tick and the position, in both models."""
+_SPARE = {"torque_enable": 1, "goal_position": 12, "present_position": 12}
 
 State = Literal["ok", "broken", "collides", "mute"]
 
@@ -70,6 +71,17 @@ def read_some(
         if left:
             bus.settle()
     return values
+
+
+def read_once(bus: Bus, servo: int, register: Register, budget: float) -> int | None:
+    """One register of one servo by one request, within a budget [s]; None without an answer.
+
+    Torque, goal and present position have defined bytes after them, by which late answers are told
+    apart.
+    """
+    span = Span(register.address, register.size, _SPARE.get(register.name, 0))
+    reply = bus.read_all([servo], span, budget)[servo]
+    return register.decode(reply.data) if isinstance(reply, Value) else None
 
 
 def _tried(bus: Bus, ask: Callable[[], Answer], tries: int) -> tuple[bytes | None, bool]:
