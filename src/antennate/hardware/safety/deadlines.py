@@ -51,18 +51,17 @@ def require_order(limits: SupervisorParams, period: float) -> None:
     Raises:
         ConfigError: One does not; names both, with their times.
     """
-    answer, watchdog = ("latest answer", ANSWER), ("watchdogs of the servos", WATCHDOG)
+    answer, watchdog = ("the latest answer", ANSWER), ("the watchdogs of the servos", WATCHDOG)
     pause = ("limits.longest_pause", limits.longest_pause)
-    _rise([("reading of one", READ_ONE), ("of a leg", READ_LEG), ("of all", READ_ALL), answer])
-    _rise([("period of control.rate", period), answer, watchdog, pause])
+    _rise([("a read", READ_ONE), ("that of a leg", READ_LEG), ("that of all", READ_ALL), answer])
+    _rise([("a period of control.rate", period), answer, watchdog, pause])
     _rise([("limits.stale_age", limits.stale_age), answer])
-    _rise([pause, ("limits.longest_arming", limits.longest_arming)])
-    _rise([("keys", JOG_PERIOD), ("watchdog of a jog", JOG_WATCHDOG_COUNTS * WATCHDOG_UNIT)])
+    _rise([("a read of `jog`", JOG_PERIOD), ("its watchdog", JOG_WATCHDOG_COUNTS * WATCHDOG_UNIT)])
 
 
 def _rise(deadlines: Iterable[tuple[str, float]]) -> None:
     for (name, time), (guard, later) in pairwise(deadlines):
         if not time < later:
             raise ConfigError(
-                f"{guard}: expected more than the {time:g} s of the {name}, found {later:g} s"
+                f"expected deadlines that rise, found {name} at {time:g} s, {guard} at {later:g} s"
             )
