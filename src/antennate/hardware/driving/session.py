@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorError, Actuators
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.supervised_controller import SupervisedController
@@ -167,7 +168,7 @@ class Session:
             elif not actuators.enabled and actuators.left_on:
                 actuators.disable(again=True)
         except (PortError, CommandError, ActuatorError) as error:
-            actuators.state.bus_error = str(error)
+            actuators.state.bus_error = reason(error)
             self.lost |= not isinstance(error, CommandError)
             return
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
@@ -198,14 +199,14 @@ class Session:
         At most `deadlines.STAND`. The supervisor is asked in every tick, as while it walks: the
         decision is to stand still, and no key lets the robot walk any more.
         """
-        orders, end = self.orders, self.clock.now() + min(time, deadlines.STAND)
-        orders.arm, orders.released = False, True
+        now, self.orders.arm, self.orders.released = self.clock.now(), False, True
+        due, end = now, now + min(time, deadlines.STAND)
         while self.actuators.enabled and not self.lost and self.clock.now() < end:
-            due = self.clock.now() + self.period
+            due = max(due + self.period, self.clock.now())
+            self.clock.sleep_until(due)
             self._feel()
             self.control.hold()
             self._decide(self.control.command)
-            self.clock.sleep_until(due)
 
     def _inputs(self, now: float) -> Inputs:
         clock, state, control = self.board.clock, self.actuators.state, self.control

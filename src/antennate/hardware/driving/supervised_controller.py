@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from antennate.errors import in_one_line
+from antennate.errors import in_one_line, reason
 from antennate.hardware.driving.decision import Decision, StepResult, decision_of, no_command
 from antennate.hardware.joints import CommandError
 from antennate.hardware.tracebacks import Tracebacks
@@ -93,7 +93,7 @@ class SupervisedController:
         try:
             command = self._sound_command = self._check(command)
         except CommandError as error:
-            result.bad_command = str(error)
+            result.bad_command = reason(error)
             self.refused += 1
         else:
             self.sound = self.decision.maneuver in set(Maneuver)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from itertools import cycle
 
+from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorState
 from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
@@ -66,7 +67,7 @@ class ServoMonitor(ActuatorState):
             self._look()
             self.bus_error = ""
         except PortError as error:
-            self.bus_error = str(error)
+            self.bus_error = reason(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
         if self._clock() - self._measured > SUPPLY_AGE:
             self.supply = math.nan
