@@ -174,10 +174,13 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     try:
         bringup.require(bus, robot.models)
     except BringUpError as error:
-        raise BringUpError(
-            f"--bus: {error}; check power, wiring, ids and baud {robot.baud}, or whether --esp32 "
-            f"and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
-        ) from None
+        check = (
+            f"check power, wiring, ids and baud {robot.baud}, or whether --esp32 and --bus are "
+            "swapped"
+        )
+        more = f"`{typed('doctor')}` tells more, slow adapters too"
+        cure = more if error.cure else f"{check}; {more}"
+        raise BringUpError(f"--bus: {error}", cure) from None
     rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()

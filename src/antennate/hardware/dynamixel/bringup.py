@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from antennate.hardware.actuators import ActuatorError
 from antennate.hardware.dynamixel import inquiry
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import Present, State
+from antennate.hardware.dynamixel.inquiry import Present
 from antennate.hardware.dynamixel.tables import XC430_W240, Register, model_name
 
 _READS = 10
@@ -18,7 +18,15 @@ _BUDGET = 0.1
 
 
 class BringUpError(ActuatorError):
-    """The servos are not fit to be moved; says which and why."""
+    """The servos are not fit to be moved; says which and why.
+
+    Attributes:
+        cure: What a person does about it, empty if that is not known; the text ends with it.
+    """
+
+    def __init__(self, text: str, cure: str = "") -> None:
+        super().__init__(f"{text}; {cure}" if cure else text)
+        self.cure = cure
 
 
 def require(bus: Bus, expected: Mapping[int, int]) -> None:
@@ -27,7 +35,10 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
     Raises:
         BringUpError: Otherwise; the text says each id that is not, and why.
     """
-    faults = {i: _fault(inquiry.look(bus, i), model) for i, model in expected.items()}
+    seen = {i: inquiry.look(bus, i) for i in expected}
+    doubled = [i for i, one in seen.items() if one and one.state in ("collides", "broken")]
+    perhaps = f", perhaps it answers as {', '.join(map(str, doubled))}" if doubled else ""
+    faults = {i: _fault(seen[i], model, f"silent{perhaps}") for i, model in expected.items()}
     strangers = {status.id for status in bus.scan()} - faults.keys()
     faults |= dict.fromkeys(sorted(strangers), "not expected")
     wrong: dict[str, list[int]] = {}
@@ -37,7 +48,11 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
     if wrong:
         fit = len(faults) - sum(map(len, wrong.values()))
         why = "; ".join(f"{_named(ids, len(expected))}: {fault}" for fault, ids in wrong.items())
-        raise BringUpError(f"expected {len(expected)} servos, found {fit} fit; {why}")
+        states = dict.fromkeys(one.state for one in seen.values() if one and one.state != "ok")
+        raise BringUpError(
+            f"expected {len(expected)} servos, found {fit} fit; {why}",
+            "; ".join(inquiry.CURE[state] for state in states),
+        )
 
 
 def _named(ids: Sequence[int], count: int) -> str:
@@ -70,18 +85,10 @@ def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int,
     return values
 
 
-def _fault(present: Present | None, model: int) -> str:
-    """What is wrong with a servo, empty if nothing is."""
+def _fault(present: Present | None, model: int, silent: str) -> str:
+    """What is wrong with a servo, empty if nothing is; `silent` of one that does not answer."""
     if present is None:
-        return "silent"
+        return silent
     if present.model not in (None, model):
         return f"expected model {model_name(model)}, found number {present.model}"
-    return _REASONS[present.state]
-
-
-_REASONS: Mapping[State, str] = {
-    "ok": "",
-    "broken": "answers are never whole: two servos with this id, or a bad cable?",
-    "collides": "answers collide: two servos with this id?",
-    "mute": "answers pings alone: switch its supply off and on",
-}
+    return inquiry.FOUND[present.state]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +20,23 @@ _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
 _SPARE = {"torque_enable": 1, "goal_position": 12, "present_position": 12}
 
 State = Literal["ok", "broken", "collides", "mute"]
+
+
+FOUND: Mapping[State, str] = {
+    "ok": "",
+    "broken": "no answer is whole: two servos with this id, or a bad cable or plug",
+    "collides": "two servos answer with this id",
+    "mute": "answers pings alone",
+}
+"""What each state means, in words."""
+_OWN_ID = "leave one of them alone on the bus and give it its own id with `antennate setup`"
+CURE: Mapping[State, str] = {
+    "ok": "",
+    "broken": f"look at its cable and plugs; if there are two, {_OWN_ID}",
+    "collides": _OWN_ID,
+    "mute": "switch its supply off and on",
+}
+"""What a person does about it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from antennate.hardware import settings
-from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel import bringup, inquiry
 from antennate.hardware.dynamixel.answers import Answer, Refused, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import (
@@ -83,6 +83,11 @@ class Jog:
             SetupError: It is not set as the joint needs it; no torque either.
         """
         servo, bus = self.joint.servo, self._bus
+        if (seen := inquiry.look(bus, servo)) and seen.state != "ok":
+            raise SetupError(
+                f"expected {self.joint} to answer, found: {inquiry.FOUND[seen.state]}; "
+                f"{inquiry.CURE[seen.state]}"
+            )
         bringup.require_models(bus, {servo: self.joint.model})
         self._require_settings()
         self._full = self._read("pwm_limit")
