@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import test_approach
 import test_bad_controllers
+import test_deadlines
 import test_dynamixel_bus as test_bus
 import test_jog
 import test_loop
@@ -30,7 +31,7 @@ from antennate.hardware.driving.supervised_controller import SupervisedControlle
 from antennate.hardware.dynamixel import monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety import torque
+from antennate.hardware.safety import deadlines, torque
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
 
@@ -77,6 +78,13 @@ def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
         old(self, number, frame)
     finally:
         self.received = False
+
+
+def unasked(self: Any, time: float) -> None:
+    end = self.clock.now() + time
+    while self.actuators.enabled and self.clock.now() < end:
+        self.actuators.command(None)
+        self.clock.sleep_until(self.clock.now() + self.period)
 
 
 def forget_the_loss(self: Any, time: float) -> None:
@@ -136,6 +144,21 @@ SESSION = [
         "command held before the torque goes",
         put(session.Session, "stand", constant(None)),
         test_release.test_B19_the_pose_is_held_for_as_long_as_told_before_the_torque_goes,
+    ),
+    Guard(
+        "supervisor asked while the command is held",
+        put(session.Session, "stand", unasked),
+        test_deadlines.test_the_supervisor_is_asked_while_a_robot_stands,
+    ),
+    Guard(
+        "longest time that the command is held",
+        put(deadlines, "STAND", 60.0),
+        test_deadlines.test_a_robot_stands_for_two_seconds_at_most,
+    ),
+    Guard(
+        "order of deadlines",
+        put(deadlines, "_rise", constant(None)),
+        test_deadlines.test_a_session_refuses_them_too,
     ),
     Guard(
         "no goal before the release of a lost bus",
