@@ -152,7 +152,7 @@ SESSION = [
     ),
     Guard(
         "longest time that the command is held",
-        put(deadlines, "STAND", 60.0),
+        put(deadlines, "STAND", 3.0),
         test_deadlines.test_a_robot_stands_for_two_seconds_at_most,
     ),
     Guard(

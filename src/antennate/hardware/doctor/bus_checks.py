@@ -93,10 +93,12 @@ def _ids(bus: BusSurvey, robot: RobotSpec) -> Finding:
 
 
 def _answers(bus: BusSurvey) -> Finding:
-    ids = {state: [i for i, seen in bus.here.items() if seen.state == state] for state in _FOUND}
-    states = [state for state in _FOUND if ids[state]]
-    parts = [f"{_FOUND[state]} {ids_text(ids[state])}" for state in states]
-    cures = [f"{ids_text(ids[state])}: {FOUND[state]}; {CURE[state]}" for state in states]
+    parts: list[str] = []
+    cures: list[str] = []
+    for state, found in _FOUND.items():
+        if ids := ids_text(i for i, seen in bus.here.items() if seen.state == state):
+            parts.append(f"{found} {ids}")
+            cures.append(f"{ids}: {FOUND[state]}; {CURE[state]}")
     grade: Grade = "bad" if parts else "ok"
     return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))
 

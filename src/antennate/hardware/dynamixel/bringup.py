@@ -48,10 +48,10 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
     if wrong:
         fit = len(faults) - sum(map(len, wrong.values()))
         why = "; ".join(f"{_named(ids, len(expected))}: {fault}" for fault, ids in wrong.items())
-        states = dict.fromkeys(one.state for one in seen.values() if one and one.state != "ok")
+        states = {one.state for one in seen.values() if one and one.state != "ok"}
         raise BringUpError(
             f"expected {len(expected)} servos, found {fit} fit; {why}",
-            "; ".join(inquiry.CURE[state] for state in states),
+            "; ".join(cure for state, cure in inquiry.CURE.items() if state in states),
         )
 
 
