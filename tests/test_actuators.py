@@ -29,7 +29,10 @@ class Motors:
     robot = RobotSpec()
 
     def __init__(self) -> None:
-        self.state, self.tally = ActuatorState(missed={1: 0}, supply=12.0), Tally()
+        self.tally = Tally()
+        self.state = ActuatorState(
+            missed={1: 0}, errors={}, watchdogs=(), disarmed=(), supply=12.0, bus_error=""
+        )
         self.enabled, self.resting, self.broken = False, False, False
         self.left_on: list[int] = []
         self.text = ""

@@ -44,7 +44,14 @@ class ServoMonitor(ActuatorState):
         clock: Callable[[], float],
         budget: float = READ_ALL,
     ) -> None:
-        super().__init__(missed=dict.fromkeys(ids, 0))
+        super().__init__(
+            missed=dict.fromkeys(ids, 0),
+            errors={},
+            watchdogs=(),
+            disarmed=(),
+            supply=math.nan,
+            bus_error="",
+        )
         self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
         self._turn = cycle(range(len(ids)))
         self._waited = 0
