@@ -73,7 +73,16 @@ def in_one_line(error: BaseException) -> str:
         raise
     except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
         return name
-    return f"{name}: {text}"[:_LONGEST]
+    return f"{name}: {text}"[:_LONGEST] if text else name
+
+
+def reason(error: BaseException) -> str:
+    """Why something failed, in one line that is never empty.
+
+    What the system says of an OSError; else the text of the exception; of one without, its type.
+    """
+    said = getattr(error, "strerror", None) or str(error)
+    return " ".join(said.split()) or type(error).__name__
 
 
 def raised(error: BaseException) -> str:

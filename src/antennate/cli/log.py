@@ -17,7 +17,7 @@ from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.replay import complain, say_unguarded
 from antennate.cli.results import ResultOptions, log_of, tell
-from antennate.errors import ConfigError, MissingPackageError, OutputError
+from antennate.errors import ConfigError, MissingPackageError, OutputError, reason
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import extra, one_line, shortened, typed
 from antennate.params.base import Params
@@ -130,7 +130,7 @@ def _target(path: Path, options: Options) -> Path:
     except OSError as error:
         raise OutputError(
             f"--out: expected a name that can be written, found {shortened(str(target))}: "
-            f"{error.strerror}"
+            f"{reason(error)}"
         ) from None
     return target
 

@@ -20,7 +20,7 @@ from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import stop_signals
 from antennate.cli.twin_kept import Kept, KeptOptions
 from antennate.cli.view_options import PageOptions, page_of
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, reason
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
 from antennate.params.base import changes, paths_of
@@ -241,7 +241,7 @@ def _tell(passage: Passage, file: Path | None) -> None:
         try:
             file.touch()
         except OSError as error:
-            sys.stderr.write(f"--passed: expected to make {file}, found: {error.strerror}\n")
+            sys.stderr.write(f"--passed: expected to make {file}, found: {reason(error)}\n")
 
 
 def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:

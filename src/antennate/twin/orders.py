@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, reason
 from antennate.twin.push import Pushes
 from antennate.twin.registers import Servo
 
@@ -111,7 +111,7 @@ class Orders:
             way = os.O_RDWR if fifo else os.O_RDONLY
             self._file: int | None = os.open(path, way | os.O_NONBLOCK) if self._mine else 0
         except OSError as error:
-            raise BadInputError(f"--orders: cannot read {path}: {error.strerror}") from None
+            raise BadInputError(f"--orders: cannot read {path}: {reason(error)}") from None
 
     @property
     def files(self) -> list[int]:

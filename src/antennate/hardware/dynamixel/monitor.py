@@ -6,19 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 
+from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorState, JointFaults
-from antennate.hardware.dynamixel.answers import (
-    DRIVE,
-    MOTION_BUDGET,
-    POSITION,
-    Answer,
-    Span,
-    Value,
-)
-from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
+from antennate.hardware.dynamixel.answers import DRIVE, POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety.deadlines import READ_ALL, READ_ONE, SUPPLY_AGE, WATCHDOG_COUNTS
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
@@ -28,15 +22,11 @@ _POSITION = XC430_W240["present_position"]
 _PWM = XC430_W240["present_pwm"]
 _MODE = XC430_W240["operating_mode"]
 _VOLT = 0.1
-_ALONE = 0.003
-"""Time for one servo asked alone [s]: the rest of the tick (assumed)."""
 _PATIENCE = 10
 """Ticks after which watchdog and supply are read even if time is short: a round of all 19 then
 takes 2 s at the slowest (assumed)."""
 _PATIENCE_BEHIND = 3
 """The same for the drive of a joint that is behind: then three readings take 0.1 s (assumed)."""
-SUPPLY_AGE = 4.0
-"""Age from which on the supply is not known [s]: two such rounds (assumed)."""
 
 
 class ServoMonitor(ActuatorState):
@@ -63,10 +53,19 @@ class ServoMonitor(ActuatorState):
         bus: Bus,
         ids: tuple[int, ...],
         clock: Callable[[], float],
-        budget: float = MOTION_BUDGET,
+        budget: float = READ_ALL,
         modes: Mapping[int, int] | None = None,
     ) -> None:
-        super().__init__(missed=dict.fromkeys(ids, 0))
+        super().__init__(
+            missed=dict.fromkeys(ids, 0),
+            errors={},
+            watchdogs=(),
+            disarmed=(),
+            modes={},
+            joints=JointFaults(),
+            supply=math.nan,
+            bus_error="",
+        )
         self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
         self._modes = modes or {}
         self._turn, self._mode_turn = cycle(range(len(ids))), cycle(self._modes)
@@ -97,7 +96,7 @@ class ServoMonitor(ActuatorState):
             self._look(suspects)
             self.bus_error = ""
         except PortError as error:
-            self.bus_error = str(error)
+            self.bus_error = reason(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
         if self._clock() - self._measured > SUPPLY_AGE:
             self.supply = math.nan
@@ -110,11 +109,11 @@ class ServoMonitor(ActuatorState):
         for servo, reply in answers.items():
             self._note(servo, reply, dead)
         self._waited += 1
-        if self._clock() + _ALONE <= end or self._waited >= _PATIENCE:
+        if self._clock() + READ_ONE <= end or self._waited >= _PATIENCE:
             self._waited = 0
             self._next(next(self._turn))
         self._waited_more += 1
-        short = self._clock() + _ALONE > end
+        short = self._clock() + READ_ONE > end
         patience = _PATIENCE_BEHIND if suspects else _PATIENCE
         if self.armed and (not short or self._waited_more >= patience):
             self._waited_more = 0
@@ -178,7 +177,7 @@ class ServoMonitor(ActuatorState):
             self.errors.pop(servo, None)
 
     def _one(self, servo: int, span: Span) -> bytes | None:
-        reply = self._bus.read_all([servo], span, _ALONE)[servo]
+        reply = self._bus.read_all([servo], span, READ_ONE)[servo]
         return reply.data if isinstance(reply, Value) else None
 
 
