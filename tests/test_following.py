@@ -38,9 +38,9 @@ CYCLE = 2.0
 class Bench:
     """Nineteen joints that stand at their zeros with torque, and one of them that does not."""
 
-    def __init__(self, at: int) -> None:
+    def __init__(self, at: int, well: bool = True) -> None:
         self.at, self.n = at, 0
-        self.following = Following(Joints(ROBOT), FollowingParams())
+        self.following = Following(Joints(ROBOT), FollowingParams(), lambda servo: well)
         self.zeros: Floats = np.array(ROBOT.zeros, float)
         self.following.arm(self.zeros, dict.fromkeys(ROBOT.ids, FULL))
 
@@ -101,6 +101,12 @@ def test_B20_a_drive_the_wrong_way_a_lost_answer_and_a_single_bad_reading() -> N
     for n in range(100):  # never three in a row
         bench.tick(SATURATED, 3.0 * (n % 7), 0 if n % 3 else FULL)
         bench.tick(SATURATED, math.nan, 0 if n % 3 else FULL)
+    assert not bench.named
+
+
+def test_B20_a_servo_without_torque_or_watchdog_has_another_cause() -> None:
+    bench = Bench(LEG, well=False)
+    bench.run(500, 4096.0, 0.0, 0)
     assert not bench.named
 
 
@@ -193,6 +199,8 @@ def test_B20_B21_B22_B23_what_a_joint_does_wrong_is_a_fault_in_time_that_names_i
     log = walked(at(EVENT, what), DriveConfig(dry_run=DRY, duration=3.0, fault_time=0.3))
     assert log.first(cause) - EVENT <= within
     assert log.state[-1] is State.FAULT
+    if cause is Cause.DISARMED:
+        assert Cause.NOT_FOLLOWING not in set().union(*log.causes)
     servo = what[6]
     assert f"{cause.name}: {cause.text} (servo {servo}" in log.report.why
     assert log.report.safe

@@ -37,7 +37,7 @@ class DynamixelActuators:
         self.tally, self.robot = bus.tally, joints.robot
         self.state = ServoMonitor(bus, joints.ids, clock, modes=self.robot.modes)
         self.turns = LegTurns(bus, joints)
-        self.following = Following(joints, following or FollowingParams())
+        self.following = Following(joints, following or FollowingParams(), self.state.well)
         self.left_on: list[int] = []
         self._now = clock
         self._goals: Floats | None = None

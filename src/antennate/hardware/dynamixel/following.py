@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -43,6 +43,8 @@ class Following:
     Args:
         joints: The joints.
         params: When a joint does not follow.
+        well: Whether the servo of an id has its torque and its watchdog, asked before its joint is
+            named as one that does not follow.
 
     Attributes:
         faults: What is wrong.
@@ -50,10 +52,15 @@ class Following:
         suspects: Places in the robot's order of joints whose drive should be read.
     """
 
-    def __init__(self, joints: Joints, params: FollowingParams) -> None:
+    def __init__(
+        self,
+        joints: Joints,
+        params: FollowingParams,
+        well: Callable[[int], bool] = lambda servo: True,
+    ) -> None:
         robot = joints.robot
         kinds = [robot.servos.of(name) for name in robot.servo_names]
-        self._ids, self._names = joints.ids, robot.joint_names
+        self._ids, self._names, self._well = joints.ids, robot.joint_names, well
         self._share, self._shortfall = params.share, params.shortfall
         self._time, self._stuck_time = params.time, params.stuck_time
         self._still = params.still / POSITION_UNIT
@@ -135,7 +142,7 @@ class Following:
         self._wrong[at] += 1
         share = (now - float(self._since[at])) / self._time
         self.margins.behind = max(self.margins.behind, share)
-        if share >= 1.0 and self._wrong[at] >= _READINGS:
+        if share >= 1.0 and self._wrong[at] >= _READINGS and self._follows_not(at):
             self._tell(
                 self.faults.behind,
                 at,
@@ -152,10 +159,15 @@ class Following:
         for at in self.suspects:
             stuck = (now - float(self._rested[at])) / self._stuck_time
             self.margins.stuck = max(self.margins.stuck, stuck)
-            if stuck >= 1.0:
+            if stuck >= 1.0 and self._follows_not(at):
                 away, time = self._radians(behind[at]), f"{self._stuck_time:g} s"
                 text = f"is {away} behind and has not moved for {time}"
                 self._tell(self.faults.behind, at, text)
+
+    def _follows_not(self, at: int) -> bool:
+        """It is named already, or its servo has all that it needs to follow."""
+        servo = self._ids[at]
+        return servo in self.faults.behind or self._well(servo)
 
     def _leave(self, now: float, positions: Floats) -> None:
         """Whether joints are beyond their limits by more than the error of full drive."""

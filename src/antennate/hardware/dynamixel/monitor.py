@@ -146,20 +146,29 @@ class ServoMonitor(ActuatorState):
             elif data is not None:
                 self.modes.pop(servo, None)
 
-    def guard(self, servo: int) -> None:
-        """Whether a servo still has the watchdog and the torque that it was given."""
+    def well(self, servo: int) -> bool:
+        """Whether a servo says, out of turn, that it has its torque and its watchdog."""
+        try:
+            answered = self.guard(servo)
+        except PortError:
+            return False
+        return answered and servo not in {*self.watchdogs, *self.disarmed}
+
+    def guard(self, servo: int) -> bool:
+        """Ask a servo for the watchdog and the torque that it was given; whether it answered."""
         data = self._one(servo, Span(_WATCHDOG.address, _WATCHDOG.size))
         if data is None:
-            return
+            return False
         watchdog = _WATCHDOG.decode(data)
         self.watchdogs = _with(self.watchdogs, servo, watchdog < 0)
         if not self.armed or servo == self.loose:
-            return
+            return True
         lost = 0 <= watchdog != WATCHDOG_COUNTS
         torque = self._one(servo, Span(_TORQUE.address, _TORQUE.size, spare=1))
         if torque is not None or lost:
             lost |= torque is not None and not _TORQUE.decode(torque)
             self.disarmed = _with(self.disarmed, servo, lost)
+        return True
 
     def _note(self, servo: int, reply: Answer, dead: bool) -> None:
         if not isinstance(reply, Value):
