@@ -157,7 +157,7 @@ SESSION = [
     ),
     Guard(
         "order of deadlines",
-        put(deadlines, "_rise", constant(None)),
+        put(deadlines, "require_order", constant(None)),
         test_deadlines.test_a_session_refuses_them_too,
     ),
     Guard(

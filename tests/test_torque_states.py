@@ -116,7 +116,7 @@ class Robot(RuleBasedStateMachine):
             quality=SignalQuality(ConditioningParams()),
         )
         self.decided: Outputs | None = None
-        self.armed = self.pressed = self.standing = self.answered_before = False
+        self.armed = self.pressed = self.standing = self.decided_before = False
         step = self.session.supervisor.step
 
         def decide(now: float, inputs: Any) -> Outputs:
@@ -149,13 +149,14 @@ class Robot(RuleBasedStateMachine):
         assert one.address == GOAL, one
         assert self.armed, one
         held = session.control.standing or self.standing
-        slow = session.control.rate < 1.0 and self.answered_before  # every second tick, no more
+        slow = session.control.rate < 1.0 and self.decided_before  # every second tick, no more
         assert self.mind.answered or held or slow, "a goal without a decision of this tick"
 
     def tick(self, asked: bool = True) -> None:
         """One tick of the loop; `asked` is whether the loop reaches the controller."""
         session, begin = self.session, self.wire.now()
-        self.answered_before, self.mind.answered = self.mind.answered, False
+        self.decided_before = self.mind.answered or session.control.standing
+        self.mind.answered = False
         frame = session.read()
         command = session.control.command
         if asked:
