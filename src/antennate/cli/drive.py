@@ -39,7 +39,7 @@ from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
-from antennate.studies.run_files import LOG
+from antennate.studies.run_files import LOG, LOG_PARTS
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
@@ -122,6 +122,7 @@ def walk(
         folder_for(view, orders, config, argv) as folder,
     ):
         folder.without_trials()
+        folder.claim_names(LOG_PARTS)
         with connect(config, orders.esp32, orders.bus, key) as session:
             if operator.stop is not None:
                 operator.stop.closed = True  # until the first tick: from here on there is a result

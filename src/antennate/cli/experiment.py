@@ -227,6 +227,8 @@ def _outcome(
     view: SimulationView | None,
 ) -> Outcome:
     """Run it: watched, logged, or neither."""
+    if options.log:
+        run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
     logs = run.folder(LOGS) if options.log else None
     interim = Interim()
 

@@ -100,6 +100,7 @@ class Experiment(Generic[Config, Found]):
         parts: What `on_step` counts.
         logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
             well; None if there are no controllers to log.
+        logs: Names of the logs that `logged` and `viewed` write into that folder.
         viewed: viewed(config, on_step, on_row, view, logs) runs as `run` does, in this process, and
             shows each trial on a page; the folder for logs may be None. None where nothing can be
             shown.
@@ -126,6 +127,7 @@ class Experiment(Generic[Config, Found]):
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
     logged: Callable[[Config, Workers, OnStep, OnRow, Path], Found] | None = None
+    logs: Callable[[Config], Sequence[str]] = lambda config: ()
     viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None

@@ -1,6 +1,6 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
-Files are written whole. While a run goes on, finished trials are appended to
+Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are appended to
 `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`. A directory that
 holds a run is left alone unless told otherwise; then the files of that run are set aside, and go
 once the new one has something to keep, so that nothing old stands beside the new. Only a
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -36,6 +37,7 @@ from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
     FIGURES,
+    FILES,
     LOGS,
     PARTIAL,
     REPORT,
@@ -43,8 +45,10 @@ from antennate.studies.run_files import (
     ROOM,
     TABLE,
     VERSIONS,
+    add_to_list,
     files_of,
     inside,
+    listed,
     read_as,
     remove_described,
     writing,
@@ -71,6 +75,7 @@ class RunDirectory:
         self._created, self._replaced = taken.created, taken.replaced
         self._partial = taken.partial
         self._kept = taken.partial is None
+        self._listed = set(listed(taken.path) or ())
 
     @classmethod
     def create(
@@ -152,6 +157,12 @@ class RunDirectory:
         path = inside(self.path, name)
         decode = formats.sound_json if name.endswith(".json") else str
         return read_as(path, decode) if path.exists() else ""
+
+    def made(self, folder: str, ending: str) -> list[Path]:
+        """Files of the run in a folder of it; of a run of an older version all that are there."""
+        files = sorted((self.path / folder).glob(f"*{ending}"))
+        own = files_of(self.path)
+        return [file for file in files if file in own or not own]
 
     def describe(self, config: Params, command: Sequence[str] = ()) -> None:
         """Write what is known before the run: configuration, versions and command.
@@ -257,10 +268,29 @@ class RunDirectory:
         if self._finished and path.exists() and (name != REPORT or self.untouched):
             return
         self.untouched = False
+        self.claim_names([name])
         with writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
             file.writelines(formats.pieces(content))
+
+    def claim_names(self, names: Iterable[str]) -> None:
+        """Put names into the list of files of this run, before these files are made.
+
+        Raises:
+            OutputError: There is such a file, which this run has not made.
+        """
+        new = [name for name in names if name not in self._listed]
+        for name in new:
+            if os.path.lexists(self.path / name):
+                raise OutputError(
+                    f"{self.path}: expected no file {name} but of this run, found one of somebody "
+                    "else; move it, or choose another folder"
+                )
+        if new:
+            with writing(self.path / FILES):
+                add_to_list(self.path, new)
+            self._listed.update(new)
 
     def folder(self, name: str) -> Path:
         """A folder in the directory for files of the run, made if it is not there.
