@@ -326,7 +326,7 @@ def test_bad_folders(capsys, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "config.toml").write_text("trials = 1\n")
     line = refusal(capsys, *QUICK, "--out", "mine")
-    assert "found mine/config.toml; choose another or give --overwrite" in line
+    assert "found mine/config.toml; choose another" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
 
 
@@ -373,9 +373,11 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "figures/summary.svg",
         "figures/trajectories.png",
         "figures/trajectories.svg",
+        "files.txt",
         "report.html",
         "result.json",
         "trials.csv",
+        "trials.store.jsonl",
         "versions.json",
     ]
     command, *dates = (run / "command.txt").read_text().splitlines()

@@ -321,9 +321,11 @@ def test_a_file_of_somebody_with_the_name_of_one_of_a_run_is_not_replaced(
     figure = Path("run/figures/trials.svg")
     figure.parent.mkdir()
     figure.write_text("mine")
-    with RunDirectory.create("wall", "run", overwrite=True) as run:
-        with pytest.raises(OutputError, match="found one of somebody else"):
-            run.write("figures/trials.svg", "another")
+    with (
+        pytest.raises(OutputError, match="found one of somebody else"),
+        RunDirectory.create("wall", "run", overwrite=True) as run,
+    ):
+        run.write("figures/trials.svg", "another")
     assert figure.read_text() == "mine"
 
 

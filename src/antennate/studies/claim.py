@@ -26,7 +26,7 @@ from antennate.studies.run_files import (
     sweep,
     writing,
 )
-from antennate.studies.store import STORE, Store, open_store
+from antennate.studies.store import STORE, Store, Tasks, open_store
 
 
 class Claim(NamedTuple):
@@ -56,6 +56,7 @@ def claim(
     identity: Mapping[str, Any] | None,
     resume: bool | None,
     retry: bool,
+    tasks: Tasks | None = None,
 ) -> Claim:
     """Take a directory; see `RunDirectory.create`."""
     place = place_of(command, path)
@@ -78,8 +79,8 @@ def claim(
         try:
             known = (stays,) if stays and held else ()
             add_to_list(place, (PARTIAL, STORE, ROOM, *known))
-            store = open_store(place, identity)
-            sound = store is not None and not store.damaged
+            store = open_store(place, identity, tasks if goes_on else None)
+            sound = store is not None and not store.damaged and store.holds_all(tasks)
             finished = goes_on and not retry and sound and is_finished(place)
             for file in outdated(held, stays, finished) if goes_on else ():
                 file.unlink()

@@ -7,6 +7,7 @@ its result in a run directory, prints its tables and its closing sentence, and d
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -112,6 +113,8 @@ class Experiment(Generic[Config, Found]):
         measures: What it tells of its trials; studies take labels and units from them.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
+        tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
+            trials; None if it is the list of `trials`, or if a run does not go on with more.
         in_shards: Whether its trials are known from the start, so that shards can divide them.
     """
 
@@ -137,6 +140,7 @@ class Experiment(Generic[Config, Found]):
     captions: Mapping[str, str] = field(default_factory=dict)
     on_workers: bool = True
     in_shards: bool = True
+    tasks: Callable[[Config], Sequence[Any]] | None = None
 
     @property
     def view(self) -> View:
@@ -146,6 +150,14 @@ class Experiment(Generic[Config, Found]):
             body=self.body,
             captions=self.captions,
         )
+
+    @property
+    def grows(self) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
+        """Tasks of a configuration as JSON has it; None if a run does not go on with more."""
+        tasks = self.tasks or (self.trials.every if self.trials else None)
+        if tasks is None:
+            return None
+        return lambda values: tasks(self.config.model_validate_json(json.dumps(values)))
 
     @classmethod
     def of_folder(

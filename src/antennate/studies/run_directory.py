@@ -1,7 +1,8 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
-Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are appended to
-`trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`. A directory that
+Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are
+appended to `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`,
+which stays where more trials may follow. A directory that
 holds a run is left alone unless told otherwise; then the files of that run are set aside, and go
 once the new one has something to keep, so that nothing old stands beside the new. Only a
 calibration stays until the next one replaces it, so that a robot is never without.
@@ -53,6 +54,7 @@ from antennate.studies.run_files import (
     remove_described,
     writing,
 )
+from antennate.studies.store import Tasks
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -86,6 +88,7 @@ class RunDirectory:
         identity: Mapping[str, Any] | None = None,
         resume: bool | None = False,
         retry: bool = False,
+        tasks: Tasks | None = None,
     ) -> RunDirectory:
         """Claim a directory for a run of `command`.
 
@@ -98,6 +101,8 @@ class RunDirectory:
                 files that are missing are written, and the report with them. None if `command`
                 goes on with none.
             retry: Whether trials that failed are run again, so that no run is finished.
+            tasks: What each task is, of a configuration as JSON has it, so that a run goes on with
+                more trials than it was begun with; None if it does not.
 
         Raises:
             BadInputError: The run that is to go on is another one, the path is none, or the command
@@ -105,7 +110,7 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it.
         """
-        return cls(claim(command, path, overwrite, identity, resume, retry))
+        return cls(claim(command, path, overwrite, identity, resume, retry, tasks))
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:

@@ -114,8 +114,8 @@ def require_replaceable(place: Path) -> None:
     others = others_of(place) if listed(place) is not None else sorted(place.iterdir())
     if others:
         raise OutputError(
-            f"{place}: expected a run of this program to overwrite ({FILES} lists its files), found "
-            f"{others[0].name}, which is of none; choose another folder"
+            f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
+            f"found {others[0].name}, which is of none; choose another folder"
         )
 
 
@@ -132,8 +132,9 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputE
             f"{place}: expected an unfinished run, found a finished one, which takes no more "
             "trials; choose another folder, or give --overwrite to run all of them anew"
         )
+    first = place / RESULT if place / RESULT in held else held[0]
     return OutputError(
-        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {held[0]}; "
+        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {first}; "
         "choose another"
         + (" or give --overwrite" if place / FILES in held else "")
         + (" or --resume" if place / STORE in held and resume is False else "")
