@@ -21,7 +21,7 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
-_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard")
+_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
 """Options that nobody uses first: they come last on the short page."""
 
 
