@@ -141,7 +141,7 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
         Kept(places, robot) as kept,
-        page_of(places) or nullcontext() as page,
+        page_of(places, idle=True) or nullcontext() as page,
         TwinServer(robot, faults, *_endpoints(places), orders) as server,
     ):
         _watch(robot, passage, faults, kept, places.passed)
