@@ -64,7 +64,7 @@ def parse(
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
     without: Sequence[str] = (),
-    file_of: Callable[[Path | None], Path | None] = lambda given: given,
+    file_of: Callable[[Any], Path | None] = lambda chosen: chosen.config,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command.
 
@@ -76,7 +76,7 @@ def parse(
         options: Its other options.
         read: Reads a file that holds more than this configuration.
         without: Fields of the other options that this command has not.
-        file_of: Which file is read, of the one that --config names.
+        file_of: Which file is read, by the other options.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -101,7 +101,7 @@ def parse(
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
     _refuse_alone([each for each in [*others, *parameters] if each.path in values], chosen)
     base: Mapping[str, Any] = {}
-    if isinstance(chosen, FromFile) and (file := file_of(chosen.config)) is not None:
+    if isinstance(chosen, FromFile) and (file := file_of(chosen)) is not None:
         config = read_file(file, model) if read is None else read(file)
         base = config.model_dump(exclude_unset=True)
         _refuse_code(file, base, values)

@@ -144,7 +144,7 @@ def carry_out(
     ):
         if view is not None:
             view.results = str(run.path)
-        run.keeps_store = experiment.continued
+        run.keeps_store = experiment.continued or experiment.grows is not None
         workers = replace(workers, store=run.store, shared=environment(kind, config))
         try:
             if shards and run.store is not None:
@@ -179,7 +179,8 @@ def _folder(
         how: dict[str, Any] = {"command": "merge", "reads": reads}
     elif experiment.on_workers:
         resume = options.resume or options.retry or experiment.continued
-        how = {"resume": resume, "retry": options.retry}
+        tasks = experiment.grows if options.shard is None else None
+        how = {"resume": resume, "retry": options.retry, "tasks": tasks}
     else:
         how = {}
     return folder_for(experiment.view, options, config, argv, identity, **how)
@@ -227,6 +228,8 @@ def _outcome(
     view: SimulationView | None,
 ) -> Outcome:
     """Run it: watched, logged, or neither."""
+    if options.log:
+        run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
     logs = run.folder(LOGS) if options.log else None
     interim = Interim()
 

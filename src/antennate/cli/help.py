@@ -21,7 +21,7 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
-_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard")
+_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
 """Options that nobody uses first: they come last on the short page."""
 
 
@@ -107,7 +107,7 @@ def paragraphs(text: str) -> list[str]:
 
 
 def _usage(command: Command, description: str) -> list[str]:
-    free = "".join(f" {option.metavar}" for option in command.others if option.positional)
+    free = "".join(f" {option.free}" for option in command.others if option.free)
     usage = f"usage: antennate {command.name}{free} [OPTIONS]"
     return [usage, "", *paragraphs(description)]
 
@@ -119,7 +119,7 @@ def _section(title: str, options: Sequence[Option]) -> list[str]:
 
 def _block(option: Option) -> list[str]:
     """An option in one line or more."""
-    head = option.metavar if option.positional else option.offered
+    head = option.free or option.offered
     if not option.positional and option.metavar:
         head += f" {option.metavar}{'...' if option.many else ''}"
     text = "; ".join(filter(None, [option.meaning, option.limits]))

@@ -93,6 +93,11 @@ class Option:
         return flag_of(self.path)
 
     @property
+    def free(self) -> str:
+        """What stands for it in the usage of its command, if it is given without a flag."""
+        return f"{self.metavar}{'...' if self.many else ''}" if self.positional else ""
+
+    @property
     def meaning(self) -> str:
         """What the field means, with its unit; of a named group its choice."""
         kind = group_of(fields_of(self.model)[self.path[-1]].annotation)
@@ -261,7 +266,8 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
         elif not words:
             raise ConfigError(f"{name}: expected {_count(option)}, found none")
         elif option.many:
-            before = values.get(option.path, ()) if option.gathered else ()
+            adds = option.gathered or option.positional
+            before = values.get(option.path, ()) if adds else ()
             values[option.path] = (*before, *map(option.value, words))
             rest = []
         else:
@@ -271,8 +277,11 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
             if not free:
                 meant = nearest(word, by_flag) if word.startswith("-") else ""
                 raise ConfigError(f"expected flags only{meant}, found {shown(word)}")
-            first = free.pop(0)
-            values[first.path] = first.value(word)
+            first = free[0]
+            if first.many:
+                values[first.path] = (*values.get(first.path, ()), first.value(word))
+            else:
+                values[free.pop(0).path] = first.value(word)
     return values
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse
+from antennate.cli.addresses import RobotFileOptions, parse_robot, usual_file
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import stop_signals
@@ -23,6 +23,7 @@ from antennate.cli.view_options import PageOptions, page_of
 from antennate.errors import ConfigError, reason
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
 from antennate.twin.config import TwinConfig, watched
@@ -41,7 +42,17 @@ if TYPE_CHECKING:
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
-_OF_SERVOS = ("duration", "fault", "push", "plugged", "config", "servos", "tcp", "orders")
+_OF_SERVOS = (
+    "duration",
+    "fault",
+    "push",
+    "plugged",
+    "config",
+    "no_config",
+    "servos",
+    "tcp",
+    "orders",
+)
 """What servos alone read."""
 
 DESCRIPTION = """\
@@ -71,7 +82,7 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 
 
 @dataclass(frozen=True)
-class Places(FromFile, KeptOptions, PageOptions):
+class Places(RobotFileOptions, KeptOptions, PageOptions):
     """Where to serve; two pseudo-terminals if no port is given."""
 
     tcp: str | None = option(
@@ -105,11 +116,23 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
-    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
+    config, places = parse_robot(
+        "twin", DESCRIPTION, _of_robot, argv, Places, file_of=_file, named=TwinConfig
+    )
     orders = None if places.orders is None else Orders(str(places.orders), _say)
     if places.servos is None:
         return _serve_robot(config, places, orders)
     return _serve_servos(config, places, read_list(places.servos), orders)
+
+
+def _of_robot(file: RobotFile) -> TwinConfig:
+    """What the twin takes of a robot's file: the robot."""
+    return TwinConfig(robot=file.robot)
+
+
+def _file(places: Places) -> Path | None:
+    """The file to read; servos alone have no robot."""
+    return places.config if places.servos is not None else usual_file(places)
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
@@ -118,7 +141,7 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
         Kept(places, robot) as kept,
-        page_of(places) or nullcontext() as page,
+        page_of(places, idle=True) or nullcontext() as page,
         TwinServer(robot, faults, *_endpoints(places), orders) as server,
     ):
         _watch(robot, passage, faults, kept, places.passed)
