@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -56,6 +56,14 @@ def test_a_list_of_servos_is_read_from_words_and_from_a_file(tmp_path: Path) -> 
 def test_what_is_no_servo_is_refused(text: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         ServoBox(read_list(text))
+
+
+def stand_alone() -> ServoBox:
+    return ServoBox(read_list("1:xc430-w240,2:xl330-m288,3:xl430-w250"))
+
+
+def of_the_robot() -> TwinRobot:
+    return watched(TwinConfig(factory=True))[0]
 
 
 def heard(box: ServoBox, t: float) -> list[int]:
@@ -115,6 +123,29 @@ def test_a_shaft_without_torque_is_turned_and_one_with_torque_is_not() -> None:
             assert 2048 < box.servos[0].get("present_position") < 2048 + 512
     assert box.servos[0].get("present_position") == 2048 + 512
     assert box.servos[1].get("present_position") == 2048
+
+
+@pytest.mark.parametrize("make", [stand_alone, of_the_robot])
+def test_a_homing_offset_moves_the_present_position_of_a_standing_servo_at_once(
+    make: Callable[[], TwinRobot | ServoBox],
+) -> None:
+    """Present Position = Actual Position + Homing Offset; in position mode up to 1024."""
+    twin = make()
+    actual = {servo: servo.get("present_position") for servo in twin.bus.servos}
+    for register, value, shift in (
+        ("homing_offset", 500, 500),
+        ("homing_offset", -1024, -1024),
+        ("homing_offset", 1025, 0),
+        ("operating_mode", 4, 1025),
+        ("homing_offset", -1_044_479, -1_044_479),
+        ("homing_offset", 0, 0),
+    ):
+        twin.advance(twin.t + 0.1)
+        for servo in twin.bus.servos:
+            row = servo.table[register]
+            assert servo.write(row.address, row.encode(value)) == 0
+            present = int.from_bytes(servo.read(132, 4)[1], "little", signed=True)
+            assert present == actual[servo] + shift
 
 
 def test_orders_come_from_a_file_line_by_line(tmp_path: Path) -> None:
