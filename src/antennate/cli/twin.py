@@ -48,7 +48,7 @@ DESCRIPTION = """\
 Serve the simulated robot in a scene on two serial ports (pseudo-terminals), which carry the same
 bytes as those of a real robot: one the frames of the antenna board, one a DYNAMIXEL bus with all
 servos. Prints one JSON line with the paths when ready. Physics begins when the first servo gets
-torque. --fault and --touch may be repeated.
+torque.
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,
@@ -57,7 +57,7 @@ no servo has torque.
 
 --push yaw1=20deg@3s turns a joint whose servo has no torque.
 
---servos 1:xl330-m288,2:xl430-w250@1000000,1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
+--servos 1:xl330-m288 2:xl430-w250@1000000 1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
 as delivered. --orders reads lines while it runs: plug NAME, unplug NAME, only NAME, next,
 push NAME=ANGLE, where a NAME is a joint, a number from 1 on, or all; touch left:20mm, to follow
 the marks of `antennate record`; fault servo:7=silent.
@@ -84,8 +84,8 @@ class Places(FromFile, KeptOptions, PageOptions):
         "FILE",
         needs=["--udp"],
     )
-    servos: str | None = option(
-        None, "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
+    servos: tuple[str, ...] = option(
+        (), "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT]"
     )
     orders: Path | None = option(
         None, "take orders from a file, a named pipe or - for stdin", "FILE"
@@ -107,7 +107,7 @@ def command(argv: Sequence[str]) -> int:
     """
     config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
     orders = None if places.orders is None else Orders(str(places.orders), _say)
-    if places.servos is None:
+    if not places.servos:
         return _serve_robot(config, places, orders)
     return _serve_servos(config, places, read_list(places.servos), orders)
 

@@ -22,8 +22,6 @@ from pydantic import (
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.faults import describe
 
-GATHERED = "gathered"
-"""Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
 ALLOWED = "allowed"
@@ -150,7 +148,14 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
         )
 
 
-def number(default: Any, unit: str, source: str, needs: Sequence[str] = (), **bounds: Any) -> Any:
+def number(
+    default: Any,
+    unit: str,
+    source: str,
+    needs: Sequence[str] = (),
+    metavar: str = "",
+    **bounds: Any,
+) -> Any:
     """Declare one parameter with its unit and source; the docstring below it is its meaning.
 
     Args:
@@ -158,9 +163,12 @@ def number(default: Any, unit: str, source: str, needs: Sequence[str] = (), **bo
         unit: Its unit, "1" if it has none.
         source: Where the default comes from.
         needs: Flags of which one must be given beside its own.
+        metavar: What stands for its value in the help, such as FILE; else its type.
         bounds: As for pydantic's Field.
     """
     extra: dict[str, Any] = {"unit": unit, "source": source}
+    if metavar:
+        extra["metavar"] = metavar
     if needs:
         extra["needs"] = list(needs)
     return Field(default, json_schema_extra=extra, **bounds)
