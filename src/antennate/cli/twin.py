@@ -30,6 +30,7 @@ from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
+from antennate.twin.rfc2217 import Rfc2217Endpoint
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
@@ -41,7 +42,17 @@ if TYPE_CHECKING:
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
-_OF_SERVOS = ("duration", "fault", "push", "plugged", "config", "servos", "tcp", "orders")
+_OF_SERVOS = (
+    "duration",
+    "fault",
+    "push",
+    "plugged",
+    "config",
+    "servos",
+    "tcp",
+    "rfc2217",
+    "orders",
+)
 """What servos alone read."""
 
 DESCRIPTION = """\
@@ -76,6 +87,9 @@ class Places(FromFile, KeptOptions, PageOptions):
 
     tcp: str | None = option(
         None, "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT"
+    )
+    rfc2217: str | None = option(
+        None, "TCP likewise, with speed, DTR and RTS for clients that need them", "[HOST:]PORT"
     )
     udp: str | None = option(None, "the board on a UDP port instead, likewise", "[HOST:]PORT")
     key: Path | None = option(
@@ -119,7 +133,7 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     with (
         Kept(places, robot) as kept,
         page_of(places) or nullcontext() as page,
-        TwinServer(robot, faults, *_endpoints(places), orders) as server,
+        TwinServer(robot, faults, *_endpoints(places, robot), orders) as server,
     ):
         _watch(robot, passage, faults, kept, places.passed)
         if page is not None:
@@ -184,7 +198,8 @@ def _serve_servos(
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)
     box = ServoBox(entries, config.plugged, config.push)
-    bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp is not None else None
+    kind, host, port = _tcp(places)
+    bus = None if kind is None else kind(host, port)
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
         server.run(_until(config, server.paths, lambda: True))
     return OK
@@ -244,16 +259,31 @@ def _tell(passage: Passage, file: Path | None) -> None:
             sys.stderr.write(f"--passed: expected to make {file}, found: {error.strerror}\n")
 
 
-def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
+def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
-    board = bus = None
+    kind, host, port = _tcp(places)
+    board: Endpoint | None = None
     if places.udp is not None:
         board = UdpEndpoint(*_place("--udp", places.udp), read_key(places.key))
-    if places.tcp is not None:
-        host, port = _place("--tcp", places.tcp)
-        board = board or TcpEndpoint(host, port)
-        bus = TcpEndpoint(host, port and port + 1)
-    return board, bus
+    elif kind is Rfc2217Endpoint:
+        board = Rfc2217Endpoint(host, port, robot.set_lines)
+    elif kind is not None:
+        board = kind(host, port)
+    return board, None if kind is None else kind(host, port and port + 1)
+
+
+def _tcp(places: Places) -> tuple[type[TcpEndpoint] | None, str, int]:
+    """The kind of TCP endpoint that is wanted, if any, with its host and port.
+
+    Raises:
+        ConfigError: Both are.
+    """
+    if places.tcp is not None and places.rfc2217 is not None:
+        raise ConfigError("--rfc2217: expected none beside --tcp, found both")
+    for kind, text in ((TcpEndpoint, places.tcp), (Rfc2217Endpoint, places.rfc2217)):
+        if text is not None:
+            return kind, *_place(kind.flag, text)
+    return None, "", 0
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:
