@@ -213,7 +213,7 @@ def _require_of_servos(config: TwinConfig, places: Places) -> None:
     """
     options = [(name, getattr(places, name), field) for name, field in fields_of(Places).items()]
     given = [(name, value) for name, value, field in options if value != field.default]
-    given += [(path, value) for path, _, value in changes(config, paths_of(TwinConfig))]
+    given += list(changes(config, paths_of(TwinConfig)))
     for path, value in given:
         if path not in _OF_SERVOS:
             raise ConfigError(

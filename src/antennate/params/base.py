@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.params.faults import describe
+from antennate.params.faults import Unread, describe
 
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
@@ -77,22 +77,27 @@ class Params(Strict):
         never = (path for path in self.unread if not path.startswith(f"{ROBOT}."))
         why = {**dict.fromkeys(never, "it is not read here"), **self.unread_here()}
         allowed = (info.context or {}).get(ALLOWED, ())
-        for path, default, found in changes(self, why):
+        for path, found in changes(self, why):
             if path not in allowed:
-                raise ValueError(f"{path}: expected {default}, as {why[path]}, found {found}")
+                raise self.unread_error(path, why[path], found)
         return self
 
+    def unread_error(self, path: str, why: str, found: Any) -> Unread:
+        """The error of a dotted parameter that nothing reads and that has a value of its own."""
+        never = {*self.unread, *self.unread_here()}
+        read = [name for name in paths_of(type(self)) if name not in never]
+        return Unread(path, why, found, read)
 
-def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any, Any]]:
-    """Those of these dotted parameters that differ from their default: path, default and value."""
+
+def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any]]:
+    """Those of these dotted parameters that differ from their default, with their values."""
     for path in paths:
         *groups, name = path.split(".")
         group: Any = config
         for part in groups:
             group = getattr(group, part)
-        default, found = type(group).model_fields[name].default, getattr(group, name)
-        if found != default:
-            yield path, default, found
+        if (found := getattr(group, name)) != type(group).model_fields[name].default:
+            yield path, found
 
 
 def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
