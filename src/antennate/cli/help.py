@@ -21,7 +21,8 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
-_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard")
+_LATER = ("--calibration-right", "--sensor-id", "--insecure-udp", "--key", "--view", "--foxglove")
+_LATER += ("--video", "--slurm", "--shard")
 """Options that nobody uses first: they come last on the short page."""
 
 
@@ -50,7 +51,7 @@ def short_page(command: Command) -> str:
     the other half leaves.
     """
     outside = (option for option in command.parameters if len(option.path) == 1)
-    top = sorted(outside, key=lambda option: not option.metavar.startswith("NAME"))
+    top = sorted(outside, key=lambda each: (_rank(each), not each.metavar.startswith("NAME")))
     head = _usage(command, command.description.split("\n\n")[0])
     tail = [*_groups(command.model, command.parameters), "", *_lists(command)]
     tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
