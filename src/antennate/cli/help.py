@@ -21,8 +21,8 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
-_LATER = ("--calibration-right", "--sensor-id", "--insecure-udp", "--key", "--view", "--foxglove")
-_LATER += ("--video", "--slurm", "--shard")
+_LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--key")
+_LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard")
 """Options that nobody uses first: they come last on the short page."""
 
 
