@@ -11,11 +11,12 @@ import numpy as np
 
 from antennate.csv_files import LARGEST_WHOLE
 from antennate.errors import BadInputError
+from antennate.files import in_units
 from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
 
 LARGEST = 10**9
-"""No file is longer [bytes]."""
+"""No file is longer [bytes], nor what it unpacks to: a day at 30 Hz of 24 points."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,19 @@ def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> No
                 f"{path}: expected a point {name}{nearest(name, known)}, found {listed}; name the "
                 "points of the antennae and the body axis with --points.*"
             )
+
+
+def require_room_for(path: Path, size: int) -> None:
+    """Check, before anything is unpacked, how much a file unpacks to [byte].
+
+    Raises:
+        BadInputError: It is more than `LARGEST`.
+    """
+    if size > LARGEST:
+        raise BadInputError(
+            f"{path}: expected at most {in_units(LARGEST)} once unpacked, found {in_units(size)}; "
+            "split the recording, or name fewer points"
+        )
 
 
 def refuse_labels(path: Path, index: str) -> NoReturn:
