@@ -7,7 +7,7 @@ import io
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from antennate.errors import BadInputError
@@ -110,9 +110,17 @@ def column(header: Sequence[str], name: str) -> int | None:
     return same[0] if len(same) == 1 else None
 
 
-def unit_of(cell: str) -> str:
-    """The unit that a column's name gives in brackets, empty without."""
-    return "".join(_UNIT.findall(cell)[-1:]).strip()
+def unit_of(cell: str, known: Collection[str]) -> str:
+    """The unit that a column's name gives in brackets, as `Time [s]`, or at its end, as `time_s`.
+
+    Args:
+        cell: The name.
+        known: Units that are looked for at the end, those of a letter or more.
+    """
+    bracketed = "".join(_UNIT.findall(cell)[-1:]).strip()
+    ends = (unit for unit in known if unit.isascii() and not unit.isdigit())
+    ends = [unit for unit in ends if cell.rstrip("\"' ").endswith("_" + unit.replace("/", "_"))]
+    return bracketed or max(ends, key=len, default="")
 
 
 def _plain(cell: str) -> str:

@@ -9,6 +9,7 @@ from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
+from antennate.experiments.calibrate.readings import told
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
@@ -60,11 +61,48 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             {found["sensor_id"]: found},
             CURVE,
             f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}.\n"
-            f"{_over(found)}",
+            f"{_over(found)}\n{_file(result)}".rstrip(),
         ),
         Table.of("The one curve at each speed", speeds, SPEED),
         _next_push(result),
     )
+
+
+def _file(result: Mapping[str, Any]) -> str:
+    """What was done to the file of a recording, in lines."""
+    handled = result.get("recording")
+    if not handled:
+        return ""
+    lines = [told(handled["conversion"])] if handled["conversion"] else []
+    lines += [f"{w['clock'].capitalize()} wrapped in row {w['row']}." for w in handled["wraps"]]
+    if handled["damaged"]:
+        row, why = handled["damages"][0]
+        lines.append(f"Row {row} is damaged: {why}.")
+    if handled["outliers"]:
+        far = handled["outliers"][0]
+        lines.append(
+            f"Row {far['row']} is an outlier: {far['counts']:.4g} counts where others at its bend "
+            f"are {far['usual']:.4g}."
+        )
+    return "\n".join(lines)
+
+
+def _handled(result: Mapping[str, Any]) -> str:
+    """What was left out of the file of a recording, or mended, as a sentence."""
+    handled = result.get("recording")
+    if not handled:
+        return ""
+    rows, far = handled["rows"], len(handled["outliers"])
+    kept = "kept, as they are many" if handled["outliers_kept"] else "left out"
+    counted = (
+        (handled["damaged"], f"{handled['damaged']} damaged left out"),
+        (far, f"{far} outlier{'s' * (far > 1)} {kept}"),
+        (len(handled["wraps"]), "a clock that wraps unwrapped"),
+    )
+    said = ", ".join(text for number, text in counted if number)
+    unit = handled["conversion"]["unit"] if handled["conversion"] else ""
+    become = f" Readings in {unit} became counts: see the table." if unit else ""
+    return (f" Of {rows} rows: {said}." if said else "") + become
 
 
 def _over(found: Mapping[str, Any]) -> str:
@@ -128,7 +166,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     interval = _no_interval(found) or f"95 % interval {shown(found['slope_95'], '.1f')}"
     return (
         f"One sigmoid explains R² {found['r2']:.2f} of {_pushes(found)}, with a slope of "
-        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}."
+        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}.{_handled(result)}"
     )
 
 

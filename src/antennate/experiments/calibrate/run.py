@@ -22,10 +22,11 @@ from antennate.antenna.next_push import Assessment, Pushes, assess
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
+from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.experiments.reading import mean_since
-from antennate.params.base import Params, number, require_default
+from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
@@ -36,7 +37,7 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
-_OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver", "seed")
+_OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
 
 
 class CalibrateConfig(Params):
@@ -90,7 +91,9 @@ class CalibrateConfig(Params):
         if self.recording is None:
             require_default(self, "without a recording it is not read", "columns", "rate")
         else:
-            require_default(self, "with a recording it is not read", *_OF_THE_RIG)
+            used = {f"antenna.sensor.{n}" for n in parameters_of(self.columns.reading_unit)}
+            antenna = sorted({*paths_of(AntennaSpec, "antenna")} - used)
+            require_default(self, "with a recording it is not read", *_OF_THE_RIG, *antenna)
         named = {"time_column", "time_unit"} & self.columns.model_fields_set
         if self.rate is not None and named:
             raise ValueError(
@@ -142,6 +145,7 @@ class CalibrateOutcome(Outcome):
             "source": "rig" if self.config.recording is None else "recording",
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
+            "recording": None if self.raw.handled is None else asdict(self.raw.handled),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
@@ -245,7 +249,8 @@ def run(
     if config.recording is None:
         raw = record(config, workers, on_step)
     else:
-        raw = read(Path(config.recording), config.columns, config.rate)
+        sensor = config.antenna.sensor
+        raw = read(Path(config.recording), config.columns, config.rate, sensor)
     used = averaged(raw, config.averaging_time)
     pushes = Pushes.of(used.samples)
     used = replace(used, samples=replace(used.samples, trial=pushes.number))
