@@ -44,6 +44,9 @@ NEXT = (
     Measure("hysteresis.largest", "  largest gap", "% of the span", form="+.1f", scale=100.0),
     Measure("hysteresis.at_bend", "  at a bend of"),
     Measure("hysteresis.level", "  largest gap in b", form="+.3f"),
+    Measure("relaxation.mean", "relaxation in a hold", "% of the span", form="+.1f", scale=100.0),
+    Measure("relaxation.mean_95", _95, form="+.1f", scale=100.0),
+    Measure("relaxation.time", "  length of a hold", "s", form=".2g"),
 )
 
 
@@ -133,6 +136,8 @@ def _next_push(result: Mapping[str, Any]) -> Table:
     notes = []
     if known["new_push"] is None:
         notes.append("One push only: nothing is known about the next one; record more pushes.")
+    elif known["new_push"]["error_95"] is None:
+        notes.append("Two pushes say too little for an interval of the next one; record three.")
     if known["hysteresis"] is None:
         notes.append("No push was bent and released: nothing is known about hysteresis.")
     notes += [_rival(name, checks) for name, checks in known["rivals"].items() if checks]
@@ -157,12 +162,12 @@ def sentence(result: Mapping[str, Any]) -> str:
     """How well one curve serves all pushes."""
     found = result["calibration"]
     following = result["assessment"]["new_push"]
-    errors = Measure("error_95", form="+.2f").cell(following) if following else ""
-    ahead = (
-        f"in a new push b errs by {errors} (95 %)"
-        if following
-        else "nothing is known about the next push"
-    )
+    ahead = "nothing is known about the next push"
+    if following:
+        errors = Measure("error_95", form="+.2f").cell(following)
+        ahead = f"in a new push b errs by {errors} (95 %)"
+        if following["error_95"] is None:
+            ahead = "two pushes say too little about the next one"
     interval = _no_interval(found) or f"95 % interval {shown(found['slope_95'], '.1f')}"
     return (
         f"One sigmoid explains R² {found['r2']:.2f} of {_pushes(found)}, with a slope of "
@@ -174,17 +179,29 @@ def _warning(result: Mapping[str, Any]) -> str:
     """What a poor fit comes from."""
     if not result["poor"]:
         return ""
+    known = result["assessment"]
     if result.get("hysteretic"):
-        known = result["assessment"]["hysteresis"]
-        there, back = known["one_way_r2"]
+        there, back = known["hysteresis"]["one_way_r2"]
         return (
-            f"; the rest is hysteresis, {100 * abs(known['mean']):.0f} % of the span: loading "
-            f"alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and one curve "
-            "cannot follow both"
+            f"; the rest is hysteresis, {100 * abs(known['hysteresis']['mean']):.0f} % of the "
+            f"span: loading alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and "
+            f"one curve cannot follow both{_relaxing(known)}"
         )
     return (
         "; look at the figure: perhaps marks and readings do not match, or the flex sensor "
-        "slipped; record again before a robot relies on it"
+        f"slipped; record again before a robot relies on it{_relaxing(known)}"
+    )
+
+
+def _relaxing(known: Mapping[str, Any]) -> str:
+    """How far readings move while the bend is held, if they do beyond noise."""
+    found = known.get("relaxation")
+    if not found or not found["mean_95"] or found["mean_95"][0] * found["mean_95"][1] <= 0:
+        return ""
+    way = "on" if found["mean"] > 0 else "back"
+    return (
+        f"; it relaxes, too: held for {found['time']:.2g} s its readings move {way} by "
+        f"{100 * abs(found['mean']):.0f} % of the span"
     )
 
 

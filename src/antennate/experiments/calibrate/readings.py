@@ -117,12 +117,13 @@ def to_counts(
     apart = (volts > corners[0]) & (volts < corners[-1])
     if (~apart).mean() > _RAIL_SHARE:
         low, high = values.min(), values.max()
-        cure = "--antenna.sensor.divider-resistance" if unit.endswith("ohm") else "--columns.*"
+        cure = "does --antenna.sensor.divider-resistance fit?"
+        cure = cure if unit.endswith("ohm") else "must it be amplified?"
         raise CalibrationError(
             f"{path}: expected voltages of {corners[0]:.3g} to {corners[-1]:.3g} V at the "
             f"converter, which it tells apart, found {volts.min():.3g} to {volts.max():.3g} V from "
-            f"{low:.4g} to {high:.4g} {unit}; is {unit} the right --columns.reading-unit, and does "
-            f"{cure} fit?"
+            f"{low:.4g} to {high:.4g} {unit}; is {unit} the right --columns.reading-unit, and "
+            f"{cure}"
         )
     how = "the divider and the board's converter" if len(used) > 1 else "the board's converter"
     counts = np.clip(np.interp(volts, corners, readings), 0.0, FULL_SCALE)

@@ -244,7 +244,7 @@ def _check_share(path: Path, damages: list[tuple[int, str]], rows: int, most: fl
     if len(damages) <= most * rows:
         return
     line, why = damages[0]
-    more = f" ({len(damages)} of {rows} rows are damaged)" if len(damages) > 1 else ""
+    more = f" ({len(damages)} of {rows} rows are like it)" if len(damages) > 1 else ""
     raise CalibrationError(f"{path}: row {line}: {why}{more}")
 
 
@@ -282,8 +282,11 @@ def _values(
 ) -> list[float] | str:
     """Numbers of a row, or what was expected of it and found."""
     if len(cells) != len(header):
-        few = len(cells) < len(header)
-        why = " (truncated); delete the row" if few else "; are there decimal commas? write points"
+        why = "; are there decimal commas? write points"
+        if len(cells) < len(header):
+            why = " (truncated); delete the row"
+        elif any("." in cell for cell in cells):
+            why = "; is it merged with another, or a column without a name?"
         return f"expected {len(header)} cells, found {len(cells)}{why}"
     values = list[float]()
     for i, place in enumerate(places):

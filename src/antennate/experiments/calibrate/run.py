@@ -18,7 +18,7 @@ from pydantic import model_validator
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
-from antennate.antenna.next_push import Assessment, Pushes, assess
+from antennate.antenna.next_push import Assessment, Pushes, assess, one_way_r2
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
@@ -37,6 +37,8 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
+_ONE_WAY = 0.8
+"""Share of the level that each direction has to explain for hysteresis to be asked about."""
 _OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
 
 
@@ -134,7 +136,7 @@ class CalibrateOutcome(Outcome):
     @functools.cached_property
     def assessment(self) -> Assessment:
         """What is known about the next push."""
-        return assess(self.recording.samples, self.calibration)
+        return assess(self.recording.samples, self.calibration, self.recording.t)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -151,9 +153,15 @@ class CalibrateOutcome(Outcome):
         }
 
     def _hysteretic(self) -> bool:
-        """Whether the fit is poor although loading and unloading each are fitted well."""
-        found, good = self.assessment.hysteresis, self.config.good_r2
-        return self.calibration.r2 < good and found is not None and min(found.one_way_r2) >= good
+        """Whether the fit is poor, and loading and unloading are fitted far better on their own.
+
+        That is: each well, or with half the variance left or less.
+        """
+        found, good, r2 = self.assessment.hysteresis, self.config.good_r2, self.calibration.r2
+        if found is None or r2 >= good:
+            return False
+        alone = min(found.one_way_r2)
+        return alone >= good or 1.0 - alone <= (1.0 - r2) / 2.0
 
     def levels(self) -> Floats:
         """Bending levels that the calibration gives its own data, shape (n,)."""
@@ -265,5 +273,9 @@ def run(
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""
-        raise CalibrationError(f"{where}{error}") from None
+        there, back = one_way_r2(used.samples, pushes)
+        both = min(there, back) >= max(config.least_r2, _ONE_WAY)
+        ways = f"loading alone would fit with R² {there:.2f}, unloading alone with {back:.2f}"
+        why = f"; or is it hysteresis? {ways}" if both else ""
+        raise CalibrationError(f"{where}{error}{why}") from None
     return CalibrateOutcome(config, used, raw, found)
