@@ -269,19 +269,15 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
         interval,
         float(levels[np.argmax(abs(levels))]),
         len(each),
-        one_way_r2(samples, pushes),
+        (sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)),
     )
 
 
-def one_way_r2(samples: Samples, pushes: Pushes) -> tuple[float, float]:
-    """R² of a sigmoid fitted to readings of loading alone, and of one to those of unloading."""
-
-    def of(rows: Bools) -> float:
-        counts, level = samples.counts[rows], samples.level[rows]
-        if len(counts) < FEWEST or np.ptp(counts) == 0 or np.ptp(level) == 0:
-            return 0.0
-        x = (counts - counts.min()) / np.ptp(counts)
-        error = predict("sigmoid", x, level, x, polarity(samples)) - level
-        return float(1.0 - (error**2).mean() / level.var())
-
-    return of(pushes.way > 0), of(pushes.way < 0)
+def sigmoid_r2(samples: Samples, rows: Bools) -> float:
+    """R² of a sigmoid fitted to some of the readings alone, 0 of too few."""
+    counts, level = samples.counts[rows], samples.level[rows]
+    if len(counts) < FEWEST or np.ptp(counts) == 0 or np.ptp(level) == 0:
+        return 0.0
+    x = (counts - counts.min()) / np.ptp(counts)
+    error = predict("sigmoid", x, level, x, polarity(samples)) - level
+    return float(1.0 - (error**2).mean() / level.var())

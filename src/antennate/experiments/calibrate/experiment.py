@@ -15,6 +15,8 @@ from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
 _95 = "  95 %"
+_MUCH = 0.1
+"""Hysteresis over the span beyond which a poor fit is partly its work."""
 CURVE = (
     Measure("slope", "slope", form=".3f"),
     Measure("slope_95", _95, form=".3f"),
@@ -180,12 +182,19 @@ def _warning(result: Mapping[str, Any]) -> str:
     if not result["poor"]:
         return ""
     known = result["assessment"]
+    loop = known["hysteresis"]
     if result.get("hysteretic"):
-        there, back = known["hysteresis"]["one_way_r2"]
+        there, back = loop["one_way_r2"]
         return (
-            f"; the rest is hysteresis, {100 * abs(known['hysteresis']['mean']):.0f} % of the "
-            f"span: loading alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and "
-            f"one curve cannot follow both{_relaxing(known)}"
+            f"; the rest is hysteresis, {100 * abs(loop['mean']):.0f} % of the span: loading "
+            f"alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and one curve "
+            f"cannot follow both{_relaxing(known)}"
+        )
+    ends = loop and loop["mean_95"]
+    if ends and ends[0] * ends[1] > 0 and abs(loop["mean"]) > _MUCH:
+        return (
+            f"; hysteresis, {100 * abs(loop['mean']):.0f} % of the span, is a part of the rest; "
+            f"the figure shows what else is: noise, or marks that do not match{_relaxing(known)}"
         )
     return (
         "; look at the figure: perhaps marks and readings do not match, or the flex sensor "

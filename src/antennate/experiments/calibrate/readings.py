@@ -118,7 +118,7 @@ def to_counts(
     if (~apart).mean() > _RAIL_SHARE:
         low, high = values.min(), values.max()
         cure = "does --antenna.sensor.divider-resistance fit?"
-        cure = cure if unit.endswith("ohm") else "must it be amplified?"
+        cure = cure if unit.endswith("ohm") else "does it need another gain?"
         raise CalibrationError(
             f"{path}: expected voltages of {corners[0]:.3g} to {corners[-1]:.3g} V at the "
             f"converter, which it tells apart, found {volts.min():.3g} to {volts.max():.3g} V from "

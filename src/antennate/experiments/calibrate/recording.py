@@ -148,7 +148,8 @@ def read(
     kept = np.ones(len(t), bool)
     if rate is None:
         t, wraps = unwrapped(t * TIME_UNITS[params.time_unit], trial, lines)
-        kept = ~out_of_place(t, trial)
+        astray = out_of_place(t, trial)
+        kept = ~astray if astray.mean() <= params.most_lost else kept
         why = f"expected time to rise within a push, found {params.time_column} out of place"
         damages += [(int(line), why) for line in lines[~kept]]
     _check_share(path, damages, total, params.most_lost)

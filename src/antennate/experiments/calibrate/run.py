@@ -18,7 +18,7 @@ from pydantic import model_validator
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
-from antennate.antenna.next_push import Assessment, Pushes, assess, one_way_r2
+from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
@@ -37,8 +37,8 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
-_ONE_WAY = 0.8
-"""Share of the level that each direction has to explain for hysteresis to be asked about."""
+_BETTER = 0.2
+"""How much more of the level each direction alone explains where hysteresis is asked about."""
 _OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
 
 
@@ -273,9 +273,17 @@ def run(
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""
-        there, back = one_way_r2(used.samples, pushes)
-        both = min(there, back) >= max(config.least_r2, _ONE_WAY)
-        ways = f"loading alone would fit with R² {there:.2f}, unloading alone with {back:.2f}"
-        why = f"; or is it hysteresis? {ways}" if both else ""
-        raise CalibrationError(f"{where}{error}{why}") from None
+        raise CalibrationError(f"{where}{error}{_hysteresis(used.samples, pushes)}") from None
     return CalibrateOutcome(config, used, raw, found)
+
+
+def _hysteresis(samples: Samples, pushes: Pushes) -> str:
+    """A hint at hysteresis beside a fault, if each direction alone would be fitted far better."""
+    there, back = (sigmoid_r2(samples, pushes.way == sign) for sign in (1, -1))
+    both = sigmoid_r2(samples, pushes.way != 0)
+    if min(there, back) < both + _BETTER:
+        return ""
+    return (
+        f"; or is it hysteresis? Loading alone fits with R² {there:.2f}, unloading alone with "
+        f"{back:.2f}"
+    )
