@@ -157,20 +157,16 @@ def _require_counts(path: Path, values: Floats, rows: Ints) -> None:
         )
 
 
-def outliers(samples: Samples, position: Ints) -> Bools:
+def outliers(samples: Samples) -> Bools:
     """Readings far from those around them in time and at the same bend, shape (n,).
 
     A serial line that loses a digit makes 41 of 416. Such a reading is off the median of five in a
     row of its trial, and off the median of those at its bend, by 0.3 spans and by eight standard
     deviations of what the others are off.
-
-    Args:
-        samples: The readings.
-        position: Number of the trial of each, shape (n,).
     """
     counts = samples.counts
     low, high = np.percentile(counts, [1, 99])
-    off = counts - _running_median(counts, position)
+    off = counts - _running_median(counts, samples.trial)
     noise = 1.4826 * float(np.median(abs(off[off != 0]))) if (off != 0).any() else 0.0
     far = abs(off) > max(_FAR * (high - low), _FAR_OVER_NOISE * noise)
     return far & (abs(counts - usual(samples)) > _FAR * (high - low))

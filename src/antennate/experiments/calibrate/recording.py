@@ -42,8 +42,8 @@ _LARGEST_SPEED = 1.0
 _LARGEST_FILE = 50_000_000
 _NAMED = 20
 """Most rows that are named one by one."""
-_TIME, _READING = 2, 3
-"""Places among the columns of a recording."""
+_TRIAL, _SPEED, _TIME, _READING, _BEND = range(5)
+"""Columns of a recording as it is read."""
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
 
 
@@ -142,46 +142,46 @@ def read(
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
     table, lines, damages = _rows(path, data, params, rate)
     total = len(table) + len(damages)
-    trial, speed, t, readings, raw = table.T
-    trial = _numbered(path, trial, lines, params.trial_column)
-    wraps = list[Wrap]()
-    kept = np.ones(len(t), bool)
+    trial = _numbered(path, table[:, _TRIAL], lines, params.trial_column)
     if rate is None:
-        t, wraps = unwrapped(t * TIME_UNITS[params.time_unit], trial, lines)
+        t, wraps = unwrapped(table[:, _TIME] * TIME_UNITS[params.time_unit], trial, lines)
         astray = out_of_place(t, trial)
-        kept = ~astray if astray.mean() <= params.most_lost else kept
-        why = f"expected time to rise within a push, found {params.time_column} out of place"
-        damages += [(int(line), why) for line in lines[~kept]]
-    _check_share(path, damages, total, params.most_lost)
-    trial, speed, t, readings, raw = (v[kept] for v in (trial, speed, t, readings, raw))
-    lines = lines[kept]
-    if rate is None:
+        if astray.mean() <= params.most_lost:
+            why = f"expected time to rise within a push, found {params.time_column} out of place"
+            damages = sorted([*damages, *((int(line), why) for line in lines[astray])])
+            table, t = table[~astray], t[~astray]
+            lines, trial = lines[~astray], trial[~astray]
         check_time(path, t, trial, lines, params.time_unit)
     else:
-        t = _counted(trial) / rate
+        t, wraps = _counted(trial) / rate, []
+    _check_share(path, damages, total, params.most_lost)
+    readings, bend = table[:, _READING], _normalised(path, lines, table[:, _BEND], params)
     counts, conversion = to_counts(
         path, params.reading_unit, readings, lines, sensor or SensorParams()
     )
-    speed = _speeds(path, speed, lines, params)
-    samples = Samples(counts, _normalised(path, raw, lines, params), trial, speed, lines)
-    far = outliers(samples, trial)
-    among = [
-        Outlier(int(row), float(value), float(other))
-        for row, value, other in zip(lines[far], counts[far], usual(samples)[far], strict=True)
-    ]
-    keep_all = bool(far.mean() > params.most_lost)
-    used = np.ones(len(far), bool) if keep_all else ~far
-    samples = Samples(*(getattr(samples, f.name)[used] for f in fields(Samples)))
+    speed: Floats = np.abs(table[:, _SPEED]) * SPEED_UNITS[params.speed_unit]
+    samples, t, far, kept = _without_outliers(Samples(counts, bend, trial, speed, lines), t, params)
     handled = Handled(
-        total,
-        len(damages),
-        tuple(sorted(damages)[:_NAMED]),
-        tuple(among),
-        keep_all,
-        tuple(wraps),
-        conversion,
+        total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion
     )
-    return Recording(t[used], samples, hashlib.sha256(data).hexdigest(), handled)
+    return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
+
+
+def _without_outliers(
+    samples: Samples, t: Floats, params: RecordingParams
+) -> tuple[Samples, Floats, tuple[Outlier, ...], bool]:
+    """Readings and times without outliers, these, and whether they are kept as there are many."""
+    far = outliers(samples)
+    found = tuple(
+        Outlier(int(row), float(value), float(other))
+        for row, value, other in zip(
+            samples.row[far], samples.counts[far], usual(samples)[far], strict=True
+        )
+    )
+    if far.mean() > params.most_lost:
+        return samples, t, found, True
+    used = Samples(*(getattr(samples, field.name)[~far] for field in fields(Samples)))
+    return used, t[~far], found, False
 
 
 def _numbered(path: Path, trial: Floats, lines: Ints, name: str) -> Ints:
@@ -304,38 +304,32 @@ def _values(
             value = clock / TIME_UNITS[params.time_unit]
         if not math.isfinite(value):
             return f"expected a finite number {found}; delete the row"
-        if i == _READING and (wanted := impossible(params.reading_unit, value)):
-            return (
-                f"expected {wanted}, found {value:g}; is {params.reading_unit} the right "
-                "--columns.reading-unit?"
-            )
+        if why := _impossible(i, value, header[place], params):
+            return why
         values.append(value)
     return values
 
 
-def _speeds(path: Path, speed: Floats, lines: Ints, params: RecordingParams) -> Floats:
-    """Speeds [m/s] without their sign, NaN where unknown, shape (n,)."""
-    si = abs(speed) * SPEED_UNITS[params.speed_unit]
-    beyond = si > _LARGEST_SPEED
-    if beyond.any():
-        i = int(np.argmax(beyond))
-        raise CalibrationError(
-            f"{path}: row {lines[i]}: expected speeds up to {_LARGEST_SPEED:g} m/s in "
-            f"{params.speed_column}, found {speed[i]:g} {params.speed_unit}; is it the right "
-            "--columns.speed-unit?"
-        )
-    return si
+def _impossible(place: int, value: float, name: str, params: RecordingParams) -> str:
+    """What was expected of a number that its unit hardly allows, empty if it does."""
+    unit, flag, wanted = params.reading_unit, "reading-unit", ""
+    if place == _READING:
+        wanted = impossible(unit, value)
+    elif place == _SPEED:
+        unit, flag = params.speed_unit, "speed-unit"
+        if abs(value) * SPEED_UNITS[unit] > _LARGEST_SPEED:
+            wanted = f"speeds up to {_LARGEST_SPEED:g} m/s in {name}"
+    elif place == _BEND:
+        unit, flag = params.bend_unit, "bend-unit"
+        if abs(value) > _LARGEST_BEND[unit]:
+            wanted = f"at most {_LARGEST_BEND[unit]:g} in {name}"
+    if not wanted:
+        return ""
+    return f"expected {wanted}, found {value:g}; is {unit} the right --columns.{flag}?"
 
 
-def _normalised(path: Path, raw: Floats, lines: Ints, params: RecordingParams) -> Floats:
+def _normalised(path: Path, lines: Ints, raw: Floats, params: RecordingParams) -> Floats:
     unit = params.bend_unit
-    beyond = abs(raw) > _LARGEST_BEND[unit]
-    if beyond.any():
-        i = int(np.argmax(beyond))
-        raise CalibrationError(
-            f"{path}: row {lines[i]}: expected at most {_LARGEST_BEND[unit]:g} in unit {unit}, "
-            f"found {raw[i]:g}; is it the right --columns.bend-unit?"
-        )
     zero = float(raw.min()) if params.bend_zero is None else params.bend_zero
     full = float(raw.max()) if params.bend_full is None else params.bend_full
     if unit == "1" and params.bend_zero is None and params.bend_full is None:
