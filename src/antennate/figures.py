@@ -55,6 +55,9 @@ SHAPE_COLOURS = {
 ENOUGH_TRIALS = 5
 """Fewest trials for which an interval is drawn: of fewer it is so wide that it dwarfs the rest."""
 
+_SMALL_DPI, _COLOURS = 130, 64
+"""Pixels an inch and colours of a thumbnail."""
+
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 200,
@@ -183,6 +186,18 @@ def render(figure: Figure) -> dict[str, bytes]:
         figure.savefig(file, format=suffix, metadata=metadata, facecolor="white")
         files[suffix] = file.getvalue()
     return files
+
+
+@styled
+def thumbnail(figure: Figure) -> bytes:
+    """The figure as a small png of few colours, for a page that holds many."""
+    from PIL import Image
+
+    _settle(figure)
+    large, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(large, format="png", dpi=_SMALL_DPI, facecolor="white")
+    Image.open(large).convert("RGB").quantize(_COLOURS).save(small, "png", optimize=True)
+    return small.getvalue()
 
 
 def _settle(figure: Figure) -> None:
