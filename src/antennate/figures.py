@@ -18,6 +18,7 @@ from antennate import checks
 from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
 from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
 from antennate.colours import SERIES as SERIES
+from antennate.jackknife import ENOUGH as ENOUGH_TRIALS
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -51,9 +52,6 @@ SHAPE_COLOURS = {
     "free": "#DDDDDD",
 }
 """Shapes of an antenna that touches, and no contact."""
-
-ENOUGH_TRIALS = 5
-"""Fewest trials for which an interval is drawn: of fewer it is so wide that it dwarfs the rest."""
 
 _SMALL_DPI, _COLOURS = 130, 64
 """Pixels an inch and colours of a thumbnail."""

@@ -177,7 +177,7 @@ def _map(
 def _told(cell: Result, measure: Measure) -> str:
     """Value, interval and counts of a cell, a line each."""
     valid = cell["trials"] - cell["invalid"]
-    counts = f"{cell['successes']} of {valid}" if "successes" in cell else f"n {valid}"
+    counts = f"{cell['successes']} of {valid}" if cell.get("successes") and valid else f"n {valid}"
     if cell["response"] is None:
         return f"{NONE}\n{counts}"
     ends = cell["response95"]

@@ -8,7 +8,7 @@ from typing import Any
 from antennate.experiments.touch import run as touch
 from antennate.experiments.touch.config import TouchConfig
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Measure, Table, shown
+from antennate.studies.measures import Measure, Table, few, shown
 
 _95 = "  95 %"
 F1 = Measure("f1", "F1")
@@ -93,13 +93,11 @@ def _grid(
 def sentence(result: Mapping[str, Any]) -> str:
     """How well contact is sensed by each profile."""
     found = ", ".join(
-        f"{name} {shown(row['f1'])} ({shown(row['f1_95'])})"
+        f"{name} {shown(row['f1'])}" + (f" ({shown(row['f1_95'])})" if row["f1_95"] else "")
         for name, row in result["profiles"].items()
     )
-    return (
-        f"Contact is sensed with an F1 of {found}, 1 being without error; 95 % intervals over "
-        f"{result['trials']} trials."
-    )
+    over = few([result["trials"]]) or f"Intervals are 95 %, over {result['trials']} trials."
+    return f"Contact is sensed with an F1 of {found}, 1 being without error. {over}"
 
 
 CAPTIONS = {

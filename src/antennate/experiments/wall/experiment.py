@@ -11,7 +11,7 @@ from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import WallTrial
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment, Trials
-from antennate.studies.measures import Table, successes
+from antennate.studies.measures import Table, few, successes
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -35,7 +35,10 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which profiles passed, how sure it is, and what it depends on."""
-    return f"Walls passed (95 % interval): {successes(result['profiles'])}. {_border(result)}"
+    profiles = result["profiles"]
+    so_few = few(row["trials"] - row["invalid"] for row in profiles.values())
+    text = f"Walls passed (95 % interval): {successes(profiles)}. {_border(result)}"
+    return f"{text} {so_few}".strip()
 
 
 def _border(result: Mapping[str, Any]) -> str:
