@@ -53,7 +53,7 @@ SHAPE_COLOURS = {
 }
 """Shapes of an antenna that touches, and no contact."""
 
-_SMALL_DPI, _COLOURS = 130, 64
+_SMALL_DPI, _COLOURS = 120, 256
 """Pixels an inch and colours of a thumbnail."""
 
 _RC: dict[Any, Any] = {

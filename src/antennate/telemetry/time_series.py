@@ -57,8 +57,7 @@ _UNUSABLE = (
 _MOST_COLUMNS = 1000
 _INDEX = {"left": "0", "right": "1", "x": "0", "y": "1"}
 _SHOWN_COLUMNS = (
-    "ticks [%]",
-    *(f"{n} {side}" for n in ("level", "contact [%]") for side in ("left", "right")),
+    *("ticks [%]", "level left", "level right", "contact left [%]", "contact right [%]"),
 )
 
 
