@@ -142,7 +142,7 @@ def few(trials: Iterable[int]) -> str:
     some = [count for count in trials if count]
     if not some or min(some) >= ENOUGH:
         return ""
-    return f"So few trials decide nothing; from {ENOUGH} on a mean has an interval."
+    return f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
 
 
 class Interim:

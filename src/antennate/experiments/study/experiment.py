@@ -65,9 +65,9 @@ def _points(result: Mapping[str, Any]) -> Table:
         )
         for number, of in by_point.items()
     ]
-    note = f"Mean of each point with its 95 % interval, {_ended(result)} in all."
-    if so_few := _few(result):
-        note += f" {so_few}"
+    so_few = _few(result)
+    interval = "" if so_few else " with its 95 % interval"
+    note = f"Mean of each point{interval}, {_ended(result)} in all. {so_few}".strip()
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
     if not shown_axes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.statics import about
 from antennate.experiments.touch import run as touch
 from antennate.experiments.touch.config import TouchConfig
 from antennate.studies.experiment import Experiment
@@ -64,6 +65,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             f"{result['trials']} trials of every wall and speed, {result['invalid']} traverses "
             "invalid. Intervals are 95 %: of counts per\nmetre those of chance counts, of all else "
             "over trials. Latencies are medians.",
+            about(profiles),
         ),
         _grid("F1 by speed [m/s]", result["by_speed"], "speed_m_s", "g", profiles),
         _grid("F1 by wall", result["by_wall"], "wall", "", profiles),

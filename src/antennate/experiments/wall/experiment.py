@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.statics import about
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.experiments.wall.config import WallConfig
@@ -23,6 +24,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"Seed {result['seed']}, gravity {result['gravity']}. `after` leaves out the first "
         f"{1e3 * result['start_m']:g} mm of travel.\nMedians over trials; invalid trials are left "
         "out of them.",
+        about(result["profiles"]),
     )
     pairs = Table.of(
         f"{wall.REFERENCE} (first) against each, trial by trial",
