@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CELL = "text-align: {}; padding: .15rem .8rem .15rem 0; white-space: pre-wrap;"
-_WIDEST = 48
+_WIDEST = 36
 """Width of a figure [rem], where there is room: letters are as large as those of the notebook."""
 
 
