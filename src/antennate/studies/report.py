@@ -323,7 +323,13 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
             for name, found in ((name, cells[name].get(line, {})) for name in here)
         ]
         notes = dict.fromkeys(table.note for table in here.values())
-        joined.append(Table(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))))
+        prefaces = (line for table in here.values() for line in table.preface.splitlines())
+        joined.append(
+            Table(
+                *(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))),
+                preface="\n".join(dict.fromkeys(prefaces)),
+            )
+        )
     return joined
 
 
