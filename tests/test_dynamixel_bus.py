@@ -311,7 +311,8 @@ def test_B6_all_silent_costs_no_more_and_all_are_back_soon_after() -> None:
 
 
 def test_servos_that_do_not_know_fast_reads_are_asked_slowly() -> None:
-    rig = Rig(speaks_fast=False)
+    rig = Rig()
+    rig.say_firmware(44)
     for _ in range(6):
         answers, took = rig.cycle()
         assert took <= LIMIT
@@ -333,10 +334,10 @@ def test_a_silent_first_servo_does_not_end_fast_reads() -> None:
 def test_fast_reads_that_were_answered_outlast_a_busy_computer() -> None:
     rig = Rig()
     rig.cycle()
-    rig.twin.fast = False  # as answers that come too late
+    rig.say_firmware(44)  # no answer, as when it comes too late
     for _ in range(20):
         rig.cycle()
-    rig.twin.fast = True
+    rig.say_firmware(52)
     answers, took = rig.cycle()
     assert rig.bus.fast
     assert took < 0.005

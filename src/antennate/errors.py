@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import traceback
 from pathlib import Path
 
@@ -58,6 +59,12 @@ class ControllerError(AntennateError):
 
 class MissingPackageError(AntennateError, ImportError):
     """An optional package is needed for this and not installed; the text says how to get it."""
+
+
+def is_ctrl_c(error: BaseException) -> bool:
+    """Whether it may come of Ctrl-C: a worker process ignores that, so there it is of some code."""
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    return isinstance(error, KeyboardInterrupt) and not ignored
 
 
 _LONGEST = 300

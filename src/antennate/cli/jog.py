@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import BusOptions, parse_writer, require_bus
+from antennate.cli.addresses import BusOptions, parse_robot, require_bus
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, typed_keys
 from antennate.cli.options import option
@@ -50,7 +50,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
     """
-    config, orders, _ = parse_writer("jog", DESCRIPTION, RobotFile.for_jog, argv, Orders)
+    config, orders = parse_robot("jog", DESCRIPTION, RobotFile.for_jog, argv, Orders)
     names = config.robot.joint_names
     if orders.joint and orders.joint not in names:
         raise ConfigError(

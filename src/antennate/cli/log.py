@@ -47,7 +47,7 @@ _ENDINGS = {
 _ROWS = 4096
 """Ticks that are written to a Parquet file at once."""
 _SHOWN = 10
-"""Most events that `info` prints."""
+"""Most events that `info` prints at either end of a log."""
 
 
 @dataclass(frozen=True)
@@ -245,9 +245,9 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
 
 def _table(result: Mapping[str, Any]) -> Table:
     events, start = result["events"], result["start_ns"]
-    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events[:_SHOWN]]
-    if len(events) > _SHOWN:
-        lines.append(f"and {len(events) - _SHOWN} more events; --json has all")
+    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events]
+    if (hidden := len(events) - 2 * _SHOWN) > 0:
+        lines[_SHOWN:-_SHOWN] = [f"... {hidden} more events; --json has all"]
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]
     note = "\n".join(map(one_line, lines))
     return Table(f"Log of {one_line(result['controller'])}", ["messages"], rows, note)

@@ -85,6 +85,7 @@ class LogWriter:
         self._names = header.robot.joint_names
         self.written = self.kept = self._size = self._time = 0
         self._since, self._state = math.inf, ""
+        self._told: set[str] = set()  # causes of this state
         self.failure = ""
         self._called = called or path
         require_room(self._called, least_free, LogError)
@@ -117,8 +118,12 @@ class LogWriter:
             return
         stamp = self._stamp(tick.now)
         messages = list(tick.messages(self._names, stamp))
+        named = {cause.partition(":")[0] for cause in tick.causes}
         if tick.state != self._state:
+            self._told.clear()
+        if tick.state != self._state or not named <= self._told:
             messages.append((EVENTS, self._event(tick, stamp)))
+            self._told |= named
         for topic, data in messages:
             self.add(topic, tick.number, stamp, data)
         self._state = tick.state
@@ -236,7 +241,7 @@ class LogWriter:
         return max(self._time, min(max(0, self._header.start + since), _LATEST))
 
     def _event(self, tick: Tick, stamp: int) -> bytes:
-        before = f" after {self._state}" if self._state else ""
+        before = f" after {self._state}" if self._state not in ("", tick.state) else ""
         words = "; ".join([f"{tick.state or 'no state'}{before}", *tick.causes])
         level = _LEVELS.get(tick.state, 20)
         time = divmod(stamp, 10**9)

@@ -46,12 +46,11 @@ class Plugging:
         Raises:
             BadInputError: A name is not known.
         """
-        names = [name for text in plugged for name in text.split(",") if name]
-        if not names:
+        if not plugged:
             return
         chosen = {
             place
-            for name in names
+            for name in plugged
             if name != NONE
             for place in self._pushes.places(name, "--plugged")
         }
