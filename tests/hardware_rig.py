@@ -29,6 +29,7 @@ def healthy(now: float, **changes: Any) -> Inputs:
         "age": 0.005,
         "valid": 1,
         "findings": (Finding.OK, Finding.OK),
+        "noise": ("", ""),
         "decided_at": now,
         "maneuver": Maneuver.FORWARD,
         "contact": (Contact.FREE, Contact.FREE),

@@ -187,6 +187,7 @@ class Soak:
                 valid=self._body.used,
                 refused=refused,
                 findings=(self._films[0].reading.finding, self._films[1].reading.finding),
+                noise=(self._films[0].noise_text, self._films[1].noise_text),
                 decided_at=now,
                 supply=12.0,
                 maneuver=Maneuver.FORWARD,

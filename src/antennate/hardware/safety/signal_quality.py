@@ -82,10 +82,16 @@ class SignalQuality:
         """Which antennae are broken and what to do, empty if none is."""
         return "; ".join(
             f"mend wire, plug or sensor of the {side} antenna, it is {finding.name}: "
-            f"{finding.value}"
-            for side, finding in zip(_SIDES, self.findings, strict=True)
+            f"{finding.value}{f', {noise}' if noise else ''}"
+            for side, finding, noise in zip(_SIDES, self.findings, self.noise, strict=True)
             if finding.broken
         )
+
+    @property
+    def noise(self) -> tuple[str, str]:
+        """Size and frequency of the noise of the left and the right channel, empty if not NOISE."""
+        left, right = (channel.noise_text for channel in self.channels)
+        return left, right
 
     @property
     def refused(self) -> bool:
