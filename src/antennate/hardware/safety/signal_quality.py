@@ -40,6 +40,7 @@ class SignalQuality:
         bands = Band.of(conditioning, reaches[0]), Band.of(right or conditioning, reaches[1])
         self.channels = [ChannelDiagnosis(band) for band in bands]
         self.check = None if touch is None else TouchCheck(touch, bands)
+        self._together = (drift or DriftParams()).together
         self.drifts = [Drift(drift or DriftParams(), band) for band in bands]
         self._t = -math.inf
 
@@ -58,6 +59,9 @@ class SignalQuality:
         for drift, reading, seen in zip(self.drifts, found, contact, strict=True):
             resting = reading.taken if reading.finding in _RESTING else math.nan
             drift.step(t, resting, seen == Contact.FREE)
+        if min(drift.bent_for for drift in self.drifts) >= self._together:
+            for drift in self.drifts:
+                drift.follow_calm()
 
     @property
     def counts(self) -> list[float]:
