@@ -7,7 +7,6 @@ robot stands and the board repeats its first reading.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np

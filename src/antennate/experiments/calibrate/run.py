@@ -19,6 +19,7 @@ from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
 from antennate.antenna.next_push import Assessment, Pushes, assess
+from antennate.antenna.plateau import Plateau, plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
@@ -142,6 +143,7 @@ class CalibrateOutcome(Outcome):
             "source": "rig" if self.config.recording is None else "recording",
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
+            "plateau": None if (found := self._plateau()) is None else asdict(found),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
@@ -150,6 +152,11 @@ class CalibrateOutcome(Outcome):
         """Whether the fit is poor although loading and unloading each are fitted well."""
         found, good = self.assessment.hysteresis, self.config.good_r2
         return self.calibration.r2 < good and found is not None and min(found.one_way_r2) >= good
+
+    def _plateau(self) -> Plateau | None:
+        """Readings that stand at their highest, too few to refuse them."""
+        samples = self.raw.samples
+        return plateau_of(samples.counts, samples.level)
 
     def levels(self) -> Floats:
         """Bending levels that the calibration gives its own data, shape (n,)."""
@@ -231,6 +238,12 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
     return replace(recording, samples=replace(s, counts=counts))
 
 
+def _noise(samples: Samples) -> float | None:
+    """Noise of single readings [counts], None if it cannot be told."""
+    noise = white_noise(samples.counts, samples.trial)
+    return float(noise) if np.isfinite(noise) else None
+
+
 def run(
     config: CalibrateConfig,
     workers: int | Workers = 1,
@@ -257,6 +270,7 @@ def run(
             config.threshold,
             config.full_scale,
             config.least_r2,
+            _noise(raw.samples),
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""
