@@ -68,9 +68,9 @@ def check(samples: Samples) -> None:
         first = int(np.argmax(counts))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings that change with the bend, found "
-            f"{plateau.counts:g} counts and {100 * plateau.share:.0f} % of all like it, the highest "
-            "(saturated below the rail); set the attenuation of the converter, or choose another "
-            "divider resistor"
+            f"{plateau.counts:g} counts and {100 * plateau.share:.0f} % of all like it, the "
+            "highest (saturated below the rail); set the attenuation of the converter, or choose "
+            "another divider resistor"
         )
     if np.ptp(level) < 0.1:
         raise CalibrationError(

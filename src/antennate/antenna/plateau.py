@@ -9,8 +9,8 @@ import numpy as np
 from antennate.types import Floats, Ints
 
 FEWEST = 150
-"""Fewest readings of which a plateau is told: the noise of the quietest real sensor, 1.7 counts, puts
-a fifth of so many within a count of the highest once in 50,000 times (computed)."""
+"""Fewest readings of which a plateau is told: the noise of the quietest real sensor, 1.7 counts,
+puts a fifth of so many within a count of the highest once in 50,000 times (computed)."""
 SHARE = 0.2
 """Share of the readings that stand at their highest from which on they say nothing (assumed)."""
 SHOWN = 0.05

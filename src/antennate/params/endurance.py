@@ -32,8 +32,8 @@ class DriftParams(Params):
     calm: float = number(
         0.1,
         "1/s",
-        "assumed: a walking robot bends an antenna faster than that in some second of a touch; noise "
-        "alone shows 0.03",
+        "assumed: a walking robot bends an antenna faster than that in some second of a touch; "
+        "noise alone shows 0.03",
         gt=0,
         le=1,
     )
@@ -41,7 +41,7 @@ class DriftParams(Params):
     together: float = number(
         5.0,
         "s",
-        "measured: not one calm second of both antennae bent in 24 simulated tunnels",
+        "measured: at most one calm second of both antennae bent in 24 simulated tunnels",
         ge=2,
         le=600,
     )

@@ -28,8 +28,8 @@ _CURES = {
     diagnosis.Finding.SHORT_LO: "the sensor is torn off its wire, its plug is out, or it is "
     "shorted to ground",
     diagnosis.Finding.SHORT_HI: "the wire of this antenna is shorted to the supply",
-    diagnosis.Finding.STUCK: "the converter always gives one value: reset the board, check the pin; "
-    "if that is its highest value, set its attenuation",
+    diagnosis.Finding.STUCK: "the converter always gives one value: reset the board, check "
+    "the pin; if it is the highest value, set its attenuation",
     diagnosis.Finding.NOISE: "keep its wires away from mains, motors and servo cables, join the "
     "grounds, put 100 nF from pin to ground; an open wire hums, too",
     diagnosis.Finding.SATURATED: "let the antenna straighten; then choose another divider resistor",

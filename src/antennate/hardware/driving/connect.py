@@ -177,8 +177,8 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     except BringUpError as error:
         echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
         raise BringUpError(
-            f"--bus: {error}{echo}; check power, wiring, ids and baud {robot.baud}, or whether --esp32 "
-            f"and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
+            f"--bus: {error}{echo}; check power, wiring, ids and baud {robot.baud}, or whether "
+            f"--esp32 and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
         ) from None
     rules = settings.settings(robot)
     known = {

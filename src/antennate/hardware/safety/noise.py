@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _REST = 0.01
-"""Share of the energy that a hum leaves; white noise leaves less once in 10^4 windows (computed)."""
+"""Share of the energy that a hum leaves; white noise leaves less once in 30,000 times (computed)."""
 _SLOWEST = 0.25
 """Slowest hum [samples^-1]: 25 Hz at 100 Hz. Antennae ring at 2.4 Hz and bend fully in 30 ms."""
 _SAME = 0.01
