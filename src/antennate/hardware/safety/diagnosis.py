@@ -49,6 +49,8 @@ rest, and readings are doubted as jumps (assumed)."""
 _FLOATING = FULL_SCALE / 3
 """Least that the readings of a floating wire differ in the window [counts]: one window of white
 noise over the whole range in 3000 differs less (computed)."""
+_MEMORY = 1.0
+"""Time for which a hum is remembered while readings that were skipped break its sine [s]."""
 JUMP = 1 / 3
 """Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
@@ -187,7 +189,7 @@ class ChannelDiagnosis:
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)
         self._times: deque[float] = deque(maxlen=WINDOW)
-        self.noise = Noise(0.0)
+        self.noise, self._hummed = Noise(0.0), -math.inf
         self._bad: deque[bool] = deque(maxlen=WINDOW)
         self._share: deque[bool] = deque(maxlen=SHARE_WINDOW)
         self._outside: deque[bool] = deque(maxlen=WINDOW)
@@ -297,20 +299,28 @@ class ChannelDiagnosis:
             return None
         if self._at_both_rails():
             return Finding.OPEN
-        spoiled = sum(self._bad) >= OPEN_BAD
-        if self._hidden(spoiled):
-            return Finding.NOISE
-        return Finding.OPEN if spoiled else None
+        return self._noise_or_open(spoiled=sum(self._bad) >= OPEN_BAD)
 
-    def _hidden(self, spoiled: bool) -> bool:
-        """Whether the window is a hum, or noise too narrow for a floating wire, and too large."""
+    def _noise_or_open(self, spoiled: bool) -> Finding | None:
+        """Noise is a hum, or narrower than what a floating wire gives; a step is wide only once."""
         raw, least = list(self._raw), 2.0 * HIDDEN * self._band.span
-        if any(map(math.isnan, raw)) or not least <= max(raw) - min(raw) <= FULL_SCALE:
-            return False
-        self.noise = noise_of(raw)
-        newest = raw[-OPEN_BAD:]
-        wide = max(newest) - min(newest) >= least  # no step to where readings are not believed
-        return self.noise.hums or (spoiled and wide and max(raw) - min(raw) < _FLOATING)
+        width = max(raw) - min(raw)
+        if any(map(math.isnan, raw)) or not least <= width <= FULL_SCALE:
+            return Finding.OPEN if spoiled else None
+        noise, before = noise_of(raw), self.noise
+        if noise.hums:
+            self._hummed = self._t
+        elif self._t - self._hummed < _MEMORY and sum(self._bad) >= SATURATED:
+            noise = Noise(noise.size, before.frequency)
+        self.noise = noise
+        if noise.hums:
+            return Finding.NOISE
+        older, newer = raw[: WINDOW // 2], raw[WINDOW // 2 :]
+        if not spoiled:
+            return None
+        if width >= _FLOATING or max(newer) - min(newer) < least:
+            return Finding.OPEN
+        return Finding.NOISE if max(older) - min(older) >= least else None
 
     def _at_both_rails(self) -> bool:
         """Whether the window has two readings or more at either rail, which no flex sensor can."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _REST = 0.01
-"""Share of the energy that a hum leaves; white noise leaves less once in 30,000 times (computed)."""
+"""Share of the energy that a hum leaves; white noise leaves less once in 30,000 (computed)."""
 _SLOWEST = 0.25
 """Slowest hum [samples^-1]: 25 Hz at 100 Hz. Antennae ring at 2.4 Hz and bend fully in 30 ms."""
 _SAME = 0.01
@@ -66,7 +66,9 @@ def noise_of(readings: Sequence[float]) -> Noise:
     y = y - y.mean()
     whole = float(y[2:] @ y[2:] + y[:-2] @ y[:-2]) + c * c * energy
     frequency = math.acos(min(max(0.5 * c, -1.0), 1.0)) / (2.0 * math.pi)
-    hums = float(rest @ rest) < _REST * whole and frequency > _SLOWEST
+    half = len(y) // 2
+    steady = min(float(np.ptp(y[:half])), float(np.ptp(y[half:]))) > size
+    hums = steady and float(rest @ rest) < _REST * whole and frequency > _SLOWEST
     return Noise(size, frequency if hums else math.nan)
 
 

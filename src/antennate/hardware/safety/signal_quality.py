@@ -55,7 +55,7 @@ class SignalQuality:
         fresh, self._t = t > self._t, t
         found = [channel.step(t, c) for channel, c in zip(self.channels, counts, strict=True)]
         if self.check is not None and fresh:
-            self.check.step(*(reading.taken for reading in found))
+            self.check.step(*(math.nan if r.finding.broken else r.taken for r in found))
         for drift, reading, seen in zip(self.drifts, found, contact, strict=True):
             resting = reading.taken if reading.finding in _RESTING else math.nan
             drift.step(t, resting, seen == Contact.FREE)
