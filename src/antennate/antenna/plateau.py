@@ -35,8 +35,7 @@ class Plateau:
         """It in words, with what may be wrong."""
         return (
             f"{100 * self.share:.0f} % of {whose} stand at {self.counts:.0f} counts, the highest: "
-            "the converter saturates there, or is stuck; is its attenuation set, and does the "
-            "divider fit?"
+            "the converter saturates there, or is stuck; check its attenuation and the divider"
         )
 
 
