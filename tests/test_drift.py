@@ -107,7 +107,7 @@ def test_S7_only_what_is_free_and_fit_counts() -> None:
     quality = SignalQuality(ConditioningParams())
     drifted = BAND.high - 0.2 * SPAN
     for n in range(5000):
-        spiky = 4000.0 if n % 10 in (0, 3, 6) else drifted
+        spiky = 4000.0 if n % 10 in (0, 3, 5) else drifted
         seen = (Contact.CONTACT, Contact.FREE)
         quality.step(PERIOD * n, (drifted + n % 5 - 2, spiky + n % 5 - 2), seen)
     assert quality.findings == (Finding.OK, Finding.SPIKY)

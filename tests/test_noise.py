@@ -91,7 +91,7 @@ def test_S14_noise_of_no_frequency_is_no_open_wire() -> None:
 @pytest.mark.parametrize("frequency", [50.0, 50.02, 60.0])
 def test_S14_the_doctor_names_a_hum_and_lets_nobody_drive(frequency: float) -> None:
     patient = Patient("esp32=hum:120")
-    patient.robot.converter._mains = frequency
+    patient.robot.converter.mains = frequency
     checkup = patient.examine(bus=False)
     rows = wrong(checkup)
     assert checkup.grade == "bad"

@@ -27,6 +27,7 @@ class Converter:
         mains: Frequency of what hums [Hz].
 
     Attributes:
+        mains: That frequency.
         wires: What is wrong with the wire of each antenna: "open", "short", "stuck", or nothing.
         held: Readings at which somebody holds the antennae [counts], NaN for none.
         hum: Amplitude of the hum on both readings [counts].
@@ -38,7 +39,7 @@ class Converter:
     """
 
     def __init__(self, seed: int, mains: float) -> None:
-        self._chance, self._mains = np.random.default_rng(seed), mains
+        self._chance, self.mains = np.random.default_rng(seed), mains
         self.wires = ["", ""]
         self.held = [math.nan, math.nan]
         self.hum = self.radio_noise = self.drift = 0.0
@@ -62,7 +63,7 @@ class Converter:
         self._drifted += self.drift * (t - self._t)
         self._t = t
         readings = np.where(np.isnan(self.held), readings, self.held) + noise + self._drifted
-        readings = readings + self.hum * math.sin(2 * math.pi * self._mains * t + 1.0)
+        readings = readings + self.hum * math.sin(2 * math.pi * self.mains * t + 1.0)
         if self.radio and self.radio_noise:
             readings = readings + self._chance.normal(0.0, self.radio_noise, 2)
         left, right = readings.tolist()

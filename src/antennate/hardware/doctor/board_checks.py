@@ -41,7 +41,7 @@ _RADIO = (
     "and the antenna of the radio away from the wires; or calibrate by radio"
 )
 _OFTEN = 0.1
-"""Share of the readings that makes a finding count, although the newest has another."""
+"""Share of the readings that makes an antenna bad, although most of them are good."""
 _DEGRADED = (diagnosis.Finding.OUT_OF_CAL, diagnosis.Finding.SPIKY, diagnosis.Finding.SATURATED)
 
 
@@ -158,10 +158,12 @@ def _antenna(
 
 
 def _usual(seen: list[diagnosis.Finding]) -> diagnosis.Finding:
-    """The newest finding, or a worse one that a tenth of the readings had."""
-    worse = Counter(found for found in seen[diagnosis.AGREE :] if not found.usable)
-    found, count = worse.most_common(1)[0] if worse else (seen[-1], 0)
-    return found if count > _OFTEN * len(seen) else seen[-1]
+    """What a tenth of the readings say of a channel that is not usable, else most of them."""
+    counted = Counter(seen[diagnosis.AGREE :] or seen)
+    worse = [found for found in counted if not found.usable]
+    found = max(worse, key=lambda one: counted[one], default=seen[-1])
+    often = worse and counted[found] > _OFTEN * len(seen)
+    return found if often else counted.most_common(1)[0][0]
 
 
 def _at_ground(shown: diagnosis.Finding) -> bool:
@@ -176,6 +178,8 @@ def _noise(
     good = config.doctor
     before = good.calibrated_noise if name == "left" else good.calibrated_noise_right
     noise, usual = float(np.std(counts)), usual_noise(counts)
+    usually = max(before or 0.0, 1.0)
+    louder = noise > good.noise_ratio * usually
     found, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
     cure = "leave the antenna alone; then check its plug, cable and ground"
     bad = noise > good.noise
@@ -184,8 +188,8 @@ def _noise(
         cure = _CURES[diagnosis.Finding.NOISE]
     if before is not None:
         expected += f", {before:.1f} when it was calibrated"
-        if noise > good.noise_ratio * max(before, 1.0):
-            bad, found = True, f"{found}, {noise / max(before, 1.0):.0f} times that"
+        if louder:
+            bad, found = True, f"{found}, {noise / usually:.0f} times that"
             cure = _RADIO if board.radio else cure
     return Finding(found, "warn" if bad else "ok", cure), f"{name} noise", expected
 

@@ -5,7 +5,7 @@ So their low quantile is followed in small steps, up by `speed` and down by more
 share `quantile` of the readings lies nearer to straight. A touch of some seconds hardly moves it.
 
 That is slow, and ends where drift looks like contact. Two things no touch does are known sooner:
-readings that stay beyond the straight end, and both antennae that bend together, calmly, for long.
+readings that stay beyond the straight end, and both antennae that stay bent together for long.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Drift:
     Attributes:
         share: Drift in spans, positive towards the bent end.
         beyond: Whether it is more than the band allows.
-        bent_for: Time for which it has been bent beyond the band and calm [s].
+        bent_for: Time for which it has been bent beyond the band [s].
     """
 
     def __init__(self, params: DriftParams, band: Band) -> None:
@@ -34,7 +34,7 @@ class Drift:
         self._down = params.speed * (1.0 - params.quantile) / params.quantile
         self._t = math.nan
         self._begin_second()
-        self.share = self.bent_for = self._nearest = 0.0
+        self.share, self.bent_for, self._nearest = 0.0, 0.0, math.inf
         self.beyond = False
 
     def step(self, t: float, counts: float, free: bool) -> None:
@@ -57,7 +57,7 @@ class Drift:
         bound = self._params.band - (self._params.rise if self.beyond else 0.0)
         self.beyond = abs(self.share) > bound
 
-    def follow_calm(self) -> None:
+    def follow_bent(self) -> None:
         """What both antennae showed together was drift."""
         self.share = max(self.share, self._nearest)
 
@@ -72,7 +72,9 @@ class Drift:
             return
         if self._most < -self._params.band:
             self.share = min(self.share, self._most)
-        calm = self._most - self._least <= self._params.calm
-        self.bent_for = self.bent_for + _SECOND if calm and self._least > self._params.band else 0.0
-        self._nearest = self._least
+        if self._least > self._params.band:
+            self.bent_for += _SECOND
+            self._nearest = min(self._nearest, self._least)
+        else:
+            self.bent_for, self._nearest = 0.0, math.inf
         self._begin_second()

@@ -61,7 +61,7 @@ class SignalQuality:
             drift.step(t, resting, seen == Contact.FREE)
         if min(drift.bent_for for drift in self.drifts) >= self._together:
             for drift in self.drifts:
-                drift.follow_calm()
+                drift.follow_bent()
 
     @property
     def counts(self) -> list[float]:
