@@ -13,12 +13,14 @@ from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
-from antennate.messages import shown
+from antennate.messages import one_line, shown
+from antennate.notebook import html
 from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity
+from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
@@ -28,9 +30,9 @@ _PARTS = 100
 """Parts of the making of a film that are told."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
-    """What came out of an experiment.
+    """What came out of an experiment. In a notebook it shows its sentence, table and figure.
 
     Attributes:
         experiment: The experiment.
@@ -43,6 +45,18 @@ class Result:
     config: Params
     outcome: Outcome
     path: Path | None = None
+
+    def __repr__(self) -> str:
+        """It in one line: what was run, and what came out."""
+        trials = f", {len(self.rows)} trials" if self.rows else ""
+        return f"<Result of {self.experiment.name}{trials}: {one_line(self.sentence)}>"
+
+    def _repr_html_(self) -> str:
+        """A sentence, the first table and the first figure, for a notebook."""
+        tables, figures = self.experiment.tables(self.summary), self.figures()
+        table = tables[0] if tables else Table("", (), ())
+        first = next(iter(self.experiment.view.ordered(figures)), "")
+        return html(*(self.sentence, table.columns, table.rows, figures.get(first), table.preface))
 
     @property
     def rows(self) -> Sequence[Any]:
@@ -117,7 +131,7 @@ def run(
         overwrite: Replace a run that `out` holds.
         video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
-        resume: Go on with the run that `out` holds, if there is one.
+        resume: Go on with the run that `out` holds, if there is one; with more trials, too.
         engine: Where the workers are: local, dask, dask://HOST:PORT, slurm, or an object with
             `submit` as those of concurrent.futures have.
         settings: Fields of its configuration where a name was given, with nested groups as objects
@@ -147,8 +161,8 @@ def run(
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     require_apart(out, config.model_dump())
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
-    with RunDirectory.create(*place) as directory:
-        directory.keeps_store = found.continued
+    with RunDirectory.create(*place, tasks=found.grows) as directory:
+        directory.keeps_store = found.continued or found.grows is not None
         directory.describe(config)
         pool = replace(pool, store=directory.store)
         outcome = found.run(config, pool, on_step, directory.append)

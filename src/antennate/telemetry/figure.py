@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, islice
@@ -16,6 +17,7 @@ from matplotlib.patches import Patch
 from antennate import figures as style
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Pair
+from antennate.telemetry.time_series import TimeSeries
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 _MOST_DRAWN = 5000
@@ -56,7 +58,7 @@ class Course:
         recorded: `Maneuver` decided then, shape (n,).
         replayed: `Maneuver` decided now, shape (n,); None without a replay.
         state: The supervisor's, n of them; empty text without one.
-        threshold: Level from which on there is contact.
+        threshold: Level from which on there is contact; NaN if it is not known.
     """
 
     t: Floats
@@ -91,7 +93,25 @@ class Course:
         )
 
 
-def _drawable(values: Sequence[float] | Sequence[Pair]) -> Floats:
+def of_series(series: TimeSeries) -> Figure:
+    """The figure of a time series of at least one tick."""
+    kept = slice(None, None, -(-len(series) // _MOST_DRAWN))
+    threshold = series.meta.get("threshold")
+    return replay(
+        Course(
+            t=_drawable(series.t[kept]),
+            reading=_drawable(series.counts[kept]),
+            level=_drawable(series.level[kept]),
+            contact=series.contact[kept],
+            recorded=series.maneuver[kept],
+            replayed=None,
+            state=[""] * len(series.t[kept]),
+            threshold=threshold if isinstance(threshold, float) else math.nan,
+        )
+    )
+
+
+def _drawable(values: Floats | Sequence[float] | Sequence[Pair]) -> Floats:
     """Numbers as they are, NaN for those that no axis can show."""
     found = np.array(values)
     return np.where(np.abs(found) <= _LARGEST, found, np.nan)
@@ -142,8 +162,10 @@ def _draw_readings(panel: Axes, course: Course) -> None:
 def _draw_levels(panel: Axes, course: Course) -> None:
     for side, colour in enumerate(style.series(2)):
         panel.plot(course.t, course.level[:, side], color=colour, linewidth=1)
-    panel.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
-    panel.annotate("θ", (1.005, course.threshold), xycoords=("axes fraction", "data"), va="center")
+    if math.isfinite(course.threshold):
+        at = (1.005, course.threshold)
+        panel.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
+        panel.annotate("θ", at, xycoords=("axes fraction", "data"), va="center")
     panel.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
 
 
