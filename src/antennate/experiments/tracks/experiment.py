@@ -69,7 +69,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             *((f"frames {name}", [str(found[name])]) for name in ("contact", "free", "unknown")),
             ("animals", [str(result["animals"])]),
             ("animals known in too few frames, left out", [str(result["skipped"])]),
-            *((text, [str(result["handled"][name])]) for name, text in HANDLED.items()),
+            *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
         ],
     )
     return shapes, varied, counts
