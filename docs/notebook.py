@@ -7,8 +7,8 @@ What tells of the machine or of the time is left out.
 from pathlib import Path
 from typing import Any
 
-import nbformat
-from nbclient import NotebookClient
+import nbformat  # pyright: ignore[reportMissingImports]
+from nbclient import NotebookClient  # pyright: ignore[reportMissingImports]
 
 NOTEBOOK = Path(__file__).parents[1] / "examples" / "first_look.ipynb"
 METADATA = {

@@ -11,6 +11,7 @@ from typing import Any
 
 import test_dynamixel_bus as test_bus
 import test_dynamixel_packets as test_packets
+import test_following
 import test_loose_leg
 import test_release
 import test_servo_hours
@@ -19,21 +20,27 @@ import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, put
+from guard_tools import Guard, after, around, constant, given, put
 from lockstep import SimulatedWire
 
 from antennate.hardware import joints, settings
-from antennate.hardware.driving import session
+from antennate.hardware.driving import dry_run, session
 from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
 from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.answers import Timing, Value
+from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.hardware.safety import torque
+from antennate.params.safety import FollowingParams
+from antennate.robots.servos import FULL_DRIVE
 from antennate.robots.spec import RobotSpec
 
+does_wrong = (
+    test_following.test_B20_B21_B22_B23_what_a_joint_does_wrong_is_a_fault_in_time_that_names_it
+)
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
 
@@ -142,6 +149,10 @@ def torque_reads(value: bytes) -> Any:
         return dict.fromkeys(ids, Value(value, False)) if span.address == TORQUE else answers
 
     return around(bus.Bus, "read_all", read)
+
+
+def well(old: Any, master: Any, ids: Any, register: Any) -> Any:
+    return {} if register.name == "hardware_error_status" else old(master, ids, register)
 
 
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
@@ -359,6 +370,56 @@ SERVOS = [
             ("bus_watchdog",),
         ),
         by=(AssertionError,),
+    ),
+    Guard(
+        "drive of a joint that is behind",
+        put(Following, "drive", constant(None)),
+        partial(does_wrong, *test_following.CASES[0]),
+    ),
+    Guard(
+        "joint that is stuck",
+        given(test_following, FollowingParams, stuck_time=math.inf),
+        test_following.test_B20_a_joint_far_behind_at_full_drive_is_not_named_as_long_as_it_moves,
+    ),
+    Guard(
+        "limit of a joint",
+        put(Following, "_leave", constant(None)),
+        partial(
+            test_following.test_B21_a_joint_is_pushed_beyond_its_limit_for_a_moment_and_at_full_drive,
+            1.03,
+            205,
+            FULL_DRIVE,
+            True,
+            1,
+        ),
+    ),
+    Guard(
+        "speed of a joint",
+        given(test_following, FollowingParams, overspeed=math.inf),
+        partial(
+            test_following.test_B22_a_leap_is_named_at_once_and_the_speed_without_load_is_not,
+            4096.0,
+        ),
+    ),
+    Guard(
+        "operating mode while armed",
+        put(actuators, "ServoMonitor", lambda *words, modes: monitor.ServoMonitor(*words)),
+        partial(does_wrong, *test_following.CASES[1]),
+    ),
+    Guard(
+        "operating mode before torque",
+        put(bringup, "require_modes", constant(None)),
+        test_following.test_B23_a_mode_that_was_changed_in_the_dry_run_gets_no_torque,
+    ),
+    Guard(
+        "hardware error before a drive",
+        around(bringup, "read_register", well),
+        partial(test_following.test_B24_a_hardware_error_is_refused_at_once, 0.0, "overload"),
+    ),
+    Guard(
+        "hardware error in the dry run",
+        put(dry_run, "_latched", constant("")),
+        partial(test_following.test_B24_a_hardware_error_is_refused_at_once, 0.2, "overheat"),
     ),
     Guard(
         "torque taken off on purpose",

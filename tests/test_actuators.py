@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from twin_rig import rig
 
-from antennate.hardware.actuators import ActuatorError, ActuatorState, Tally
+from antennate.hardware.actuators import ActuatorError, ActuatorState, JointFaults, Tally
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -31,7 +31,14 @@ class Motors:
     def __init__(self) -> None:
         self.tally = Tally()
         self.state = ActuatorState(
-            missed={1: 0}, errors={}, watchdogs=(), disarmed=(), supply=12.0, bus_error=""
+            missed={1: 0},
+            errors={},
+            watchdogs=(),
+            disarmed=(),
+            modes={},
+            joints=JointFaults(),
+            supply=12.0,
+            bus_error="",
         )
         self.enabled, self.resting, self.broken = False, False, False
         self.left_on: list[int] = []

@@ -1,4 +1,4 @@
-"""B20: an adapter that gives back what is sent; the echo is dropped, and nothing else is."""
+"""B25: an adapter that gives back what is sent; the echo is dropped, and nothing else is."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def master(echo: bool, fast: bool = True) -> tuple[Bus, SimulatedWire]:
 
 
 @pytest.mark.parametrize("fast", [True, False])
-def test_B20_a_walk_through_an_echo_takes_no_longer_and_loses_nothing(fast: bool) -> None:
+def test_B25_a_walk_through_an_echo_takes_no_longer_and_loses_nothing(fast: bool) -> None:
     """Goals to all and a read of all, a hundred times: the echo is over before they answer."""
     times: list[float] = []
     for echo in (False, True):
@@ -57,7 +57,7 @@ REQUEST = st.one_of(
 
 
 @given(st.lists(REQUEST, max_size=6), st.lists(STATUS, max_size=6), st.data())
-def test_B20_no_answer_is_ever_taken_for_an_echo(
+def test_B25_no_answer_is_ever_taken_for_an_echo(
     requests: list[bytes], statuses: list[Status], data: st.DataObject
 ) -> None:
     """With or without echoes before them, in pieces of any size, all bytes of answers come out."""
@@ -76,7 +76,7 @@ def test_B20_no_answer_is_ever_taken_for_an_echo(
     assert echo.requests == (len(requests) if echoed else 0)
 
 
-def test_B20_the_doctor_names_an_echo_and_finds_all_servos() -> None:
+def test_B25_the_doctor_names_an_echo_and_finds_all_servos() -> None:
     checkup = Patient("bus=echo").examine(esp32=False)
     assert set(wrong(checkup)) == {"bus: echo of the adapter"}
     assert checkup.grade == "warn"

@@ -34,6 +34,38 @@ class Tally:
     echoes: int = 0
 
 
+@dataclass(slots=True)
+class JointFaults:
+    """What joints do wrong since torque came on, in words by the id of their servo.
+
+    Attributes:
+        behind: Joints that do not follow their goals.
+        outside: Joints that are beyond their limits.
+        leaps: Joints that have moved faster than they can.
+    """
+
+    behind: dict[int, str] = field(default_factory=dict[int, str])
+    outside: dict[int, str] = field(default_factory=dict[int, str])
+    leaps: dict[int, str] = field(default_factory=dict[int, str])
+
+
+@dataclass(slots=True)
+class Margins:
+    """How near joints have come to each bound since torque came on, as a share of it.
+
+    Attributes:
+        behind: Time in a row for which a joint that is behind drove too little.
+        stuck: Time in a row for which a joint that is behind did not move.
+        outside: Time in a row for which a joint was beyond its limit and the error of full drive.
+        speed: Way of a joint from one reading to the next.
+    """
+
+    behind: float = 0.0
+    stuck: float = 0.0
+    outside: float = 0.0
+    speed: float = 0.0
+
+
 @dataclass(kw_only=True)
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
@@ -45,6 +77,9 @@ class ActuatorState:
         errors: Hardware errors in words, by id.
         watchdogs: Ids stopped by their watchdog.
         disarmed: Ids that have lost their torque or their watchdog while they were to have it.
+        modes: Wrong operating modes in words, by id.
+        joints: What joints do wrong.
+        margins: How near they have come to that.
         supply: Voltage [V], NaN if it is not known.
         angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
             not answered yet; empty if they are not read.
@@ -56,8 +91,11 @@ class ActuatorState:
     errors: dict[int, str]
     watchdogs: tuple[int, ...]
     disarmed: tuple[int, ...]
+    modes: dict[int, str]
+    joints: JointFaults
     supply: float
     bus_error: str
+    margins: Margins = field(default_factory=Margins)
     angles: tuple[float, ...] = ()
     tracebacks: Tracebacks = field(default_factory=Tracebacks)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.robots.servos import MOST_TICKS
 from antennate.twin.bus import ServoBus
 from antennate.twin.converter import SIDES
 from antennate.twin.registers import Servo
@@ -27,6 +28,8 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 """Bits of the register Hardware Error Status, from the manuals of both models."""
 NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
+_FROZEN, _JUMP = "frozen", "jump"
+"""Present Position keeps its value, or is wrong by some ticks; the servo moves as before."""
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
 _BOARD = ("silent", "reset")
@@ -40,7 +43,7 @@ _READINGS = (
     "radio_noise",
 )
 _KNOWN = {
-    "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
+    "servo": (*_SERVO, *_HARDWARE, "reboot", _FROZEN, _JUMP, NONE),
     "esp32": (*_BOARD, *_READINGS, "ber"),
     "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
@@ -58,7 +61,7 @@ class Demand:
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
             that are wrong, fall of the supply [V/s], reading of a bent antenna, hum, noise or
-            plateau [counts], drift [counts/s], or value of a register.
+            plateau [counts], drift [counts/s], jump of a position [ticks], or value of a register.
         t: When it begins [s].
     """
 
@@ -99,6 +102,8 @@ def read(text: str) -> Demand:
         ) from None
     if match["what"] in SIDES and size > _MOST_COUNTS:
         raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
+    if match["what"] == _JUMP and not 1 <= abs(size) <= MOST_TICKS:
+        raise BadInputError(f"--fault: expected a jump of 1 to {MOST_TICKS} ticks, found {text!r}")
     if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
         raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
     if register:
@@ -200,10 +205,16 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
 def _break_servo(servo: Servo, demand: Demand, t: float) -> None:
     if demand.what == NONE:
         servo.trouble = None
+        servo.freeze(False)
+        servo.misread(0)
     elif demand.what in _SERVO:
         servo.trouble = Trouble(_SERVO[demand.what], delay=demand.size)
     elif demand.what == "reboot":
         servo.restart(t)
+    elif demand.what == _FROZEN:
+        servo.freeze()
+    elif demand.what == _JUMP:
+        servo.misread(int(demand.size))
     elif demand.what in _HARDWARE:
         servo.fail(_HARDWARE[demand.what])
     elif demand.what in servo.table.registers:

@@ -119,6 +119,17 @@ class Servo:
         if bits & self.get("shutdown"):
             self.set("torque_enable", 0)
 
+    def freeze(self, frozen: bool = True) -> None:
+        """Let it tell its present position from now on, or the true one again."""
+        self._refresh()
+        self.motion.frozen = round(self.motion.position) if frozen else None
+        self._show()
+
+    def misread(self, ticks: int) -> None:
+        """Let it tell a position that is wrong by so much from now on."""
+        self.motion.misread = ticks
+        self._show()
+
     def restart(self, t: float, time: float = BOOT_TIME) -> None:
         """Power lost and back after a time [s]: registers below 64 stay, others are reset."""
         self.advance(t)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
@@ -14,11 +15,13 @@ from antennate.params.base import number
 from antennate.params.dead_man import DeadManParams
 from antennate.params.endurance import DriftParams
 from antennate.params.safety import TouchCheckParams
-from antennate.robots.readers import unused
+from antennate.robots.readers import UNDRIVEN, unused
 
 
 class DriveConfig(RobotConfig):
     """The robot, its controller, and how long it runs."""
+
+    unread: ClassVar[tuple[str, ...]] = UNDRIVEN
 
     controller: str = number(
         "closed", "1", "assumed: our best", examples=["open", "paper", "closed"]

@@ -18,7 +18,7 @@ from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.host_clock import HostClock
@@ -95,7 +95,9 @@ def prepare(
     board.count_anew(clock.now())
     return Session(
         board=board,
-        actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
+        actuators=DynamixelActuators(
+            master, Joints(config.robot), clock.now, config.limits.following
+        ),
         clock=clock,
         controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,
@@ -166,7 +168,7 @@ def _unasked(bus: Port) -> int:
 
 
 def require_servos(bus: Bus, robot: RobotSpec) -> None:
-    """Check that all servos answer, are of the right model and have the right settings.
+    """Check that all servos answer, are of the right model, well, and have the right settings.
 
     Raises:
         BringUpError: One does not; the message names its id and the cure.
@@ -182,6 +184,12 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
         cure = more if error.cure else f"{check}; {more}"
         echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
         raise BringUpError(f"--bus: {error}{echo}", cure) from None
+    status = bringup.read_register(bus, robot.ids, XC430_W240["hardware_error_status"])
+    if ill := [f"{', '.join(hardware_errors(b))} in servo {i}" for i, b in status.items() if b]:
+        raise BringUpError(
+            f"--bus: expected servos without a hardware error, found {'; '.join(ill)}; remove the "
+            "cause (load, heat, supply), then reboot: switch the supply off and on"
+        )
     rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()

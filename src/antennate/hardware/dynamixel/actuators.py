@@ -10,11 +10,13 @@ import numpy as np
 from antennate.errors import AntennateError
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import READ_ALL
+from antennate.params.safety import FollowingParams
 from antennate.types import Floats, JointCommand
 
 
@@ -24,11 +26,18 @@ class DynamixelActuators:
     Any packet feeds the watchdogs of the servos: nothing is sent but by the calls below.
     """
 
-    def __init__(self, bus: Bus, joints: Joints, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        joints: Joints,
+        clock: Callable[[], float],
+        following: FollowingParams | None = None,
+    ) -> None:
         self.bus, self.joints = bus, joints
         self.tally, self.robot = bus.tally, joints.robot
-        self.state = ServoMonitor(bus, joints.ids, clock)
+        self.state = ServoMonitor(bus, joints.ids, clock, modes=self.robot.modes)
         self.turns = LegTurns(bus, joints)
+        self.following = Following(joints, following or FollowingParams(), self.state.well)
         self.left_on: list[int] = []
         self._now = clock
         self._goals: Floats | None = None
@@ -70,14 +79,18 @@ class DynamixelActuators:
         """Where everything stands [ticks]."""
         bus, ids = self.bus, self.joints.ids
         self.turns.reset()
+        self.following.disarm()
         bringup.require_models(bus, self.joints.models)
+        bringup.require_modes(bus, self.robot.modes)
         torque.arm_watchdogs(bus, ids)
         torque.limit_speed(bus, self.joints.profiles)
-        torque.allow_full_pwm(bus, ids)
+        limits = torque.allow_full_pwm(bus, ids)
         stood = torque.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), command)
         present = torque.enable(bus, ids)
-        return np.array([present[servo] for servo in ids], float)
+        place = np.array([present[servo] for servo in ids], float)
+        self.following.arm(place, limits)
+        return place
 
     def disable(self, again: bool = False) -> list[int]:
         """Torque off, group by group, verified: ids that did not confirm it.
@@ -90,6 +103,7 @@ class DynamixelActuators:
             return list(self.left_on)
         self._goals = None
         self.turns.reset()
+        self.following.rest()
         self.state.arm(False)
         self.left_on = []
         for group in self.joints.in_order_of_release:
@@ -147,8 +161,25 @@ class DynamixelActuators:
         self.turns.step(self._goals, self.state.positions, may_begin)
 
     def look(self) -> None:
-        """Read all positions, and a little more in turn."""
-        self.state.loose = self.turns.loose
-        self.state.step()
-        ticks = [self.state.positions.get(servo, math.nan) for servo in self.joints.ids]
-        self.state.angles = tuple(self.joints.angles(np.array(ticks)).tolist())
+        """Read all positions, and a little more in turn; judge whether joints follow."""
+        state, ids, began = self.state, self.joints.ids, self._now()
+        state.loose = self.turns.loose
+        state.step(tuple(ids[at] for at in self.following.suspects))
+        ticks = np.array([state.positions.get(servo, math.nan) for servo in ids])
+        state.angles = tuple(self.joints.angles(ticks).tolist())
+        if self._goals is not None:
+            idle = {*state.watchdogs, *state.disarmed}  # which is why they do not follow
+            unknown = np.array([state.missed[servo] > 0 or servo in idle for servo in ids])
+            self._judge((began, state.read_at), np.where(unknown, math.nan, ticks))
+
+    def _judge(self, span: tuple[float, float], ticks: Floats) -> None:
+        """Whether joints follow, unless they stand for legs that forget their turns."""
+        state, following = self.state, self.following
+        if self._goals is None or self.turns.standing:
+            following.rest()
+            return
+        following.step(span, self._goals, ticks)
+        if state.drive is not None:
+            servo, pwm, position = state.drive
+            following.drive(self._now(), self.joints.ids.index(servo), pwm, position)
+        state.joints, state.margins = following.faults, following.margins

@@ -73,6 +73,18 @@ def require_models(bus: Bus, models: Mapping[int, int]) -> None:
         raise BringUpError(f"expected model numbers {wanted} by id, found {wrong}")
 
 
+def require_modes(bus: Bus, modes: Mapping[int, int]) -> None:
+    """All ids are in these operating modes: another program may have changed one since.
+
+    Raises:
+        BringUpError: One did not answer, or is in another mode.
+    """
+    found = read_register(bus, list(modes), XC430_W240["operating_mode"])
+    if wrong := {i: found[i] for i, mode in modes.items() if found[i] != mode}:
+        wanted = {i: modes[i] for i in wrong}
+        raise BringUpError(f"expected operating modes {wanted} by id, found {wrong}")
+
+
 def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int, int]:
     """One register of each servo.
 

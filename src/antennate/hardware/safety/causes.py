@@ -61,6 +61,10 @@ class Cause(Enum):
     BUS_ERROR = (State.FAULT, "the servo bus does not work")
     WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
     DISARMED = (State.FAULT, "servos have lost their torque or their watchdog, as by a restart")
+    NOT_FOLLOWING = (State.FAULT, "joints do not follow their goals")
+    OUT_OF_LIMITS = (State.FAULT, "joints are beyond their limits")
+    IMPOSSIBLE_SPEED = (State.FAULT, "joints seem to move faster than their servos can")
+    WRONG_MODE = (State.FAULT, "servos are in another operating mode than they were given")
     NOT_READY = (State.FAULT, "something speaks against arming")
     PAUSE = (State.FAULT, "the loop stood still, or its clock did")
     SUPPLY_OFF = (State.OFF, "the supply is empty")
@@ -85,7 +89,11 @@ OF_CONTROLLER = frozenset(
     {Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.BAD_COMMAND, Cause.UNKNOWN_CONTACT}
 )
 """Causes in the controller: each ends as soon as its decision is valid again."""
-CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
+OF_JOINTS = frozenset(
+    {Cause.NOT_FOLLOWING, Cause.OUT_OF_LIMITS, Cause.IMPOSSIBLE_SPEED, Cause.WRONG_MODE}
+)
+"""Causes that are looked for while servos have torque, and anew from each arm event on."""
+CURED_BY_ARMING = OF_JOINTS | {Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED}
 """Causes that do not prevent an arm event."""
 
 
@@ -115,6 +123,10 @@ class Inputs:
         watchdogs: Ids of servos stopped by their watchdog.
         disarmed: Ids of servos that have lost their torque or their watchdog while armed.
         supply: Voltage of the supply [V], NaN if unknown.
+        behind: Joints that do not follow their goals, in words by servo id.
+        outside: Joints beyond their limits, likewise.
+        leaps: Joints that have moved faster than they can, likewise.
+        modes: Servos in a wrong operating mode, likewise.
         drift: How far resting readings have drifted, empty if not far.
         objections: Reasons not to arm, such as a failed touch check or unknown firmware.
         unrecorded: Whether a record that is required is not kept.
@@ -142,6 +154,10 @@ class Inputs:
     watchdogs: tuple[int, ...]
     disarmed: tuple[int, ...]
     supply: float
+    behind: Mapping[int, str]
+    outside: Mapping[int, str]
+    leaps: Mapping[int, str]
+    modes: Mapping[int, str]
     drift: str
     objections: tuple[str, ...]
     unrecorded: bool

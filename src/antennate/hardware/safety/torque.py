@@ -88,8 +88,8 @@ def limit_speed(bus: Bus, velocities: Mapping[int, int]) -> None:
     _write_checked(bus, _COMMON["profile_velocity"], velocities)
 
 
-def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> None:
-    """Let each servo use all of the PWM that its EEPROM allows.
+def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
+    """Let each servo use all of the PWM that its EEPROM allows: that, by id.
 
     Goal PWM bounds the force in every mode of position. It stays as it is written until the supply
     goes off, so that a `jog` that was killed would leave a joint without force.
@@ -97,7 +97,9 @@ def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> None:
     Raises:
         BringUpError: A servo did not take it.
     """
-    limit_pwm(bus, read_register(bus, ids, _COMMON["pwm_limit"]))
+    limits = read_register(bus, ids, _COMMON["pwm_limit"])
+    limit_pwm(bus, limits)
+    return limits
 
 
 def limit_pwm(bus: Bus, pwm: Mapping[int, int]) -> None:
