@@ -30,6 +30,7 @@ def healthy(now: float, **changes: Any) -> Inputs:
         "valid": 1,
         "refused": 0,
         "findings": (Finding.OK, Finding.OK),
+        "noise": ("", ""),
         "decided_at": now,
         "maneuver": Maneuver.FORWARD,
         "contact": (Contact.FREE, Contact.FREE),

@@ -180,7 +180,8 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
         )
         more = f"`{typed('doctor')}` tells more, slow adapters too"
         cure = more if error.cure else f"{check}; {more}"
-        raise BringUpError(f"--bus: {error}", cure) from None
+        echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
+        raise BringUpError(f"--bus: {error}{echo}", cure) from None
     rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()
