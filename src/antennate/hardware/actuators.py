@@ -24,17 +24,21 @@ class Tally:
         misses: Requests to one of them without a right answer.
         stale: Answers that were right but came too late, and were thrown away.
         drained: Bytes thrown away before a request.
+        echoes: Requests that the adapter gave back.
     """
 
     misses: int = 0
     stale: int = 0
     bad_crc: int = 0
     drained: int = 0
+    echoes: int = 0
 
 
-@dataclass
+@dataclass(kw_only=True)
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
+
+    What the supervisor decides on has no default: what a bus cannot tell has to be said.
 
     Attributes:
         missed: Answers missed in a row, by id.
@@ -48,13 +52,13 @@ class ActuatorState:
         tracebacks: Of errors that nobody expected while torque was taken off.
     """
 
-    missed: dict[int, int] = field(default_factory=dict[int, int])
-    errors: dict[int, str] = field(default_factory=dict[int, str])
-    watchdogs: tuple[int, ...] = ()
-    disarmed: tuple[int, ...] = ()
-    supply: float = math.nan
+    missed: dict[int, int]
+    errors: dict[int, str]
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
+    supply: float
+    bus_error: str
     angles: tuple[float, ...] = ()
-    bus_error: str = ""
     tracebacks: Tracebacks = field(default_factory=Tracebacks)
 
     def silent(self, missed: int) -> bool:

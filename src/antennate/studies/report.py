@@ -148,7 +148,7 @@ def _when(run: RunDirectory, result: Result | None) -> str:
 
 def _images(run: RunDirectory, view: View) -> dict[str, str]:
     """The figures by name, the picture first."""
-    found = {path.stem: path for path in (run.path / FIGURES).glob("*.png")}
+    found = {path.stem: path for path in run.made(FIGURES, ".png")}
     return {
         name: page.picture(
             read_limited(found[name], LARGEST),
@@ -168,7 +168,7 @@ def _films(run: RunDirectory) -> dict[str, str]:
         found = (i for i, name in enumerate(names) if path.stem.startswith(name))
         return next(found, len(names)), path.stem
 
-    found = sorted((run.path / FILMS).glob("*.mp4"), key=place)
+    found = sorted(run.made(FILMS, ".mp4"), key=place)
     return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.twin.bus import ServoBus
+from antennate.twin.converter import SIDES
 from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox
@@ -26,14 +27,22 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 """Bits of the register Hardware Error Status, from the manuals of both models."""
 NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
-_SIDES = ("left", "right")
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
-_BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
+_BOARD = ("silent", "reset")
+_READINGS = (
+    *(f"{kind}_{side}" for kind in ("open", "short", "stuck") for side in SIDES),
+    *SIDES,
+    "hum",
+    "drift",
+    "plateau",
+    "sticky",
+    "radio_noise",
+)
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
-    "esp32": (*_BOARD, *_SIDES, "ber"),
-    "bus": ("loss", "silent", "latency", "discharge", "ber"),
+    "esp32": (*_BOARD, *_READINGS, "ber"),
+    "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
 }
 _SHARES = ("loss", "ber")
@@ -48,8 +57,8 @@ class Demand:
         servo: Id, for a servo.
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
-            that are wrong, fall of the supply [V/s], reading of a bent antenna [counts], or value
-            of a register.
+            that are wrong, fall of the supply [V/s], reading of a bent antenna, hum, noise or
+            plateau [counts], drift [counts/s], or value of a register.
         t: When it begins [s].
     """
 
@@ -88,7 +97,7 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
-    if match["what"] in _SIDES and size > _MOST_COUNTS:
+    if match["what"] in SIDES and size > _MOST_COUNTS:
         raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
     if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
         raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
@@ -169,8 +178,8 @@ def _break_robot(robot: TwinRobot, demand: Demand) -> None:
     if demand.target == "wire":
         for noise in (robot.noise, robot.bus.noise):
             setattr(noise, demand.what, demand.size)
-    elif demand.what in _SIDES:
-        robot.hold(_SIDES.index(demand.what), demand.size)
+    elif demand.what in _READINGS:
+        robot.converter.set(demand.what, demand.size)
     elif demand.what == "ber":
         robot.noise.ber = demand.size
     else:
@@ -182,6 +191,8 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
         bus.latency = demand.size
     elif demand.what == "ber":
         bus.noise.ber = demand.size
+    elif demand.what == "echo":
+        bus.echo = True
     else:
         bus.loss = 1.0 if demand.what == "silent" else demand.size
 

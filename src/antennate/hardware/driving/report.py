@@ -134,6 +134,7 @@ class Report:
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,
             "broken_answers": answers.bad_crc,
+            "echoes": answers.echoes,
             "commands_sent": session.tally.sent,
             "commands_limited": session.tally.limited,
             "commands_refused": session.control.refused,
