@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -178,6 +179,12 @@ def named(*servos: int) -> Check:
     return lambda f: f["code"] == 2 and worst(f) and sorted(f["servos_on"]) == list(servos)
 
 
+def names(cause: str, servo: int) -> Check:
+    """With a FAULT of this cause that names the servo, torque off confirmed."""
+    said = re.compile(rf"{cause}: [^()]*\(servo {servo}: ")
+    return lambda f: faults(f) and said.search(f["why"]) is not None
+
+
 def told(found: dict[str, Any]) -> bool:
     """It walks on, or it is a FAULT with all torque confirmed off or the other servos named."""
     if found["code"] == 0:
@@ -197,8 +204,20 @@ def worst(found: dict[str, Any]) -> bool:
 
 
 def without_log(found: dict[str, Any]) -> bool:
-    """It walks on, and says that its log is not whole."""
-    return walks_on(found) and found["log_complete"] is False
+    """It walks on, and says that its log ended before it did."""
+    return walks_on(found | {"code": 0}) and (found["code"], found["log_cut"]) == (2, True)
+
+
+def holds(*words: str) -> Check:
+    """It holds to the end of its time, torque off confirmed, and the cause is told so."""
+    return lambda f: (
+        walks_on(f) and f["worst_state"] == "HOLD" and all(word in f["why"] for word in words)
+    )
+
+
+def echoes(found: dict[str, Any]) -> bool:
+    """It walks on, and says that requests came back."""
+    return walks_on(found) and found["echoes"] > 0
 
 
 TIME = "the end of its time"
@@ -213,6 +232,21 @@ CASES: dict[str, tuple[Act, Check, str]] = {
     "servo silent": (fault("servo:7=silent"), named(7), "FAULT, servo 7 named"),
     "servo reboots": (fault("servo:7=reboot"), faults, "FAULT, torque off confirmed"),
     "servo overloaded": (fault("servo:7=overload"), faults, "FAULT, torque off confirmed"),
+    "leg cut": (fault("servo:9=goal_pwm:0"), names("NOT_FOLLOWING", 9), "FAULT, leg_r1 named"),
+    "yaw cut": (fault("servo:2=goal_pwm:0"), names("NOT_FOLLOWING", 2), "FAULT, yaw2 named"),
+    "leg frozen": (fault("servo:9=frozen"), names("NOT_FOLLOWING", 9), "FAULT, leg_r1 named"),
+    "yaw frozen": (fault("servo:2=frozen"), names("NOT_FOLLOWING", 2), "FAULT, yaw2 named"),
+    "yaw out of limits": (
+        fault("servo:2=jump:-4096"),
+        names("OUT_OF_LIMITS", 2),
+        "FAULT, yaw2 named",
+    ),
+    "leg leaps": (fault("servo:9=jump:4096"), names("IMPOSSIBLE_SPEED", 9), "FAULT, leg_r1 named"),
+    "mode changed": (
+        fault("servo:2=operating_mode:1"),
+        names("WRONG_MODE", 2),
+        "FAULT, yaw2 named",
+    ),
     "servo 50 ms late": (fault("servo:7=late:0.05"), told, WALKS_OR_FAULT),
     "servo bad CRC": (fault("servo:7=bad_crc"), told, WALKS_OR_FAULT),
     "BER 1e-5": (fault("wire=ber:1e-5"), walks_on, "walks on"),
@@ -220,6 +254,10 @@ CASES: dict[str, tuple[Act, Check, str]] = {
     "BER 1e-3": (fault("wire=ber:1e-3"), told, WALKS_OR_FAULT),
     "BER 1e-2": (fault("wire=ber:1e-2"), told, WALKS_OR_FAULT),
     "supply sags 1 V/s": (fault("bus=discharge:1"), faults, "OFF or FAULT, torque off confirmed"),
+    "hum 400": (fault("esp32=hum:400"), holds("NOISE", "50 Hz or an alias"), "HOLD, NOISE, 50 Hz"),
+    "stuck +-1": (fault("esp32=stuck_left"), holds("STUCK", "left"), "HOLD, STUCK, left"),
+    "sticky codes": (fault("esp32=sticky"), walks_on, "walks on"),
+    "echo": (fault("bus=echo"), echoes, "walks on, the echo is named"),
     "SIGINT": (send("SIGINT"), ends, "torque off confirmed"),
     "SIGTERM": (send("SIGTERM"), ends, "torque off confirmed"),
     "SIGQUIT": (send("SIGQUIT"), ends, "torque off confirmed"),
@@ -234,7 +272,7 @@ def once(case: str, chance: random.Random) -> dict[str, Any]:
     """One run of a case: what came of it, and whether that is as documented."""
     act, check, _ = CASES[case]
     with twin(tcp="replugged" in case) as run, _disk(case, run):
-        walk = LONG_WALK if check in (ends, faults, killed) else WALK
+        walk = WALK if check in (walks_on, told, without_log) else LONG_WALK
         run.start("--duration", str(walk))
         walked = run.drive.poll() is None
         time.sleep(chance.uniform(EARLY, LATE))

@@ -11,6 +11,7 @@ from typing import Any
 
 import test_dynamixel_bus as test_bus
 import test_dynamixel_packets as test_packets
+import test_following
 import test_loose_leg
 import test_release
 import test_servo_hours
@@ -19,20 +20,27 @@ import test_settings
 import test_turns
 import test_twin_bus
 import test_twin_robot
-from guard_tools import Guard, after, around, constant, put
+from guard_tools import Guard, after, around, constant, given, put
 from lockstep import SimulatedWire
 
 from antennate.hardware import joints, settings
-from antennate.hardware.driving import session
+from antennate.hardware.driving import dry_run, session
 from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
 from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.answers import Timing, Value
+from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
+from antennate.hardware.safety import torque
+from antennate.params.safety import FollowingParams
+from antennate.robots.servos import FULL_DRIVE
 from antennate.robots.spec import RobotSpec
 
+does_wrong = (
+    test_following.test_B20_B21_B22_B23_what_a_joint_does_wrong_is_a_fault_in_time_that_names_it
+)
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
 
@@ -141,6 +149,10 @@ def torque_reads(value: bytes) -> Any:
         return dict.fromkeys(ids, Value(value, False)) if span.address == TORQUE else answers
 
     return around(bus.Bus, "read_all", read)
+
+
+def well(old: Any, master: Any, ids: Any, register: Any) -> Any:
+    return {} if register.name == "hardware_error_status" else old(master, ids, register)
 
 
 def told_once(old: Any, master: Any, ids: Any, *words: Any) -> list[int]:
@@ -294,37 +306,37 @@ SERVOS = [
     ),
     Guard(
         "speed limit on the servos",
-        put(bringup, "limit_speed", constant(None)),
+        put(torque, "limit_speed", constant(None)),
         test_settings.test_B10_profiles_that_another_program_left_are_set_before_torque,
     ),
     Guard(
         "present goals on torque-on",
-        around(bringup, "hold_here", where_goals_were),
+        around(torque, "hold_here", where_goals_were),
         test_bus.test_B10_torque_goes_on_without_a_jump,
     ),
     Guard(
         "present goals before watchdogs are on",
-        put(bringup, "hold_here", constant({})),
+        put(torque, "hold_here", constant({})),
         test_bus.test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand,
     ),
     Guard(
         "writes are read back",
-        around(bringup, "read_register", as_wished),
+        around(torque, "read_register", as_wished),
         test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
     ),
     Guard(
         "homing offset in extended mode",
-        put(bringup, "EXTENDED_MODE", -1),
+        put(torque, "EXTENDED_MODE", -1),
         test_bus.test_B9_extended_mode_with_an_offset_is_refused,
     ),
     Guard(
         "torque off is confirmed",
-        put(bringup, "disable", constant([])),
+        put(torque, "disable", constant([])),
         test_bus.test_B19_torque_off_is_confirmed_and_what_did_not_is_named,
     ),
     Guard(
         "torque off is told again",
-        around(bringup, "disable", told_once),
+        around(torque, "disable", told_once),
         partial(test_release.test_B19_a_servo_is_told_five_times_to_let_go, 4, []),
     ),
     Guard(
@@ -336,7 +348,7 @@ SERVOS = [
     ),
     Guard(
         "watchdogs armed",
-        around(bringup, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
+        around(torque, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
         partial(controller_fails, 11.1),
     ),
     Guard(
@@ -358,6 +370,56 @@ SERVOS = [
             ("bus_watchdog",),
         ),
         by=(AssertionError,),
+    ),
+    Guard(
+        "drive of a joint that is behind",
+        put(Following, "drive", constant(None)),
+        partial(does_wrong, *test_following.CASES[0]),
+    ),
+    Guard(
+        "joint that is stuck",
+        given(test_following, FollowingParams, stuck_time=math.inf),
+        test_following.test_B20_a_joint_far_behind_at_full_drive_is_not_named_as_long_as_it_moves,
+    ),
+    Guard(
+        "limit of a joint",
+        put(Following, "_leave", constant(None)),
+        partial(
+            test_following.test_B21_a_joint_is_pushed_beyond_its_limit_for_a_moment_and_at_full_drive,
+            1.03,
+            205,
+            FULL_DRIVE,
+            True,
+            1,
+        ),
+    ),
+    Guard(
+        "speed of a joint",
+        given(test_following, FollowingParams, overspeed=math.inf),
+        partial(
+            test_following.test_B22_a_leap_is_named_at_once_and_the_speed_without_load_is_not,
+            4096.0,
+        ),
+    ),
+    Guard(
+        "operating mode while armed",
+        put(actuators, "ServoMonitor", lambda *words, modes: monitor.ServoMonitor(*words)),
+        partial(does_wrong, *test_following.CASES[1]),
+    ),
+    Guard(
+        "operating mode before torque",
+        put(bringup, "require_modes", constant(None)),
+        test_following.test_B23_a_mode_that_was_changed_in_the_dry_run_gets_no_torque,
+    ),
+    Guard(
+        "hardware error before a drive",
+        around(bringup, "read_register", well),
+        partial(test_following.test_B24_a_hardware_error_is_refused_at_once, 0.0, "overload"),
+    ),
+    Guard(
+        "hardware error in the dry run",
+        put(dry_run, "_latched", constant("")),
+        partial(test_following.test_B24_a_hardware_error_is_refused_at_once, 0.2, "overheat"),
     ),
     Guard(
         "torque taken off on purpose",

@@ -96,7 +96,7 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     ("command", "flags"),
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
-        ("drive", "--robot --controller --calibration --esp32 --bus --arm"),
+        ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm"),
         ("wall", "--trials --seed --profiles --solver --out"),
     ],
 )
@@ -406,7 +406,7 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     def refuse(name):
         raise AssertionError(f"{name} is no JSON")
 
-    assert main([*QUICK, "--controllers", "open", "closed", "--json", "--out", "run"]) == 0
+    assert main([*QUICK, "--controllers", "closed", "--json", "--out", "run"]) == 0
     text = capsys.readouterr().out
     assert text == (tmp_path / "run" / "result.json").read_text()
     result = json.loads(text, parse_constant=refuse)

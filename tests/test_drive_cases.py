@@ -16,6 +16,9 @@ from antennate.studies.run_directory import RunDirectory
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 RUNS = 20
 """Runs of each case, each broken at another moment."""
+LATE = ("SILENT_SERVO", "WATCHDOG", "PAUSE")
+"""Causes by which a machine that stands still ends a drive before its joint does wrong."""
+ATTEMPTS = 3
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +61,44 @@ def test_B1_B3_B11_B12_one_bad_servo_is_a_fault_that_names_it(cases: Any, case: 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "case",
+    [
+        "leg cut",
+        "yaw cut",
+        "leg frozen",
+        "yaw frozen",
+        "yaw out of limits",
+        "leg leaps",
+        "mode changed",
+    ],
+)
+def test_B20_B21_B22_B23_a_joint_that_does_wrong_is_a_fault_that_names_it(
+    cases: Any, case: str
+) -> None:
+    for n in range(RUNS):
+        for attempt in range(ATTEMPTS):
+            found = cases.once(case, random.Random(f"slow {case} {n} {attempt}"))
+            if found["as_documented"] or not any(cause in found["why"] for cause in LATE):
+                break
+        assert found["as_documented"], found
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["BER 1e-5", "BER 1e-4", "BER 1e-3", "BER 1e-2"])
 def test_L1_wrong_bits_on_both_wires(cases: Any, case: str) -> None:
     as_documented(cases, case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["hum 400", "stuck +-1", "sticky codes"])
+def test_S4_S14_noise_and_stuck_readings_hold_and_are_named(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+def test_B25_the_echo_of_an_adapter_is_dropped_and_named(cases: Any) -> None:
+    as_documented(cases, "echo")
 
 
 @pytest.mark.slow

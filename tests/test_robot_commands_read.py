@@ -55,7 +55,8 @@ REPLACED = {"controller"}  # `teleop` walks by keys in its place
 SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 BRIEF = {"patience": 1.0}
 """Torque is refused before a silent bus; it is asked for so long."""
-LIFTING = {"legs": {"kind": "lifting"}, "pitch": {"kind": "actuated"}}
+PITCH = {"kind": "actuated", "servo": "xl430_w250"}
+LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH}
 HEXAPOD = RobotSpec.named("hexapod").model_dump()
 """Without antennae."""
 
@@ -302,7 +303,6 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "scene": "flat",
                 "robot": {
                     **LIFTING,
-                    "pitch": {"kind": "actuated", "servo": "xl430_w250"},
                     "yaw": {"servo": "xl330_m288"},
                     "antenna": {"sensor": {"kind": "fsr"}},
                 },

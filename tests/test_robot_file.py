@@ -70,7 +70,7 @@ def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -
     [
         ("[robot]\nbuad = 1\n", "robot.buad: expected a known key of robot (did you mean"),
         ("[record]\nmark = [0, 1]\n", "record.mark: expected a known key of record"),
-        ("marks = [0, 1]\n", "marks: expected a known key, found 'marks'"),
+        ("marks = [0, 1]\n", "marks: expected a known key (did you mean record.marks?)"),
         ("[doctor]\nlisten = 0.0\n", "doctor.listen: expected a number above 0"),
     ],
 )

@@ -102,7 +102,7 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
         ('[vary]\ncontrollers = [["clsoed"]]\n', "vary: tunnel: controllers: expected one of open"),
         (
             'experiment = "tunel"\n[vary]\nx = [1]\n',
-            "experiment: expected an experiment (calibrate",
+            "experiment: expected an experiment (did you mean tunnel?), one of calibrate",
         ),
         (f"experiment = 3\n{GOOD}", "bad.toml: experiment: expected text, found 3"),
         (f'plan = "gird"\n{GOOD}', "bad.toml: plan: expected one of grid, list, random"),
@@ -230,3 +230,10 @@ def test_a_sensor_of_another_kind_without_its_curve_is_refused_at_any_point(
     kinds = '"robot.antenna.sensor.kind" = ["flex", "fsr"]\n'
     Path("kinds.toml").write_text(f"[vary]\n{kinds}")
     assert "polarity must be 1 for a fsr sensor" in refusal(capsys, "study", "kinds.toml")
+
+
+@pytest.mark.parametrize("command", ["study", "design"])
+def test_without_a_file_one_is_asked_for(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in ([], ["--out", "run"]):
+        assert "expected a FILE that says what varies" in refusal(capsys, command, *words)
+    assert not Path("run").exists()

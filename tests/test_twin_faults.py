@@ -133,7 +133,9 @@ def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
         for servo, position in session.actuators.state.positions.items():
             assert position in truth.positions[servo]
 
-    report = drive(made.session, DriveConfig(dry_run=0.3, duration=3.5), arm=True, on_tick=look)
+    duration = 8.0 if worst is State.FAULT else 3.5  # until five answers in a row are missed
+    config = DriveConfig(dry_run=0.3, duration=duration, fault_time=0.5)
+    report = drive(made.session, config, arm=True, on_tick=look)
     result = report.result(made.session)
     assert made.robot.bus.noise.wrong > 50
     assert made.robot.noise.wrong > 5

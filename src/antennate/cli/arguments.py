@@ -133,12 +133,10 @@ def _refuse_unread(config: Params, flags: Mapping[tuple[str, ...], Any]) -> None
         ConfigError: There is one.
     """
     why = config.unread_here() if config.shared else {}
-    for path, default, value in changes(config, why):
+    for path, value in changes(config, why):
         parts = tuple(path.split("."))
         if any(parts[:n] in flags for n in range(1, len(parts) + 1)):
-            raise ConfigError(
-                f"{flag_of(parts)}: expected {default}, as {why[path]}, found {found(value)}"
-            )
+            raise ConfigError(config.unread_error(path, why[path], value).text(flag_of))
 
 
 _CODE = ("controller", "controllers", "scene", "experiment")

@@ -61,7 +61,7 @@ verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
-off, and if it was armed and never walked."""
+off, if it was armed and never walked, and if its log ended before the drive did."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def walk(
                 folder.write_figures({"drive": _figure(log)})
             except (LogError, OutputError) as error:
                 viewer.say(error)
-    return BAD_INPUT if _failed(result) else OK
+    return BAD_INPUT if _failed(result) or result["log_cut"] else OK
 
 
 def _figure(log: Path) -> Any:
@@ -196,7 +196,7 @@ def _calibration(config: DriveConfig) -> str:
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     again = f"What was read and decided: {typed('replay')} {log}"
-    again = again if result["logs"] else f"No log was kept: {result['log_failure']}."
+    again = again if result["logs"] else f"No log was kept: {_why(result)}."
     tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
 
 
@@ -244,13 +244,17 @@ def _carry_out(
     operator = dataclasses.replace(operator, watches=lambda: feed.watched)
     with feed, urgent() as priority:
         report = drive(session, config, orders.arm, keep, operator)
+    logs = [each.name for each in parts(log) if each.exists()]
+    kept = feed.complete and bool(logs)
+    why = feed.failure or ("" if kept else f"{log} is not there any more")
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,
-        "unlogged": 0 if feed.complete else feed.offered - count(log),
-        "log_complete": feed.complete,
-        "log_failure": feed.failure,
-        "logs": [each.name for each in parts(log) if each.exists()],
+        "unlogged": 0 if kept else feed.offered - count(log),
+        "log_complete": kept,
+        "log_cut": feed.failed or not logs,
+        "log_failure": why,
+        "logs": logs,
     }
     return head | report.result(session) | tail
 
@@ -295,11 +299,19 @@ def _note(result: Mapping[str, Any]) -> str:
     lines: list[str] = []
     if result["priority"] == Priority.ORDINARY.value:
         lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
+    if result.get("echoes"):  # results of older versions have none
+        lines.append(
+            "The adapter of the servo bus sends back what it gets (an echo); that was dropped."
+        )
     if not result["log_complete"] and result["logs"]:
         files = f"Its files: {', '.join(result['logs'])}."
-        why = result.get("log_failure")  # results of older versions have none
-        lines.append(f"The log is not complete{f': {why}' if why else ''}. {files}")
+        lines.append(f"The log is not complete: {_why(result)}. {files}")
     return "\n".join(lines)
+
+
+def _why(result: Mapping[str, Any]) -> str:
+    """Why the log is not complete; results of older versions do not tell."""
+    return result.get("log_failure") or "nothing is known of the reason"
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

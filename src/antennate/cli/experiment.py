@@ -28,6 +28,7 @@ from antennate.errors import (
     raised,
 )
 from antennate.experiments.running import keep, require_films, write_films
+from antennate.messages import typed
 from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
@@ -96,6 +97,11 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         StudyOptions if experiment.continued else Options,
         without=_without(experiment),
     )
+    if experiment.continued and options.config is None and "assumed" not in config.model_fields_set:
+        raise ConfigError(
+            f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
+            "found none"
+        )
     experiment.check(config)
     trial = _filmed(options)
     if trial is not None:

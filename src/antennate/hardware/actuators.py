@@ -24,23 +24,62 @@ class Tally:
         misses: Requests to one of them without a right answer.
         stale: Answers that were right but came too late, and were thrown away.
         drained: Bytes thrown away before a request.
+        echoes: Requests that the adapter gave back.
     """
 
     misses: int = 0
     stale: int = 0
     bad_crc: int = 0
     drained: int = 0
+    echoes: int = 0
 
 
-@dataclass
+@dataclass(slots=True)
+class JointFaults:
+    """What joints do wrong since torque came on, in words by the id of their servo.
+
+    Attributes:
+        behind: Joints that do not follow their goals.
+        outside: Joints that are beyond their limits.
+        leaps: Joints that have moved faster than they can.
+    """
+
+    behind: dict[int, str] = field(default_factory=dict[int, str])
+    outside: dict[int, str] = field(default_factory=dict[int, str])
+    leaps: dict[int, str] = field(default_factory=dict[int, str])
+
+
+@dataclass(slots=True)
+class Margins:
+    """How near joints have come to each bound since torque came on, as a share of it.
+
+    Attributes:
+        behind: Time in a row for which a joint that is behind drove too little.
+        stuck: Time in a row for which a joint that is behind did not move.
+        outside: Time in a row for which a joint was beyond its limit and the error of full drive.
+        speed: Way of a joint from one reading to the next.
+    """
+
+    behind: float = 0.0
+    stuck: float = 0.0
+    outside: float = 0.0
+    speed: float = 0.0
+
+
+@dataclass(kw_only=True)
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
+
+    What the supervisor decides on has no default: what a bus cannot tell has to be said.
 
     Attributes:
         missed: Answers missed in a row, by id.
         errors: Hardware errors in words, by id.
         watchdogs: Ids stopped by their watchdog.
         disarmed: Ids that have lost their torque or their watchdog while they were to have it.
+        modes: Wrong operating modes in words, by id.
+        joints: What joints do wrong.
+        margins: How near they have come to that.
         supply: Voltage [V], NaN if it is not known.
         angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
             not answered yet; empty if they are not read.
@@ -48,13 +87,16 @@ class ActuatorState:
         tracebacks: Of errors that nobody expected while torque was taken off.
     """
 
-    missed: dict[int, int] = field(default_factory=dict[int, int])
-    errors: dict[int, str] = field(default_factory=dict[int, str])
-    watchdogs: tuple[int, ...] = ()
-    disarmed: tuple[int, ...] = ()
-    supply: float = math.nan
+    missed: dict[int, int]
+    errors: dict[int, str]
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
+    modes: dict[int, str]
+    joints: JointFaults
+    supply: float
+    bus_error: str
+    margins: Margins = field(default_factory=Margins)
     angles: tuple[float, ...] = ()
-    bus_error: str = ""
     tracebacks: Tracebacks = field(default_factory=Tracebacks)
 
     def silent(self, missed: int) -> bool:

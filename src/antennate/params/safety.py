@@ -26,6 +26,42 @@ class TouchCheckParams(Params):
         return self
 
 
+class FollowingParams(Params):
+    """When a joint does not follow its goals, by the model of its servo."""
+
+    share: float = number(
+        0.5,
+        "1",
+        "assumed: how a gain register acts is known within a factor of two (XL330: 256 measured, "
+        "128 in the manual)",
+        gt=0,
+        le=1,
+    )
+    """Share of the modelled gain that a position loop must have."""
+    shortfall: float = number(
+        0.25, "1", "assumed: half of what a leg drives with at its pace", gt=0, lt=1
+    )
+    """Drive that may be missing, in full drives."""
+    time: float = number(0.1, "s", "assumed: ten ticks; noise loses single answers", gt=0, le=10)
+    """Time in a row for which a drive must be too small."""
+    stuck_time: float = number(
+        2.0, "s", "assumed: a gait cycle at half a hertz; its wave frees a joint", gt=0, le=60
+    )
+    """Time in a row for which a joint that is behind does not move, or is beyond its limit."""
+    still: float = number(
+        0.02, "rad", "assumed: four times the backlash of 0.25 degrees (datasheet)", gt=0, le=1
+    )
+    """Motion that is none."""
+    overspeed: float = number(
+        1.5,
+        "1",
+        "datasheet: an XC430 takes 14.8 V at most, 1.33 of 11.1 V; rest assumed",
+        ge=1,
+        le=10,
+    )
+    """Fastest that a joint can turn, in unloaded speeds."""
+
+
 class SupervisorParams(Params):
     """Limits at which the robot is slowed, held, or switched off."""
 
@@ -80,6 +116,7 @@ class SupervisorParams(Params):
     """Longest time from an arm event to the next tick."""
     longest_pause: float = number(0.12, "s", "assumed: servo watchdogs act before it", gt=0, le=10)
     """Time between ticks from which on a restart needs a person."""
+    following: FollowingParams = FollowingParams()
 
     @model_validator(mode="after")
     def _levels(self) -> SupervisorParams:

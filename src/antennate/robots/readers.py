@@ -38,6 +38,13 @@ SIMULATION_ALONE = (
     *paths_of(AntennaSpec, "robot.antenna"),
 )
 """Parameters that only the simulation, or the twin, reads; the robot's hardware does not."""
+_OF_FOLLOWING = {
+    f"robot.servos.{servo}.{name}"
+    for servo in ServosParams.model_fields
+    for name in ("p_gain", "gain_divisor", "no_load_speed")
+}
+UNDRIVEN = tuple(path for path in SIMULATION_ALONE if path not in _OF_FOLLOWING)
+"""The same of a drive, which judges by the models of its servos whether joints follow."""
 
 
 def unused(robot: RobotSpec) -> dict[str, str]:

@@ -77,6 +77,7 @@ class RunDirectory:
         self._created, self._replaced = taken.created, taken.replaced
         self._partial = taken.partial
         self._kept = taken.partial is None
+        self._described: dict[str, str] = {}
         self._listed = set(listed(taken.path) or ())
 
     @classmethod
@@ -181,11 +182,12 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         checks.instance("config", config, Params)
-        self.write(CONFIG, formats.to_toml(config))
-        self.write(VERSIONS, self._versions())
+        self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
         if command:
             resumed = self.store is not None and self.store.holds_trials
-            self.write(COMMAND, f"{shlex.join(command)}\n{dates.begun(resumed)}")
+            self._described[COMMAND] = f"{shlex.join(command)}\n{dates.begun(resumed)}"
+        for name, text in self._described.items():
+            self.write(name, text)
 
     def _versions(self) -> str:
         """Versions of what the numbers depend on, and the models of the processors."""
@@ -223,6 +225,8 @@ class RunDirectory:
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
         """Write the result and, if there are rows, their table; then drop the partial file.
 
+        What `describe` wrote is written again where somebody removed it meanwhile.
+
         Raises:
             ConfigError: The result is no dictionary, or a row is neither that nor a dataclass.
             OutputError: Something cannot be written.
@@ -233,6 +237,9 @@ class RunDirectory:
         if table:
             self.write(TABLE, table)
         self._give_room()
+        for name, text in self._described.items():
+            if not (self.path / name).exists():
+                self.write(name, text)
         if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
             self.write(VERSIONS, self._versions())
         self.write(RESULT, formats.to_json(result))

@@ -40,11 +40,11 @@ class ServoBus:
         baud: Bits per second while the master's are not known; a byte is ten bits.
         loss: Share of answers that get lost between the wire and the master.
         rng: Which of them.
-        fast: They understand fast sync reads.
 
     Attributes:
         trouble: Faults of servos, by the id that each had when the bus was made.
         latency: Time by which the adapter delivers answers late [s].
+        echo: The adapter hears what it sends, and gives it to the master.
         noise: What the wire does to bytes, both ways.
         master_baud: Bits per second of the master; servos set to another baud understand nothing.
             None while that is not known: then all do.
@@ -57,14 +57,13 @@ class ServoBus:
         baud: int = 1_000_000,
         loss: float = 0.0,
         rng: np.random.Generator | None = None,
-        fast: bool = True,
     ) -> None:
         self.servos = list(servos)
         self.trouble: dict[int, Trouble] = {}
         self._first_ids = {id(servo): servo.get("id") for servo in self.servos}
         self.loss = loss
-        self.fast = fast
         self.latency = 0.0
+        self.echo = False
         self.noise = Noise(seed=1)
         self.master_baud: int | None = None
         self.on_goals: Callable[[], None] = lambda: None
@@ -85,6 +84,8 @@ class ServoBus:
         if t - self._last > _GIVE_UP:
             self._parser.reset()
         self._last = max(self._last, t) + self._byte_time * len(data)
+        if self.echo:
+            self._out.append((self._last + self.latency, data))
         for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)
@@ -170,12 +171,15 @@ class ServoBus:
         self._join(t, present, _bulk(params))
 
     def _join(self, t: float, present: list[Servo], asked: list[tuple[int, int, int]]) -> None:
-        """Let servos answer with one packet together: id, address and length of each."""
+        """Let servos answer with one packet together: id, address and length of each.
+
+        A firmware that does not know the instruction is silent, and so are those behind it.
+        """
         chain: list[tuple[Servo, Status]] = []
         known = {s.get("id"): s for s in reversed(present) if s.get("status_return_level")}
-        for name, address, length in asked if self.fast else []:
+        for name, address, length in asked:
             servo = known.get(name)
-            if servo is None:
+            if servo is None or servo.get("firmware_version") < servo.table.fast_read_firmware:
                 break
             error, data = servo.read(address, length)
             chain.append((servo, instructions.status(servo, error, data.ljust(length, b"\0"))))

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.robots.servos import MOST_TICKS
 from antennate.twin.bus import ServoBus
+from antennate.twin.converter import SIDES
 from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox
@@ -26,14 +28,24 @@ _HARDWARE = {"voltage": 1, "overheat": 4, "encoder": 8, "shock": 16, "overload":
 """Bits of the register Hardware Error Status, from the manuals of both models."""
 NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
-_SIDES = ("left", "right")
+_FROZEN, _JUMP = "frozen", "jump"
+"""Present Position keeps its value, or is wrong by some ticks; the servo moves as before."""
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
-_BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
+_BOARD = ("silent", "reset")
+_READINGS = (
+    *(f"{kind}_{side}" for kind in ("open", "short", "stuck") for side in SIDES),
+    *SIDES,
+    "hum",
+    "drift",
+    "plateau",
+    "sticky",
+    "radio_noise",
+)
 _KNOWN = {
-    "servo": (*_SERVO, *_HARDWARE, "reboot", NONE),
-    "esp32": (*_BOARD, *_SIDES, "ber"),
-    "bus": ("loss", "silent", "latency", "discharge", "ber"),
+    "servo": (*_SERVO, *_HARDWARE, "reboot", _FROZEN, _JUMP, NONE),
+    "esp32": (*_BOARD, *_READINGS, "ber"),
+    "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
 }
 _SHARES = ("loss", "ber")
@@ -48,8 +60,8 @@ class Demand:
         servo: Id, for a servo.
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
-            that are wrong, fall of the supply [V/s], reading of a bent antenna [counts], or value
-            of a register.
+            that are wrong, fall of the supply [V/s], reading of a bent antenna, hum, noise or
+            plateau [counts], drift [counts/s], jump of a position [ticks], or value of a register.
         t: When it begins [s].
     """
 
@@ -88,8 +100,10 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
-    if match["what"] in _SIDES and size > _MOST_COUNTS:
+    if match["what"] in SIDES and size > _MOST_COUNTS:
         raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
+    if match["what"] == _JUMP and not 1 <= abs(size) <= MOST_TICKS:
+        raise BadInputError(f"--fault: expected a jump of 1 to {MOST_TICKS} ticks, found {text!r}")
     if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
         raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
     if register:
@@ -169,8 +183,8 @@ def _break_robot(robot: TwinRobot, demand: Demand) -> None:
     if demand.target == "wire":
         for noise in (robot.noise, robot.bus.noise):
             setattr(noise, demand.what, demand.size)
-    elif demand.what in _SIDES:
-        robot.hold(_SIDES.index(demand.what), demand.size)
+    elif demand.what in _READINGS:
+        robot.converter.set(demand.what, demand.size)
     elif demand.what == "ber":
         robot.noise.ber = demand.size
     else:
@@ -182,6 +196,8 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
         bus.latency = demand.size
     elif demand.what == "ber":
         bus.noise.ber = demand.size
+    elif demand.what == "echo":
+        bus.echo = True
     else:
         bus.loss = 1.0 if demand.what == "silent" else demand.size
 
@@ -189,10 +205,16 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
 def _break_servo(servo: Servo, demand: Demand, t: float) -> None:
     if demand.what == NONE:
         servo.trouble = None
+        servo.freeze(False)
+        servo.misread(0)
     elif demand.what in _SERVO:
         servo.trouble = Trouble(_SERVO[demand.what], delay=demand.size)
     elif demand.what == "reboot":
         servo.restart(t)
+    elif demand.what == _FROZEN:
+        servo.freeze()
+    elif demand.what == _JUMP:
+        servo.misread(int(demand.size))
     elif demand.what in _HARDWARE:
         servo.fail(_HARDWARE[demand.what])
     elif demand.what in servo.table.registers:

@@ -42,6 +42,8 @@ class Motion:
         shaft: The shaft.
         plan: What it means to do.
         stopped: A bus watchdog has stopped it.
+        frozen: Position that it tells whatever the shaft does [ticks], None to tell the true one.
+        misread: By how much it tells a wrong one [ticks]. Its own loops know the true one.
     """
 
     def __init__(self, memory: Memory, position: float) -> None:
@@ -50,6 +52,8 @@ class Motion:
         self.plan = Planner(memory)
         self._loops = Loops()
         self.stopped = False
+        self.frozen: int | None = None
+        self.misread = 0
         self.sign = 1
         self.mode, self.torque, self.limit = POSITION_MODE, False, 1.0
         self._base = self._homing = 0
@@ -130,7 +134,8 @@ class Motion:
         show, position, shaft = self.memory.show, self.position, self.shaft
         speed = self.sign * shaft.speed / SPEED_UNIT
         show("present_velocity", round(speed))
-        show("present_position", round(position))
+        told = round(position) if self.frozen is None else self.frozen
+        show("present_position", told + self.misread)
         show("present_pwm", round(FULL * self.sign * shaft.duty))
         load = max(-1.0, min(self.sign * shaft.load, 1.0))
         table = self.memory.table

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.design.config import OF_SUCCESSES, Axis, DesignConfig, Evaluation
+from antennate.experiments.study import labels
 from antennate.experiments.study.measures import SUCCESS
 from antennate.experiments.study.run import holds, with_status
 from antennate.experiments.study.subject import (
@@ -18,6 +19,7 @@ from antennate.experiments.study.subject import (
     find,
     nested,
     numbers,
+    table_of,
 )
 from antennate.messages import nearest, shortened
 from antennate.params.base import Params
@@ -135,8 +137,12 @@ class Evaluator:
             )
         return ends[0] if ends else None
 
-    def configured(self, point: Point) -> Any:
+    def configured(self, point: Point, where: str = "") -> Any:
         """The configuration of a design.
+
+        Args:
+            point: The design.
+            where: The table of a file that holds it, for errors.
 
         Raises:
             ConfigError: A value is out of bounds, or does not fit another one.
@@ -148,8 +154,21 @@ class Evaluator:
         try:
             return self._subject.configured(found)
         except ConfigError as error:
-            label = "" if self.label == self.name else f"evaluate.{self.label}: "
-            raise ConfigError(f"{label}{error}") from None
+            if table_of(str(error), self._asked.settings, self._subject) == "settings":
+                where = f"evaluate.{self.label}.settings: "
+            elif self.label != self.name:
+                where += f"evaluate.{self.label}: "
+            raise ConfigError(f"{where}{error}") from None
+
+    def bounds(self, point: Point) -> dict[str, tuple[float, float]]:
+        """Between which values those of each objective lie, by its name."""
+        values = dict(self.configured(point))
+        return {
+            objective.name: labels.bounds(
+                labels.measure_of(self.name, objective.column), self.name, values
+            )
+            for objective in self._asked.objectives(self.label)
+        }
 
     def check(self, point: Point) -> None:
         """Find what cannot be run.

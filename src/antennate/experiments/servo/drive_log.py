@@ -27,7 +27,10 @@ _WITHOUT_TORQUE = ("OFF", "")
 """States of the supervisor."""
 _FAULT = "FAULT"
 """A state in which the last goals are held; it ends by an arm event, as if torque were off."""
-_LOST = ("DISARMED", "WATCHDOG", "SERVO_ERROR")
+_LOST = (
+    *("DISARMED", "WATCHDOG", "SERVO_ERROR"),
+    *("NOT_FOLLOWING", "IMPOSSIBLE_SPEED", "WRONG_MODE"),
+)
 """Causes in whose ticks nobody knows whether a servo holds its goal."""
 
 

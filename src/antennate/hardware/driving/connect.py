@@ -18,7 +18,7 @@ from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.host_clock import HostClock
@@ -26,6 +26,7 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
@@ -40,8 +41,6 @@ _QUIET = 0.1
 _UNASKED = 32
 """Bytes in that time from which on servos are not alone on the bus (assumed: a plug gives less)."""
 _PATIENCE = 0.05
-LATEST = 0.07
-"""Latest answer while servos have torque [s]: less than the 100 ms of their watchdogs (assumed)."""
 
 
 @contextlib.contextmanager
@@ -91,12 +90,14 @@ def prepare(
     require_sensor(board.hello, config.sensor_id)
     require_sensor(board.hello, config.sensor_id_right)
     require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
-    master = Bus(bus, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
+    master = Bus(bus, Timing(config.robot.baud, latest=ANSWER), clock=clock.now)
     require_servos(master, config.robot)
     board.count_anew(clock.now())
     return Session(
         board=board,
-        actuators=DynamixelActuators(master, Joints(config.robot), clock.now),
+        actuators=DynamixelActuators(
+            master, Joints(config.robot), clock.now, config.limits.following
+        ),
         clock=clock,
         controller=controller or make_controller(config.controller, config.control, config.robot),
         period=config.control.period,
@@ -167,7 +168,7 @@ def _unasked(bus: Port) -> int:
 
 
 def require_servos(bus: Bus, robot: RobotSpec) -> None:
-    """Check that all servos answer, are of the right model and have the right settings.
+    """Check that all servos answer, are of the right model, well, and have the right settings.
 
     Raises:
         BringUpError: One does not; the message names its id and the cure.
@@ -175,10 +176,20 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     try:
         bringup.require(bus, robot.models)
     except BringUpError as error:
+        check = (
+            f"check power, wiring, ids and baud {robot.baud}, or whether --esp32 and --bus are "
+            "swapped"
+        )
+        more = f"`{typed('doctor')}` tells more, slow adapters too"
+        cure = more if error.cure else f"{check}; {more}"
+        echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
+        raise BringUpError(f"--bus: {error}{echo}", cure) from None
+    status = bringup.read_register(bus, robot.ids, XC430_W240["hardware_error_status"])
+    if ill := [f"{', '.join(hardware_errors(b))} in servo {i}" for i, b in status.items() if b]:
         raise BringUpError(
-            f"--bus: {error}; check power, wiring, ids and baud {robot.baud}, or whether --esp32 "
-            f"and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
-        ) from None
+            f"--bus: expected servos without a hardware error, found {'; '.join(ill)}; remove the "
+            "cause (load, heat, supply), then reboot: switch the supply off and on"
+        )
     rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()

@@ -44,7 +44,9 @@ class DryRun:
         """Look at antennae and supervisor, at a time since the beginning [s], once a tick."""
         if not self._waits:
             return
-        if self.asks:
+        if latched := _latched(out):
+            self._give_up(t, latched)
+        elif self.asks:
             self._follow(t, out)
         elif self._first < math.inf:
             self._ask(t)
@@ -74,6 +76,12 @@ class DryRun:
 
     def _give_up(self, t: float, why: str) -> None:
         self._waits, self.refusal, self.end = False, why, t
+
+
+def _latched(out: Outputs | None) -> str:
+    """A hardware error, which keeps torque off until a reboot; empty if there is none."""
+    found = () if out is None or out.torque else out.causes
+    return "; ".join(a.text for a in found if a.present and a.cause is Cause.SERVO_ERROR)
 
 
 def _ill(out: Outputs | None) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from antennate.hardware.driving.session import Session
@@ -134,6 +134,11 @@ class Report:
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,
             "broken_answers": answers.bad_crc,
+            "echoes": answers.echoes,
+            "margins": {
+                name: round(share, 3)
+                for name, share in asdict(session.actuators.state.margins).items()
+            },
             "commands_sent": session.tally.sent,
             "commands_limited": session.tally.limited,
             "commands_refused": session.control.refused,

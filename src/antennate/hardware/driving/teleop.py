@@ -20,7 +20,7 @@ from antennate.params.base import paths_of
 from antennate.params.control import ControlParams
 from antennate.params.dead_man import DeadManParams
 from antennate.params.setup import TeleopParams
-from antennate.robots.readers import SIMULATION_ALONE
+from antennate.robots.readers import UNDRIVEN
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
@@ -48,7 +48,7 @@ class TeleopConfig(DriveConfig):
     """The configuration of `drive`, and the numbers of teleoperation; `controller` is not used."""
 
     unread: ClassVar[tuple[str, ...]] = (
-        *SIMULATION_ALONE,
+        *UNDRIVEN,
         "controller",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.{path}" for path in UNREAD[TELEOP]),

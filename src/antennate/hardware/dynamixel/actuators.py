@@ -9,16 +9,15 @@ import numpy as np
 
 from antennate.errors import AntennateError
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.answers import MOTION_BUDGET
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import READ_ALL
+from antennate.params.safety import FollowingParams
 from antennate.types import Floats, JointCommand
-
-_GOAL = XC430_W240["goal_position"]
-"""At the same address in all models."""
 
 
 class DynamixelActuators:
@@ -27,11 +26,18 @@ class DynamixelActuators:
     Any packet feeds the watchdogs of the servos: nothing is sent but by the calls below.
     """
 
-    def __init__(self, bus: Bus, joints: Joints, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        joints: Joints,
+        clock: Callable[[], float],
+        following: FollowingParams | None = None,
+    ) -> None:
         self.bus, self.joints = bus, joints
         self.tally, self.robot = bus.tally, joints.robot
-        self.state = ServoMonitor(bus, joints.ids, clock)
+        self.state = ServoMonitor(bus, joints.ids, clock, modes=self.robot.modes)
         self.turns = LegTurns(bus, joints)
+        self.following = Following(joints, following or FollowingParams(), self.state.well)
         self.left_on: list[int] = []
         self._now = clock
         self._goals: Floats | None = None
@@ -73,14 +79,18 @@ class DynamixelActuators:
         """Where everything stands [ticks]."""
         bus, ids = self.bus, self.joints.ids
         self.turns.reset()
+        self.following.disarm()
         bringup.require_models(bus, self.joints.models)
-        bringup.arm_watchdogs(bus, ids)
-        bringup.limit_speed(bus, self.joints.profiles)
-        bringup.allow_full_pwm(bus, ids)
-        stood = bringup.hold_here(bus, ids)
+        bringup.require_modes(bus, self.robot.modes)
+        torque.arm_watchdogs(bus, ids)
+        torque.limit_speed(bus, self.joints.profiles)
+        limits = torque.allow_full_pwm(bus, ids)
+        stood = torque.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), command)
-        present = bringup.enable(bus, ids)
-        return np.array([present[servo] for servo in ids], float)
+        present = torque.enable(bus, ids)
+        place = np.array([present[servo] for servo in ids], float)
+        self.following.arm(place, limits)
+        return place
 
     def disable(self, again: bool = False) -> list[int]:
         """Torque off, group by group, verified: ids that did not confirm it.
@@ -89,15 +99,16 @@ class DynamixelActuators:
             PortError: Only with `again`: the bus is gone.
         """
         if again:
-            self.left_on = bringup.disable(self.bus, self.left_on, 1, MOTION_BUDGET)
+            self.left_on = torque.disable(self.bus, self.left_on, 1, READ_ALL)
             return list(self.left_on)
         self._goals = None
         self.turns.reset()
+        self.following.rest()
         self.state.arm(False)
         self.left_on = []
         for group in self.joints.in_order_of_release:
             try:
-                self.left_on += bringup.disable(self.bus, group)
+                self.left_on += torque.disable(self.bus, group)
             except Exception as error:  # noqa: BLE001 the next group has its turn whatever happens
                 self.left_on += group
                 self.state.tracebacks.keep(self._now(), error)
@@ -120,7 +131,7 @@ class DynamixelActuators:
         if goals is None:
             return 0
         pairs = zip(self.joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
-        self.bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})
+        torque.send_goals(self.bus, dict(pairs))
         if self._goals is not None:
             self._goals = goals
         return slow
@@ -150,8 +161,25 @@ class DynamixelActuators:
         self.turns.step(self._goals, self.state.positions, may_begin)
 
     def look(self) -> None:
-        """Read all positions, and a little more in turn."""
-        self.state.loose = self.turns.loose
-        self.state.step()
-        ticks = [self.state.positions.get(servo, math.nan) for servo in self.joints.ids]
-        self.state.angles = tuple(self.joints.angles(np.array(ticks)).tolist())
+        """Read all positions, and a little more in turn; judge whether joints follow."""
+        state, ids, began = self.state, self.joints.ids, self._now()
+        state.loose = self.turns.loose
+        state.step(tuple(ids[at] for at in self.following.suspects))
+        ticks = np.array([state.positions.get(servo, math.nan) for servo in ids])
+        state.angles = tuple(self.joints.angles(ticks).tolist())
+        if self._goals is not None:
+            idle = {*state.watchdogs, *state.disarmed}  # which is why they do not follow
+            unknown = np.array([state.missed[servo] > 0 or servo in idle for servo in ids])
+            self._judge((began, state.read_at), np.where(unknown, math.nan, ticks))
+
+    def _judge(self, span: tuple[float, float], ticks: Floats) -> None:
+        """Whether joints follow, unless they stand for legs that forget their turns."""
+        state, following = self.state, self.following
+        if self._goals is None or self.turns.standing:
+            following.rest()
+            return
+        following.step(span, self._goals, ticks)
+        if state.drive is not None:
+            servo, pwm, position = state.drive
+            following.drive(self._now(), self.joints.ids.index(servo), pwm, position)
+        state.joints, state.margins = following.faults, following.margins

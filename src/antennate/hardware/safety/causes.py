@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from antennate.hardware.safety.diagnosis import Finding
-from antennate.types import Contact, Maneuver
 
 
 class State(IntEnum):
@@ -39,6 +38,7 @@ class Cause(Enum):
     REBOOT = (State.HOLD, "the antenna board has restarted")
     LOST = (State.HOLD, "no good reading for too long")
     STUCK = (State.HOLD, "a channel repeats one reading")
+    NOISE = (State.HOLD, "noise hides what a flex sensor reads")
     OPEN = (
         State.HOLD,
         "a channel floats: its wire is open, or its flex sensor bent far beyond its calibration",
@@ -61,6 +61,10 @@ class Cause(Enum):
     BUS_ERROR = (State.FAULT, "the servo bus does not work")
     WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
     DISARMED = (State.FAULT, "servos have lost their torque or their watchdog, as by a restart")
+    NOT_FOLLOWING = (State.FAULT, "joints do not follow their goals")
+    OUT_OF_LIMITS = (State.FAULT, "joints are beyond their limits")
+    IMPOSSIBLE_SPEED = (State.FAULT, "joints seem to move faster than their servos can")
+    WRONG_MODE = (State.FAULT, "servos are in another operating mode than they were given")
     NOT_READY = (State.FAULT, "something speaks against arming")
     PAUSE = (State.FAULT, "the loop stood still, or its clock did")
     SUPPLY_OFF = (State.OFF, "the supply is empty")
@@ -85,19 +89,26 @@ OF_CONTROLLER = frozenset(
     {Cause.FAILED, Cause.UNDECIDED, Cause.BAD_ACTION, Cause.BAD_COMMAND, Cause.UNKNOWN_CONTACT}
 )
 """Causes in the controller: each ends as soon as its decision is valid again."""
-CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED})
+OF_JOINTS = frozenset(
+    {Cause.NOT_FOLLOWING, Cause.OUT_OF_LIMITS, Cause.IMPOSSIBLE_SPEED, Cause.WRONG_MODE}
+)
+"""Causes that are looked for while servos have torque, and anew from each arm event on."""
+CURED_BY_ARMING = OF_JOINTS | {Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED}
 """Causes that do not prevent an arm event."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Inputs:
     """Inputs of the supervisor in one tick, after the controller's step.
+
+    None has a default: one that is forgotten is an error in the first tick, not health.
 
     Attributes:
         age: Age of the newest valid sample [s]; inf if there is none.
         valid: Valid samples that arrived since the tick before, without those that were too old.
         refused: Samples since then that were not valid.
         findings: Of the left and the right channel.
+        noise: Size and frequency of the noise of a channel that is NOISE, left and right.
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
         contact: The contact that it was decided on, left and right.
@@ -112,6 +123,10 @@ class Inputs:
         watchdogs: Ids of servos stopped by their watchdog.
         disarmed: Ids of servos that have lost their torque or their watchdog while armed.
         supply: Voltage of the supply [V], NaN if unknown.
+        behind: Joints that do not follow their goals, in words by servo id.
+        outside: Joints beyond their limits, likewise.
+        leaps: Joints that have moved faster than they can, likewise.
+        modes: Servos in a wrong operating mode, likewise.
         drift: How far resting readings have drifted, empty if not far.
         objections: Reasons not to arm, such as a failed touch check or unknown firmware.
         unrecorded: Whether a record that is required is not kept.
@@ -122,28 +137,33 @@ class Inputs:
 
     age: float
     valid: int
+    refused: int
     findings: tuple[Finding, Finding]
+    noise: tuple[str, str]
     decided_at: float
+    maneuver: int
+    contact: tuple[int, int]
+    bad_command: str
+    failure: str
+    resets: int
+    reset_reason: str
+    board_error: str
+    missed: Mapping[int, int]
+    servo_errors: Mapping[int, str]
+    bus_error: str
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
     supply: float
-    maneuver: int = Maneuver.HOLD
-    contact: tuple[int, int] = (Contact.UNKNOWN, Contact.UNKNOWN)
-    bad_command: str = ""
-    failure: str = ""
-    refused: int = 0
-    resets: int = 0
-    reset_reason: str = ""
-    board_error: str = ""
-    missed: Mapping[int, int] = field(default_factory=dict[int, int])
-    servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
-    bus_error: str = ""
-    watchdogs: tuple[int, ...] = ()
-    disarmed: tuple[int, ...] = ()
-    drift: str = ""
-    objections: tuple[str, ...] = ()
-    unrecorded: bool = False
-    stop: bool = False
-    released: bool = False
-    arm: bool = False
+    behind: Mapping[int, str]
+    outside: Mapping[int, str]
+    leaps: Mapping[int, str]
+    modes: Mapping[int, str]
+    drift: str
+    objections: tuple[str, ...]
+    unrecorded: bool
+    stop: bool
+    released: bool
+    arm: bool
 
 
 @dataclass(frozen=True, slots=True)

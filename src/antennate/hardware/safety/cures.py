@@ -12,6 +12,7 @@ _BUS = "check cables, plugs and supply of the servos (`antennate doctor`)"
 _BOARD = "check cable, supply and network of the antenna board (`antennate doctor`)"
 _WIRE = "check wires and plugs of that antenna (`antennate doctor`)"
 _SUPPLY = "charge or change the battery"
+_JOINT = "take the load off, turn that joint by hand without torque"
 _CODE = "mend the controller; `tracebacks` in result.json says where it failed"
 
 CURES = MappingProxyType(
@@ -27,7 +28,11 @@ CURES = MappingProxyType(
         Cause.STALE: f"{_BOARD}; close other programs",
         Cause.REBOOT: _BOARD,
         Cause.LOST: _WIRE,
-        Cause.STUCK: f"{_WIRE}; switch the antenna board off and on",
+        Cause.STUCK: f"{_WIRE}; switch the antenna board off and on; if it is stuck at its highest "
+        "reading alone, the attenuation of the converter is not set",
+        Cause.NOISE: "keep the wires of that antenna away from mains, motors and servo cables; "
+        "join the grounds of board, supply and computer; put 100 nF from the pin to ground; an "
+        "open wire hums, too (`antennate doctor`)",
         Cause.OPEN: f"{_WIRE}; if it bends farther than when it was calibrated, calibrate again",
         Cause.SHORT_LO: f"{_WIRE}; is the flex sensor still on them?",
         Cause.SHORT_HI: f"{_WIRE}; where do they touch the supply?",
@@ -47,6 +52,10 @@ CURES = MappingProxyType(
         Cause.BUS_ERROR: f"check the adapter of the servo bus and its cable; {_BUS}",
         Cause.WATCHDOG: f"close other programs; then {_ARM}",
         Cause.DISARMED: f"{_BUS}; then {_ARM}",
+        Cause.NOT_FOLLOWING: f"{_JOINT}: is its gear or horn loose? {_BUS}; then {_ARM}",
+        Cause.OUT_OF_LIMITS: f"{_JOINT} back within its limits; then {_ARM}",
+        Cause.IMPOSSIBLE_SPEED: f"change that servo if it happens again; {_BUS}; then {_ARM}",
+        Cause.WRONG_MODE: "`antennate doctor --fix` sets it; does another program use the bus?",
         Cause.NOT_READY: "do what stands in its brackets",
         Cause.PAUSE: f"close other programs, let nothing suspend the computer; then {_ARM}",
         Cause.SUPPLY_OFF: _SUPPLY,

@@ -111,9 +111,12 @@ class Supervisor:
         found: dict[Cause, str] = {}
         if not 0.0 <= inputs.age <= params.stale_age:
             found[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
-        for side, finding in zip(("left", "right"), inputs.findings, strict=True):
+        for side, finding, noise in zip(
+            ("left", "right"), inputs.findings, inputs.noise, strict=True
+        ):
             if (cause := OF_FINDING.get(finding)) is not None:
-                found[cause] = f"{found[cause]}, {side}" if cause in found else side
+                text = f"{side} {noise}" if noise else side
+                found[cause] = f"{found[cause]}, {text}" if cause in found else text
         self._boots(now, inputs, found)
         self.meter.step(now, inputs.valid)
         if self.meter.wrong:
@@ -150,9 +153,15 @@ class Supervisor:
         _name(found, Cause.SILENT_SERVO, silent)
         _name(found, Cause.WATCHDOG, inputs.watchdogs)
         _name(found, Cause.DISARMED, inputs.disarmed)
-        if inputs.servo_errors:
-            errors = sorted(inputs.servo_errors.items())
-            found[Cause.SERVO_ERROR] = "; ".join(f"servo {i}: {text}" for i, text in errors)
+        for cause, words in (
+            (Cause.SERVO_ERROR, inputs.servo_errors),
+            (Cause.NOT_FOLLOWING, inputs.behind),
+            (Cause.OUT_OF_LIMITS, inputs.outside),
+            (Cause.IMPOSSIBLE_SPEED, inputs.leaps),
+            (Cause.WRONG_MODE, inputs.modes),
+        ):
+            if words:
+                found[cause] = "; ".join(f"servo {i}: {text}" for i, text in sorted(words.items()))
         if inputs.bus_error:
             found[Cause.BUS_ERROR] = inputs.bus_error
 
@@ -206,7 +215,7 @@ class Supervisor:
         return tuple(sorted(against - CURED_BY_ARMING, key=lambda c: (-c.severity, c.name)))
 
     def _rearm(self, present: dict[Cause, str]) -> None:
-        for cured in (Cause.WATCHDOG, Cause.DISARMED):
+        for cured in CURED_BY_ARMING - {Cause.UNKNOWN_CONTACT}:
             present.pop(cured, None)
         self._latched.clear()
         for repeats in (self._holds, self._failures, self._reboots):

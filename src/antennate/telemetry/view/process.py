@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 from importlib.util import find_spec
 
-from antennate.errors import BadInputError, MissingPackageError, WorkerError
+from antennate.errors import BadInputError, MissingPackageError, WorkerError, reason
 from antennate.messages import extra
 from antennate.telemetry.view.channel import END, FAILED, READY, Channel
 from antennate.telemetry.view.foxglove import require_foxglove
@@ -168,7 +168,7 @@ def _listener(port: int, flag: str) -> socket.socket:
     except OSError as error:
         listener.close()
         raise BadInputError(
-            f"view: expected port {port} of {HOST} free, found: {error.strerror}; "
+            f"view: expected port {port} of {HOST} free, found: {reason(error)}; "
             f"choose another with {flag}, 0 takes any"
         ) from None
     return listener

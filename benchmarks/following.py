@@ -1,0 +1,119 @@
+"""How near does a healthy robot come to the bounds by which a joint that does not follow is named?
+
+Trials of `tunnel` in simulation: in every tick the simulated servos tell goal, position and drive,
+as real ones would, and `Following` judges them. Below 1 nothing is named:
+
+    python benchmarks/following.py --trials 200 --seed 1 --json > margins.json
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from antennate.control.loop import run_loop
+from antennate.control.registry import make_controller
+from antennate.experiments.tunnel.monitor import TrialMonitor
+from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.hardware.dynamixel.following import Following
+from antennate.hardware.joints import Joints
+from antennate.params.safety import FollowingParams
+from antennate.robots.servos import FULL_DRIVE
+from antennate.sim.scenes.registry import make_scene
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import LOOK_EVERY, draw_trial
+from antennate.types import AntennaFrame, JointCommand
+
+
+class Trial:
+    """One trial, judged tick by tick.
+
+    Attributes:
+        following: The judge.
+        saturated: Ticks in which a joint that was judged had full drive.
+        status: How it ended.
+    """
+
+    def __init__(self, config: TunnelConfig, body: SimRobot, name: str, number: int) -> None:
+        scene, period = make_scene(config.scene, config.tunnel), config.control.period
+        start = draw_trial(config, scene, number, config.control.gait, period)
+        body.load(0, start.world, start.chance)
+        self._config, self._body, self._joints = config, body, Joints(config.robot)
+        self._control = make_controller(name, config.control, config.robot)
+        self._control.reset(np.array([0]), start.phase)
+        self._monitor = TrialMonitor(config.seed, number, name, start.scene, [], config.time_limit)
+        kinds = [config.robot.servos.of(kind) for kind in config.robot.servo_names]
+        self._stall = np.array([kind.stall_torque for kind in kinds])
+        self.following = Following(self._joints, FollowingParams())
+        self._goals = self._joints.positions(body.world(0).drives())
+        self.following.arm(self._goals, dict.fromkeys(config.robot.ids, FULL_DRIVE))
+        self.ticks = self.saturated = 0
+        self.status = ""
+        run_loop(body, self._control, period, self._go_on)
+
+    def _go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
+        """The last goals have moved the joints; judge that, and take the next ones."""
+        world, self.ticks = self._body.world(0), self.ticks + 1
+        positions = np.rint(self._joints.positions(world.drives()))
+        sign = np.array(self._config.robot.directions)
+        pwm = np.rint(FULL_DRIVE * sign * world.drive_torques() / self._stall).astype(int)
+        self.following.step((world.t, world.t), self._goals, positions)
+        for at in self.following.suspects:
+            self.following.drive(world.t, at, int(pwm[at]), int(positions[at]))
+            self.saturated += abs(int(pwm[at])) >= FULL_DRIVE - 1
+        self._goals = self._joints.ticks(command).astype(float)
+        if self._body.failures:
+            self.status = "invalid"
+        elif self.ticks % LOOK_EVERY == 0 or world.t >= self._config.time_limit:
+            maneuver = int(self._control.maneuver[0])
+            self.status = self._monitor.look(world, world.t, maneuver) or ""
+        return not self.status
+
+
+def trials(seed: int, numbers: range, name: str) -> Iterator[dict[str, Any]]:
+    """Each trial: how it ended, its margins, and the causes that were named."""
+    config = TunnelConfig(seed=seed)
+    body = SimRobot(1, config.robot, config.control.period, config.physics.timestep)
+    for number in numbers:
+        trial = Trial(config, body, name, number)
+        faults = {key: words for key, words in asdict(trial.following.faults).items() if words}
+        margins = {key: round(share, 4) for key, share in asdict(trial.following.margins).items()}
+        yield {
+            "trial": number,
+            "status": trial.status,
+            "ticks": trial.ticks,
+            "at_full_drive": trial.saturated,
+            "margins": margins,
+            "named": faults,
+        }
+
+
+def main() -> None:
+    """Run the trials and print the largest share of each bound."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--trials", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="number of the first trial")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--controller", default="closed")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and no lines")
+    args = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    for row in trials(args.seed, range(args.first, args.first + args.trials), args.controller):
+        rows.append(row)
+        if not args.json:
+            print(row, flush=True)
+    found = {
+        "trials": len(rows),
+        "ticks": sum(row["ticks"] for row in rows),
+        "ticks_at_full_drive": sum(row["at_full_drive"] for row in rows),
+        "named": sum(bool(row["named"]) for row in rows),
+        "largest": {key: max(row["margins"][key] for row in rows) for key in rows[0]["margins"]},
+    }
+    print(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
