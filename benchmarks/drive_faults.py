@@ -197,8 +197,8 @@ def worst(found: dict[str, Any]) -> bool:
 
 
 def without_log(found: dict[str, Any]) -> bool:
-    """It walks on, and says that its log is not whole."""
-    return walks_on(found) and found["log_complete"] is False
+    """It walks on, and says that its log ended before it did."""
+    return walks_on(found | {"code": 0}) and (found["code"], found["log_cut"]) == (2, True)
 
 
 def holds(*words: str) -> Check:

@@ -7,7 +7,7 @@ import platform
 import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 Spread = dict[str, float]
 """Median, smallest and largest of several repetitions, and their number."""
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # programs start as on a computer that keeps it
-PACKAGES = ("antennate", "mujoco-core", "numpy", "numba", "distributed")
+PACKAGES = ("antennate", "mujoco", "mujoco-core", "numpy", "numba", "distributed")
 
 
 def spread(values: Sequence[float], digits: int = 4) -> Spread:
@@ -61,10 +61,8 @@ def machine() -> dict[str, Any]:
     """What the figures of a part depend on beside the code."""
     packages = {}
     for name in PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             packages[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            packages[name] = "not installed"
     return {
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),

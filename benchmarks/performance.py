@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import cores
+import engines
 import growth
 import peers
 import starting
@@ -35,6 +36,8 @@ def gpu(quick: bool) -> dict[str, Any]:
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "trial": trial.measure,
     "tick": trial.measure_ticks,
+    "engines": engines.measure,
+    "agreement": engines.measure_agreement,
     "growth": growth.measure,
     "cores": cores.measure,
     "whole": starting.measure_whole,
@@ -43,14 +46,18 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "peers": peers.measure,
     "gpu": gpu,
 }
-USUAL = tuple(name for name in PARTS if name != "gpu")
+USUAL = tuple(name for name in PARTS if name not in ("agreement", "gpu"))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="small sizes, to see that it works")
     parser.add_argument(
-        "--parts", nargs="+", choices=PARTS, default=USUAL, help="all but gpu by default"
+        "--parts",
+        nargs="+",
+        choices=PARTS,
+        default=USUAL,
+        help="all but agreement, an hour, and gpu by default",
     )
     parser.add_argument("--out", type=Path, default=RESULT, help="file to write")
     options = parser.parse_args()

@@ -33,7 +33,7 @@ def command(name: str) -> Command:
 
 def section(page: Command) -> Iterator[str]:
     """The lines of one command."""
-    free = "".join(f" {option.metavar}" for option in page.others if option.positional)
+    free = "".join(f" {option.free}" for option in page.others if option.free)
     yield f"## `antennate {page.name}`"
     yield page.description
     yield f"```sh\nuv run antennate {page.name}{free} [OPTIONS]\n```"
@@ -49,7 +49,7 @@ def section(page: Command) -> Iterator[str]:
 
 def line(option: Option) -> str:
     """The row of an option."""
-    head = option.metavar if option.positional else option.offered
+    head = option.free or option.offered
     if option.metavar and not option.positional:
         metavar = "NAME" if option.choices else option.metavar
         head += f" {metavar}{'...' if option.many else ''}"

@@ -62,7 +62,7 @@ def machines(parts: Mapping[str, Any]) -> str:
                 about["date"],
                 known.index(about["machine"]) + 1,
                 f"{about['seconds']} s",
-                about["others"],
+                "not measured" if about["others"] is None else about["others"],
                 f"{about['load_before']}, {about['load_after']}",
             )
         )
@@ -74,7 +74,7 @@ def machines(parts: Mapping[str, Any]) -> str:
             f"Machine {number}: {machine['cpu']}, {machine['cores']} cores, {machine['system']}, "
             f"Python {machine['python']}; {packages}.\n"
         )
-    busy = [name for name in parts if parts[name]["about"]["others"] > IDLE]
+    busy = [name for name in parts if (parts[name]["about"]["others"] or 0.0) > IDLE]
     if busy:
         lines.append(
             f"**The machine was not idle** while {', '.join(busy)} ran: other programs kept more "
@@ -348,9 +348,68 @@ GPU_HEAD = """\
 `antennate tunnel --engine warp` steps thousands of tunnels at once ([how](gpu.md)). Published for
 FlyGym 2 on a GPU: about 60 times real time.
 """
+
+
+def engines(figures: Figures) -> str:
+    rows = [
+        (engine, at_once, told(one["over_bare_engine"]), told(one["realtime_factor"]))
+        for engine, cases in figures["engines"].items()
+        for at_once, one in cases.items()
+    ]
+    steps = figures["step_us"]
+    locked, other = steps
+    columns = ("engine", "trials at once", "over bare engine", "realtime factor")
+    return f"""\
+{ENGINES_HEAD}
+{table(columns, rows)}
+A physics step takes {told(steps[locked])} µs on {locked} and {told(steps[other])} µs on {other}:
+**{told(figures["step_over_other"])} times** as long. The locked engine is {locked}, since other
+packages need it beside ours; [how to take the other
+one](install.md#beside-other-packages-of-the-engine).
+"""
+
+
+def agreement(figures: Figures) -> str:
+    """How far engines and instructions disagree on the same trials."""
+    names = list(next(iter(figures["ways"].values())))
+    ways = [
+        (way, *(f"{of[n]['successes']}, {of[n]['time_s']} s" for n in names))
+        for way, of in figures["ways"].items()
+    ]
+    pairs = [
+        (
+            one["controller"],
+            *one["ways"],
+            one["other_end"],
+            f"{one['difference_s']:+} ({one['difference_95'][0]} to {one['difference_95'][1]})",
+        )
+        for one in figures["pairs"]
+    ]
+    most = max(one["other_end"] for one in figures["pairs"])
+    widest = max(figures["pairs"], key=lambda one: abs(one["difference_s"]))
+    return f"""\
+{AGREEMENT_HEAD}
+{figures["trials"]} trials of the default `tunnel`, seed {figures["seed"]}: successes and
+restricted mean time. *Old instructions*: NumPy without {figures["old_instructions"]}.
+
+{table(("way", *names), ways)}
+{table(("controller", "first", "second", "other end", "difference of time, 95 % [s]"), pairs)}
+No two ways give the same numbers: the last bits of a sum differ, and each collision amplifies that.
+The largest difference of restricted mean times is {abs(widest["difference_s"])} s, the most trials
+that end in another way are {most} of {figures["trials"]}.
+**A difference between controllers that is not larger than this is a tie.**
+"""
+
+
+ENGINES_HEAD = "## Two engines\n"
+AGREEMENT_HEAD = """\
+## How far engines and processors disagree
+"""
 SECTIONS = {
     "trial": (trial, "## A trial beside its physics\n"),
     "tick": (tick, "## A control tick\n"),
+    "engines": (engines, ENGINES_HEAD),
+    "agreement": (agreement, AGREEMENT_HEAD),
     "growth": (growth, "## How the cost grows\n"),
     "cores": (cores, "## Two cores: processes or threads\n"),
     "whole": (whole, "## The main job\n"),

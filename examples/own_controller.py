@@ -1,7 +1,7 @@
 """A controller of one's own: it follows the wall on its left, and turns away when it is pressed.
 
 uv run antennate tunnel --controllers open closed examples/own_controller.py:OwnController
-uv run antennate drive --controller examples/own_controller.py:OwnController --config robot.toml
+uv run antennate drive --controller examples/own_controller.py:OwnController
 """
 
 import numpy as np

@@ -5,18 +5,18 @@ from __future__ import annotations
 import sys
 import time
 
-from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import MOTION, Timing
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.safety import torque
 
 IDS = range(1, 20)
 
 
 def main(path: str) -> None:
     bus = Bus(SerialPort(path, 1_000_000), Timing(gap=0.02))
-    bringup.enable(bus, IDS)
-    bringup.arm_watchdogs(bus, IDS)
+    torque.enable(bus, IDS)
+    torque.arm_watchdogs(bus, IDS)
     far = {i: (4000).to_bytes(4, "little") for i in IDS}
     while True:
         bus.write_all(116, far)

@@ -31,6 +31,7 @@ from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
+from antennate.hardware.safety import torque
 from antennate.robots.spec import RobotSpec
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
@@ -294,37 +295,37 @@ SERVOS = [
     ),
     Guard(
         "speed limit on the servos",
-        put(bringup, "limit_speed", constant(None)),
+        put(torque, "limit_speed", constant(None)),
         test_settings.test_B10_profiles_that_another_program_left_are_set_before_torque,
     ),
     Guard(
         "present goals on torque-on",
-        around(bringup, "hold_here", where_goals_were),
+        around(torque, "hold_here", where_goals_were),
         test_bus.test_B10_torque_goes_on_without_a_jump,
     ),
     Guard(
         "present goals before watchdogs are on",
-        put(bringup, "hold_here", constant({})),
+        put(torque, "hold_here", constant({})),
         test_bus.test_B9_watchdogs_are_rearmed_in_order_with_goals_where_servos_stand,
     ),
     Guard(
         "writes are read back",
-        around(bringup, "read_register", as_wished),
+        around(torque, "read_register", as_wished),
         test_bus.test_B9_latched_watchdogs_are_seen_and_rearmed_in_place,
     ),
     Guard(
         "homing offset in extended mode",
-        put(bringup, "EXTENDED_MODE", -1),
+        put(torque, "EXTENDED_MODE", -1),
         test_bus.test_B9_extended_mode_with_an_offset_is_refused,
     ),
     Guard(
         "torque off is confirmed",
-        put(bringup, "disable", constant([])),
+        put(torque, "disable", constant([])),
         test_bus.test_B19_torque_off_is_confirmed_and_what_did_not_is_named,
     ),
     Guard(
         "torque off is told again",
-        around(bringup, "disable", told_once),
+        around(torque, "disable", told_once),
         partial(test_release.test_B19_a_servo_is_told_five_times_to_let_go, 4, []),
     ),
     Guard(
@@ -336,7 +337,7 @@ SERVOS = [
     ),
     Guard(
         "watchdogs armed",
-        around(bringup, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
+        around(torque, "arm_watchdogs", lambda old, master, ids: old(master, ids, 0)),
         partial(controller_fails, 11.1),
     ),
     Guard(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import test_approach
 import test_bad_controllers
+import test_deadlines
 import test_dynamixel_bus as test_bus
 import test_jog
 import test_loop
@@ -27,9 +28,10 @@ from antennate.hardware.driving import session
 from antennate.hardware.driving.decision import StepResult
 from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.dynamixel import bringup, monitor
+from antennate.hardware.dynamixel import monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import deadlines, torque
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
 
@@ -78,6 +80,13 @@ def an_exception_alone(old: Any, self: Any, number: int, frame: Any) -> None:
         self.received = False
 
 
+def unasked(self: Any, time: float) -> None:
+    end = self.clock.now() + time
+    while self.actuators.enabled and self.clock.now() < end:
+        self.actuators.command(None)
+        self.clock.sleep_until(self.clock.now() + self.period)
+
+
 def forget_the_loss(self: Any, time: float) -> None:
     self.lost = False
 
@@ -103,12 +112,12 @@ SESSION = [
     ),
     Guard(
         "watchdog of a joint moved by keys",
-        put(bringup, "arm_watchdogs", constant(None)),
+        put(torque, "arm_watchdogs", constant(None)),
         test_jog.test_a_program_that_dies_leaves_a_joint_that_stands,
     ),
     Guard(
         "speed and force of a joint moved by keys",
-        put(bringup, "limit_speed", constant(None)),
+        put(torque, "limit_speed", constant(None)),
         test_jog.test_it_turns_by_its_step_slowly_and_lets_go,
     ),
     Guard(
@@ -135,6 +144,21 @@ SESSION = [
         "command held before the torque goes",
         put(session.Session, "stand", constant(None)),
         test_release.test_B19_the_pose_is_held_for_as_long_as_told_before_the_torque_goes,
+    ),
+    Guard(
+        "supervisor asked while the command is held",
+        put(session.Session, "stand", unasked),
+        test_deadlines.test_the_supervisor_is_asked_while_a_robot_stands,
+    ),
+    Guard(
+        "longest time that the command is held",
+        put(deadlines, "STAND", 3.0),
+        test_deadlines.test_a_robot_stands_for_two_seconds_at_most,
+    ),
+    Guard(
+        "order of deadlines",
+        put(deadlines, "require_order", constant(None)),
+        test_deadlines.test_a_session_refuses_them_too,
     ),
     Guard(
         "no goal before the release of a lost bus",

@@ -28,12 +28,29 @@ def healthy(now: float, **changes: Any) -> Inputs:
     settings: dict[str, Any] = {
         "age": 0.005,
         "valid": 1,
+        "refused": 0,
         "findings": (Finding.OK, Finding.OK),
         "noise": ("", ""),
         "decided_at": now,
         "maneuver": Maneuver.FORWARD,
         "contact": (Contact.FREE, Contact.FREE),
+        "bad_command": "",
+        "failure": "",
+        "resets": 0,
+        "reset_reason": "",
+        "board_error": "",
+        "missed": {},
+        "servo_errors": {},
+        "bus_error": "",
+        "watchdogs": (),
+        "disarmed": (),
         "supply": 12.0,
+        "drift": "",
+        "objections": (),
+        "unrecorded": False,
+        "stop": False,
+        "released": False,
+        "arm": False,
     }
     return Inputs(**(settings | changes))
 
@@ -115,6 +132,7 @@ class Rig:
                         "age": age,
                         "valid": fresh,
                         "findings": tuple(film.reading.finding for film in self.films),
+                        "noise": tuple(film.noise_text for film in self.films),
                         "failure": failure,
                     }
                     | known

@@ -23,7 +23,7 @@ def tell_and_wait(task: int) -> None:
 
 
 def trouble(number: int, folder: str) -> int:
-    """Note that it runs; 3 kills its worker, 5 never ends, 6 raises."""
+    """Note that it runs; 3 kills its worker, 5 never ends, 6 and 8 raise."""
     with (Path(folder) / str(number)).open("a") as file:
         file.write("x")
     if number == 3:
@@ -32,6 +32,8 @@ def trouble(number: int, folder: str) -> int:
         time.sleep(120.0)
     if number == 6:
         raise ValueError("six")
+    if number == 8:
+        raise KeyboardInterrupt
     return number * number
 
 

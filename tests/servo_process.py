@@ -32,18 +32,9 @@ class Served:
 
 @contextmanager
 def served(servos: str, *more: str) -> Iterator[Served]:
-    """Serve while the block runs."""
-    command = [
-        sys.executable,
-        "-m",
-        "antennate",
-        "twin",
-        "--servos",
-        servos,
-        "--orders",
-        "-",
-        *more,
-    ]
+    """Serve while the block runs; `more` begins with further servos, if there are any."""
+    head = [sys.executable, "-m", "antennate", "twin", "--orders", "-"]
+    command = [*head, "--servos", servos, *more]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as program:
         try:

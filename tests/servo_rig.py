@@ -27,8 +27,8 @@ def servos() -> list[Servo]:
 class Rig:
     """The servos, the wire and its clock, the master."""
 
-    def __init__(self, fast: bool = True, loss: float = 0.0, speaks_fast: bool = True) -> None:
-        self.twin = ServoBus(servos(), loss=loss, fast=speaks_fast)
+    def __init__(self, fast: bool = True, loss: float = 0.0) -> None:
+        self.twin = ServoBus(servos(), loss=loss)
         self.link = SimulatedWire(self.twin)
         self.bus = Bus(self.link, fast=fast, clock=self.link.now)
 
@@ -39,6 +39,11 @@ class Rig:
         took = self.link.now() - begin
         self.link.sleep(max(period - took, 0.0))
         return answers, took
+
+    def say_firmware(self, version: int) -> None:
+        """All servos have this firmware; before 45, or 46 of the XL330, they take no fast reads."""
+        for servo in self.twin.servos:
+            servo.set("firmware_version", version)
 
     def servo(self, name: int) -> Servo:
         return self.twin.servos[name - 1]

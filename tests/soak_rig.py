@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 from esp32_streams import hello
-from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD
+from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD, healthy
 
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.board import Board
-from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
+from antennate.hardware.safety.causes import Cause, Outputs, State
 from antennate.hardware.safety.diagnosis import ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact
 
 DRIFT = 50e-6
 """The board's clock against the host's, [s/s]: ages at the ticks take every value in a day."""
@@ -182,15 +182,13 @@ class Soak:
         contact = [Contact.FREE if clear and c == c else Contact.UNKNOWN for c in said]
         self._out = self._supervisor.step(
             now,
-            Inputs(
+            healthy(
+                now,
                 age=clock.age(now),
                 valid=self._body.used,
                 refused=refused,
                 findings=(self._films[0].reading.finding, self._films[1].reading.finding),
                 noise=(self._films[0].noise_text, self._films[1].noise_text),
-                decided_at=now,
-                supply=12.0,
-                maneuver=Maneuver.FORWARD,
                 contact=(contact[0], contact[1]),
                 resets=clock.resets,
                 missed={7: self._missed} if self._missed else {},

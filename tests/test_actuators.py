@@ -29,9 +29,13 @@ class Motors:
     robot = RobotSpec()
 
     def __init__(self) -> None:
-        self.state, self.tally = ActuatorState(missed={1: 0}, supply=12.0), Tally()
+        self.tally = Tally()
+        self.state = ActuatorState(
+            missed={1: 0}, errors={}, watchdogs=(), disarmed=(), supply=12.0, bus_error=""
+        )
         self.enabled, self.resting, self.broken = False, False, False
         self.left_on: list[int] = []
+        self.text = ""
         self.seen: list[JointCommand | None] = []
 
     def check(self, command: JointCommand) -> JointCommand:
@@ -48,7 +52,7 @@ class Motors:
 
     def command(self, command: JointCommand | None, time: float = math.inf) -> int:
         if self.broken:
-            raise ActuatorError("motor 1 does not obey")
+            raise ActuatorError(self.text)
         self.seen.append(command)
         return 0
 
@@ -78,14 +82,19 @@ def test_another_bus_walks_stands_and_lets_go() -> None:
     assert motors.seen[-10:] == [None] * 10  # it stands before the torque goes
 
 
-def test_a_motor_that_does_not_obey_is_a_fault_and_gets_nothing_more() -> None:
+@pytest.mark.parametrize(
+    ("text", "said"), [("motor 1 does not obey",) * 2, ("", "(ActuatorError)")]
+)
+def test_a_motor_that_does_not_obey_is_a_fault_and_gets_nothing_more(text: str, said: str) -> None:
+    """Also one that does not say why."""
     motors = Motors()
+    motors.text = text
 
     def break_it(session: Session, t: float) -> None:
         motors.broken = t > 1.0
 
     report = drive(session(motors), CONFIG, arm=True, on_tick=break_it)
     assert report.worst is State.FAULT
-    assert "motor 1 does not obey" in report.why
+    assert said in report.why
     assert motors.seen[-1] is not None  # not even to stand
     assert not motors.enabled

@@ -51,7 +51,9 @@ def test_S13_what_a_killed_program_of_the_same_number_left_is_in_nobodys_way(
     (tmp_path / f".calibration.json.{os.getpid()}").write_text("half of a calib")
     GOOD.save(tmp_path / "calibration.json")
     assert Calibration.load(tmp_path / "calibration.json") == GOOD
-    (tmp_path / f".calibration.json.{os.getpid()}").write_text("half of a calib")
-    with RunDirectory.create("calibrate", tmp_path, overwrite=True) as folder:
+    with RunDirectory.create("calibrate", tmp_path / "run") as folder:
         folder.write("calibration.json", GOOD.to_json())
-    assert Calibration.load(tmp_path / "calibration.json") == GOOD
+    (tmp_path / "run" / f".calibration.json.{os.getpid()}").write_text("half of a calib")
+    with RunDirectory.create("calibrate", tmp_path / "run", overwrite=True) as folder:
+        folder.write("calibration.json", GOOD.to_json())
+    assert Calibration.load(tmp_path / "run" / "calibration.json") == GOOD

@@ -96,7 +96,7 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     ("command", "flags"),
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
-        ("drive", "--robot --controller --calibration --esp32 --bus --arm"),
+        ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm"),
         ("wall", "--trials --seed --profiles --solver --out"),
     ],
 )
@@ -326,7 +326,7 @@ def test_bad_folders(capsys, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "config.toml").write_text("trials = 1\n")
     line = refusal(capsys, *QUICK, "--out", "mine")
-    assert "found mine/config.toml; choose another or give --overwrite" in line
+    assert "found mine/config.toml; choose another" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
 
 
@@ -373,9 +373,11 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "figures/summary.svg",
         "figures/trajectories.png",
         "figures/trajectories.svg",
+        "files.txt",
         "report.html",
         "result.json",
         "trials.csv",
+        "trials.store.jsonl",
         "versions.json",
     ]
     command, *dates = (run / "command.txt").read_text().splitlines()
@@ -404,7 +406,7 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     def refuse(name):
         raise AssertionError(f"{name} is no JSON")
 
-    assert main([*QUICK, "--controllers", "open", "closed", "--json", "--out", "run"]) == 0
+    assert main([*QUICK, "--controllers", "closed", "--json", "--out", "run"]) == 0
     text = capsys.readouterr().out
     assert text == (tmp_path / "run" / "result.json").read_text()
     result = json.loads(text, parse_constant=refuse)
@@ -624,21 +626,25 @@ def test_hints_are_typed_as_the_program_was_called(
 @pytest.mark.parametrize(
     "words", [["drive"], ["teleop"], ["record", "--marks", "0", "1"], ["doctor"]]
 )
-def test_a_robot_file_in_this_folder_is_hinted_at_where_no_port_is_named(
+def test_a_robot_file_in_this_folder_is_read_where_no_port_is_named(
     words: list[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    hint = "; robot.toml is here, --config robot.toml takes its ports"
+    hint = "; robot.toml is here, without --no-config its ports are taken"
     monkeypatch.setenv("UV", "/bin/uv")
     assert main(words) == 2
     said = capsys.readouterr().err
     assert "; `uv run antennate setup` finds it, `uv run antennate twin` simulates a robot" in said
     assert hint not in said
-    (tmp_path / "robot.toml").touch()
+    (tmp_path / "robot.toml").write_text('[ports]\nesp32 = "no-board"\nbus = "no-bus"\n')
     assert main(words) == 2
-    said = capsys.readouterr().err
+    first, *said = capsys.readouterr().err.splitlines()
+    assert first == "robot.toml of this folder is read; --no-config leaves it"
+    assert not [line for line in said if "--esp32: expected a serial port, found none" in line]
+    assert main([*words, "--no-config"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
     assert "found none" in said
     assert hint in said

@@ -62,33 +62,33 @@ SHORT = {
     "twin": "--duration 0.1",
 }
 """In case that it runs."""
-NO_JOINT = "as no joint of the robot has this servo"
-ROLL = "as legs that roll do not read it"
+NO_JOINT = ", but no joint of the robot has this servo"
+ROLL = ", but legs that roll do not read it"
 REFUSED = [
-    ("tunnel --controllers closed --control.rule.hold-time 3", "2.0, as closed does not read it"),
-    ("tunnel --controllers closed --control.rule.similar 0.2", "0.15, as closed does not read it"),
-    ("tunnel --controllers open closed --control.rule.strong 0.8", "0.7, as open and closed do"),
-    ("tunnel --controllers closed open --control.gait.turn-offset 0.2", "as closed and open do"),
-    ("tunnel --controllers open paper --control.escape.retry-time 5", "12.0, as open and paper do"),
-    ("tunnel --controllers paper --control.repetition.pressure 0.3", "0.2, as paper does not"),
-    ("tunnel --control.gait.lift.stance 1", f"0.0, {ROLL}"),
-    ("gait --gait.lift.lifted 0.2", f"0.5, {ROLL}"),
-    ("tunnel --robot.servos.xl430-w250.friction 0.05", f"0.0, {NO_JOINT}"),
-    ("gait --robot.servos.xl430-w250.p-gain 5", f"640.0, {NO_JOINT}"),
-    ("twin --robot.servos.xl430-w250.p-gain 5", f"640.0, {NO_JOINT}"),
-    ("drive --control.rule.hold-time 3", "2.0, as closed does not read it"),
-    ("drive --controller open --control.escape.turn-time 3", "2.2, as open does not read it"),
-    ("drive --control.gait in_phase", f"0.0, {ROLL}"),
-    ("teleop --control.gait.lift.share 0.4", f"0.5, {ROLL}"),
+    ("tunnel --controllers closed --control.rule.hold-time 3", ", but closed does not read it"),
+    ("tunnel --controllers closed --control.rule.similar 0.2", ", but closed does not read it"),
+    ("tunnel --controllers open closed --control.rule.strong 0.8", ", but open and closed do"),
+    ("tunnel --controllers closed open --control.gait.turn-offset 0.2", ", but closed and open do"),
+    ("tunnel --controllers open paper --control.escape.retry-time 5", ", but open and paper do"),
+    ("tunnel --controllers paper --control.repetition.pressure 0.3", ", but paper does not"),
+    ("tunnel --control.gait.lift.stance 1", ROLL),
+    ("gait --gait.lift.lifted 0.2", ROLL),
+    ("tunnel --robot.servos.xl430-w250.friction 0.05", NO_JOINT),
+    ("gait --robot.servos.xl430-w250.p-gain 5", NO_JOINT),
+    ("twin --robot.servos.xl430-w250.p-gain 5", NO_JOINT),
+    ("drive --control.rule.hold-time 3", ", but closed does not read it"),
+    ("drive --controller open --control.escape.turn-time 3", ", but open does not read it"),
+    ("drive --control.gait in_phase", ROLL),
+    ("teleop --control.gait.lift.share 0.4", ROLL),
     ("tunnel --robot.legs.reach 0.05", "only legs of the kind lifting have it"),
-    ("drive --robot.legs.limit 1.2", "as only legs of the kind lifting have it"),
+    ("drive --robot.legs.limit 1.2", "but only legs of the kind lifting have it"),
     (
         "twin --robot.pitch.kind actuated --robot.pitch.stiffness 20",
-        "30.0, as only pitch joints of the kind locked have it",
+        ", but only pitch joints of the kind locked have it",
     ),
     (
         "tunnel --controllers open --robot.antennae.kind none --robot.antenna.length 0.2",
-        "as the robot has no antennae",
+        "but the robot has no antennae",
     ),
     ("drive --robot.antennae.kind none --robot.antennae.limit 1.0", "the robot has no antennae"),
 ]
@@ -110,6 +110,61 @@ def test_a_flag_that_nothing_reads_is_refused(
     assert expected in err
     assert (f"found {value}" in err) or value == "in_phase"
     assert err.count("\n") == 1
+
+
+TURN = "expected a parameter that is read, such as {}control.escape.turn{}offset, found 0.2, but"
+WHERE = [
+    ("tunnel --controllers closed --control.gait.turn-offset 0.2", "--control.gait.turn-offset: "),
+    ("drive --control.gait.turn-offset 0.2", "--control.gait.turn-offset: "),
+    ("tunnel --config tunnel.toml", "tunnel.toml: control.gait.turn_offset: "),
+    ("study settings.toml", "settings: tunnel: control.gait.turn_offset: "),
+    ("study vary.toml", "vary: tunnel: control.gait.turn_offset: "),
+    ("design design.toml", "evaluate.tunnel.settings: tunnel: control.gait.turn_offset: "),
+]
+
+
+@pytest.mark.parametrize(("words", "place"), WHERE)
+def test_what_is_read_in_its_place_is_named_as_it_is_written_there(
+    words: str,
+    place: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    turn = "control.gait.turn_offset = 0.2\n"
+    study = 'experiment = "tunnel"\n'
+    closed = 'controllers = ["closed"]\n'
+    varied = '"tunnel.free_width" = [0.5]\n'
+    for name, text in {
+        "tunnel": closed + turn,
+        "settings": f"{study}[settings]\n{closed}{turn}[vary]\n{varied}",
+        "design": f"[search]\n{varied}[evaluate.tunnel]\nminimize = ['time_s']\n"
+        f"[evaluate.tunnel.settings]\n{closed}{turn}",
+        "vary": f'{study}[settings]\n{closed}[vary]\n"control.gait.turn_offset" = [0.2]\n',
+    }.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    assert main(words.split()) == 2
+    flag = place.startswith("--")
+    said = place + TURN.format(*(("--", "-") if flag else ("", "_")))
+    assert f" error: {said} closed does not read it\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("controller", "control", "such"),
+    [
+        ("closed", {"rule": {"hold_time": 3.0}}, "control.rule.threshold"),
+        ("open", {"escape": {"turn_time": 3.0}}, r"control\.gait\.\*"),
+        ("paper", {"repetition": {"change": 0.2}}, r"control\.rule\.\*"),
+    ],
+)
+def test_without_the_same_name_the_group_or_the_groups_that_are_read_are_named(
+    controller: str, control: dict[str, Any], such: str
+) -> None:
+    with pytest.raises(
+        ValueError, match=rf"that is read, such as .*{such}.*, found .* {controller} "
+    ):
+        TunnelConfig(controllers=(controller,), control=ControlParams.model_validate(control))
 
 
 @pytest.mark.parametrize(
@@ -146,7 +201,9 @@ def test_the_file_of_a_robot_may_hold_what_another_controller_reads(
     assert main(["drive", "--config", str(file), "--control.gait.frequency", "0.5"]) == 2
     assert "--esp32: expected a serial port" in capsys.readouterr().err
     assert main(["drive", "--config", str(file), "--control.rule.hold-time", "4"]) == 2
-    assert "--control.rule.hold-time: expected 2.0, as closed does" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "--control.rule.hold-time: expected a parameter that is read" in err
+    assert "found 4.0, but closed does not read it" in err
 
 
 def test_a_study_varies_assumptions_that_nothing_reads_but_only_those() -> None:

@@ -151,3 +151,16 @@ def test_S1_S2_what_is_wrong_with_a_wire_is_said_through_bytes(driven: Drive, ca
 def test_a_controller_of_ones_own_drives_another_process(driven: Drive) -> None:
     assert driven.result["controller"] == EXAMPLE
     assert driven.result["commands_sent"] > 150  # it walked on after the reset
+
+
+@pytest.mark.slow
+def test_B15_two_servos_of_one_id_are_named_by_the_command(tmp_path: Path) -> None:
+    with twin() as (places, fault):
+        fault("servo:7=id:8")
+        time.sleep(1.0)
+        words = [*ANTENNATE, "drive", *places, "--out", str(tmp_path / "run")]
+        run = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 2
+    (line,) = run.stderr.splitlines()
+    assert "id 7: silent, perhaps it answers as 8; id 8: two servos answer with this id" in line
+    assert not (tmp_path / "run").exists()

@@ -297,7 +297,7 @@ def test_a_drive_without_a_log_says_so(
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)
     monkeypatch.setattr("antennate.cli.viewer.__name__", "this")  # `python -m this` keeps nothing
     argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 0
+    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     out = " ".join(capsys.readouterr().out.split())
     assert "No log was kept" in out
     assert "antennate replay" not in out

@@ -6,10 +6,11 @@ import os
 import subprocess
 import sys
 import tomllib
-from importlib import metadata
 from pathlib import Path
 
 import pytest
+
+from antennate.distributions import ENGINES, engines
 
 PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
 (PIN,) = (each for each in PYPROJECT["project"]["dependencies"] if each.startswith("mujoco"))
@@ -26,11 +27,20 @@ def python(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def distribution(folder: Path, version: str) -> None:
-    """What pip leaves of an installed `mujoco`."""
-    info = folder / f"mujoco-{version}.dist-info"
+def distribution(folder: Path, version: str, name: str = "mujoco-core") -> None:
+    """What pip leaves of an installed package."""
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: mujoco\nVersion: {version}\n")
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+
+
+def both_installed(folder: Path) -> str:
+    """Beside the installed engine another version under its other name; what the refusal says."""
+    ((name, version),) = engines().items()
+    other = next(each for each in ENGINES if each != name)
+    distribution(folder, "4.0.9", other)
+    installed = {name: version, other: "4.0.9"}
+    return "found " + " and ".join(f"{each} {installed[each]}" for each in ENGINES) + ";"
 
 
 def module(folder: Path, source: str) -> None:
@@ -49,16 +59,14 @@ def refusal(folder: Path, *words: str) -> str:
 
 @pytest.mark.parametrize("words", [TUNNEL, [*TUNNEL, "--engine", "warp"], ["gait"]])
 def test_two_versions_over_one_another_are_refused(tmp_path: Path, words: list[str]) -> None:
-    distribution(tmp_path, "3.17.0")
-    both = f"found mujoco 3.17.0 and mujoco-core {metadata.version('mujoco-core')};"
-    assert both in refusal(tmp_path, *words)
+    assert both_installed(tmp_path) in refusal(tmp_path, *words)
 
 
 @pytest.mark.parametrize(
     ("source", "found"),
     [
         ("__version__ = '4.0.0'", "found 4.0.0;"),
-        ("__version__ = '3.17.0'", "found 3.17.0;"),
+        ("__version__ = '3.16.1'", "found 3.16.1;"),
         ("__version__ = '5.0.0'", "found 5.0.0;"),
         ("", "found a folder without an engine;"),
         (f"raise OSError('{BROKEN}')", f"found OSError: {BROKEN};"),
@@ -76,7 +84,7 @@ def test_an_engine_that_is_another_one_or_broken_is_refused(
 def test_help_is_printed_beside_two_versions_or_an_old_one(
     tmp_path: Path, words: list[str]
 ) -> None:
-    distribution(tmp_path, "3.17.0")
+    both_installed(tmp_path)
     # Only in the command itself: the engine's packages start Python processes, and each would
     # start more.
     old = """if True:
@@ -92,7 +100,7 @@ def test_help_is_printed_beside_two_versions_or_an_old_one(
 
 
 def test_python_gets_the_same_line(tmp_path: Path) -> None:
-    distribution(tmp_path, "3.17.0")
+    both_installed(tmp_path)
     source = """if True:
         import antennate
         try:
@@ -102,19 +110,20 @@ def test_python_gets_the_same_line(tmp_path: Path) -> None:
     """
     done = python(tmp_path, "-c", source)
     assert done.stderr == ""
-    assert done.stdout.startswith(f"expected the engine {PIN.split('>')[0]}")
+    assert done.stdout.startswith(f"expected the engine {PIN.split('>')[0]} ")
     assert done.stdout.count("\n") == 1
 
 
 def test_both_names_of_one_version_are_one_engine(tmp_path: Path) -> None:
-    distribution(tmp_path, metadata.version("mujoco-core"))
+    ((name, version),) = engines().items()
+    distribution(tmp_path, version, next(each for each in ENGINES if each != name))
     source = "import antennate; antennate.simulate(time_limit=0.1)"
     done = python(tmp_path, "-c", source)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_what_needs_no_engine_runs_beside_two(tmp_path: Path) -> None:
-    distribution(tmp_path, "3.17.0")
+    both_installed(tmp_path)
     source = "import antennate; antennate.make_controller('closed'); antennate.RobotSpec()"
     done = python(tmp_path, "-c", source)
     assert (done.returncode, done.stderr) == (0, "")

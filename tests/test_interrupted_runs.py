@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import pytest
 
 from antennate.cli import main
+from antennate.errors import OutputError
 from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import LogReader
@@ -55,10 +56,11 @@ def test_nothing_stays_of_a_run_that_is_interrupted_before_its_first_trial(
             assert main([*words, folder]) == 130
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
     (tmp_path / "there" / "logs").mkdir()
-    (tmp_path / "there" / "logs" / "a.mcap").write_bytes(b"of somebody")
+    (tmp_path / "there" / "logs" / "open-0.mcap").write_bytes(b"of somebody")
     capsys.readouterr()
     assert main([*words, "there", "--resume"]) == 2
-    assert "expected an unfinished run, found there/logs/a.mcap" in capsys.readouterr().err
+    assert "expected no file logs/open-0.mcap but of this run" in capsys.readouterr().err
+    assert (tmp_path / "there" / "logs" / "open-0.mcap").read_bytes() == b"of somebody"
 
 
 @pytest.mark.parametrize(("moment", "stays"), [("describe", False), ("write_figures", True)])
@@ -239,18 +241,12 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
-@pytest.mark.parametrize("flag", ["--resume", "--retry"])
-def test_a_finished_run_takes_no_more_trials_and_says_so(
-    flag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_finished_run_that_cannot_grow_takes_no_more_trials_and_says_so(tmp_path: Path) -> None:
     run = tmp_path / "run"
-    words = [*TUNNEL, "--no-figures", "--workers", "1", "--out", str(run)]
-    assert main(words) == 0
-    capsys.readouterr()
-    assert main([*words, "--trials", "4", flag]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{run}: expected an unfinished run, found a finished one, which takes no more" in line
-    assert "choose another folder" in line
+    with RunDirectory.create("touch", run, identity={"versions": {}, "trials": 1}) as folder:
+        folder.finish({"schema": 1})
+    with pytest.raises(OutputError, match="found a finished one, which takes no more trials"):
+        RunDirectory.create("touch", run, identity={"versions": {}, "trials": 2}, resume=True)
 
 
 IN_THIS_PROCESS = ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]

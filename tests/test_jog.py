@@ -188,3 +188,14 @@ def test_a_servo_that_does_not_confirm_stays_slow_and_weak_and_is_named() -> Non
     assert jog.end() == [1]
     assert ready.servo.get("goal_pwm") == pytest.approx(0.3 * 885, abs=1)
     assert ready.servo.get("profile_velocity") > 0
+
+
+def test_two_servos_with_the_id_of_the_joint_get_no_torque() -> None:
+    ready = Ready()
+    other = ready.box.servos["yaw2"]
+    other.set("id", 1)
+    other.set("baud_rate", ready.servo.get("baud_rate"))
+    ready.box.plug("yaw1", "yaw2")
+    with pytest.raises(SetupError, match="found: two servos answer with this id; leave one of"):
+        ready.jog()
+    assert not any(servo.torque for servo in (ready.servo, other))

@@ -511,6 +511,32 @@ def test_rosbags_decodes_what_our_encoder_made(tmp_path: Path) -> None:
     assert json.loads(found["/versions"].data)["antennate"] == antennate.__version__
 
 
+def test_a_new_cause_within_a_state_is_an_event_and_a_known_one_is_none(tmp_path: Path) -> None:
+    stale, silent = "HOLD STALE: no fresh sample (age {})", "HOLD SILENT_SERVO: servo 7"
+    told = [
+        ("OK", ()),
+        ("HOLD", (stale.format(0.06),)),
+        ("HOLD", (stale.format(0.07),)),
+        ("HOLD", (silent, stale.format(0.08))),
+        ("HOLD", (stale.format(0.09),)),
+        ("HOLD", (silent, stale.format(0.10))),
+        ("OK", ()),
+        ("HOLD", (silent,)),
+    ]
+    with LogWriter(tmp_path / "log.mcap", HEADER) as log:
+        for number, (state, causes) in enumerate(told):
+            log.write(replace(tick(number), now=0.01 * number, state=state, causes=causes))
+    with LogReader(tmp_path / "log.mcap") as reader:
+        events = [EVENTS.decode(data)["msg"] for _, data in reader.survey().events]
+    assert events == [
+        "OK",
+        "HOLD after OK; HOLD STALE: no fresh sample (age 0.06)",
+        "HOLD; HOLD SILENT_SERVO: servo 7; HOLD STALE: no fresh sample (age 0.08)",
+        "OK after HOLD",
+        "HOLD after OK; HOLD SILENT_SERVO: servo 7",
+    ]
+
+
 @pytest.mark.parametrize("kills", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
     tmp_path: Path, kills: int

@@ -52,6 +52,20 @@ def log(drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path(shutil.copy(drive, tmp_path / "drive.mcap"))
 
 
+def test_info_tells_the_first_and_the_last_events(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with LogWriter(tmp_path / "log.mcap", HEADER) as log:
+        for number in range(50):
+            log.write(replace(tick(number), now=0.01 * number, state="", causes=()))
+            log.event(f"event {number}")
+    assert main(["log", "info", str(tmp_path / "log.mcap")]) == 0
+    said = capsys.readouterr().out
+    told = [int(line.split()[-1]) for line in said.splitlines() if " s event " in line]
+    assert told == [*range(10), *range(40, 50)]
+    assert "... 30 more events; --json has all" in said
+
+
 def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "info", str(log), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -176,7 +176,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             }
             for wall in (
                 {"kind": "line", "line": [0.0, 9.0, 1.0, 9.0]},
-                {"kind": "circle", "circle": [0.0, 0.0, 9.0]},
+                {"kind": "circle", "circle": [0.0, 0.0, 90.0]},
             )
         ),
     ],

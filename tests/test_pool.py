@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -56,10 +57,10 @@ def lost(place: int, failure: Failure) -> Any:
     ("chunk", "function"), [(2, trouble), (4, trouble_together)], ids=["one by one", "together"]
 )
 def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
-    tmp_path: Path, chunk: int, function: Any
+    tmp_path: Path, chunk: int, function: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """A task that kills its worker has three chances; one that never ends has one alone."""
-    tasks = [(number, str(tmp_path)) for number in range(8)]
+    tasks = [(number, str(tmp_path)) for number in range(9)]
     workers = Workers(2, timeout=2.0)
     found = gather(
         function,
@@ -71,10 +72,12 @@ def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
         lost=lost,
     )
     statuses = [each[0] if isinstance(each, tuple) else each for each in found]
-    assert statuses == [0, 1, 4, "crashed", 16, "hung", "failed", 49]
+    assert statuses == [0, 1, 4, "crashed", 16, "hung", "failed", 49, "failed"]
     assert "ended with code 9" in found[3][1]
     assert "2 s" in found[5][1]
     assert "ValueError: six" in found[6][1]
+    assert re.search(r"KeyboardInterrupt .*pool_tasks\.py:\d+", found[8][1])
+    assert "Traceback" not in capfd.readouterr().err
     tries = {number: len((tmp_path / str(number)).read_text()) for number in range(8)}
     assert tries[3] == 3
 

@@ -12,7 +12,7 @@ from twin_rig import rig
 from antennate.control.loop import run_loop
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.connect import LATEST, prepare, require_servos
+from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.answers import Timing
@@ -21,6 +21,7 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.deadlines import ANSWER
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 
@@ -241,7 +242,7 @@ def test_L14_a_port_without_a_board_is_refused_within_2_s(what: str) -> None:
 def test_L14_a_board_on_the_port_of_the_bus_is_refused_by_name() -> None:
     made = rig(TwinConfig())
     board = BoardPort(made.robot, made.clock)
-    bus = Bus(board, Timing(RobotSpec().baud, latest=LATEST), clock=made.clock.now)
+    bus = Bus(board, Timing(RobotSpec().baud, latest=ANSWER), clock=made.clock.now)
     begin = made.clock.now()
     with pytest.raises(BringUpError, match=r"--bus: .* swapped"):
         require_servos(bus, RobotSpec())

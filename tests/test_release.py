@@ -15,13 +15,13 @@ from antennate.control.loop import run_loop
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
-from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.answers import SILENT, Answer, Span
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.dynamixel.packets import Instruction, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import torque
 from antennate.hardware.safety.causes import Cause, State
 from antennate.twin.bus import Fault, Trouble
 from antennate.twin.config import TwinConfig
@@ -102,7 +102,7 @@ def test_B19_a_bus_that_nobody_answers_on_is_given_up_within_2_s() -> None:
 def test_B19_a_group_whose_release_fails_keeps_no_other_from_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made, disable = rig(TwinConfig()), bringup.disable
+    made, disable = rig(TwinConfig()), torque.disable
     first = made.session.actuators.joints.in_order_of_release[0]
 
     def broken(bus: Any, ids: Any, *words: Any) -> list[int]:
@@ -111,7 +111,7 @@ def test_B19_a_group_whose_release_fails_keeps_no_other_from_its_own(
         return disable(bus, ids, *words)
 
     with monkeypatch.context() as patch:
-        patch.setattr(bringup, "disable", broken)
+        patch.setattr(torque, "disable", broken)
         report = drive(made.session, CONFIG, arm=True)
     assert report.on == list(first)
     assert {servo.get("id") for servo in made.robot.servos if servo.torque} == set(first)
@@ -137,25 +137,25 @@ def deaf_at_first(made: Servos, times: int) -> None:
 @pytest.mark.parametrize(("times", "on"), [(0, []), (1, []), (4, []), (5, [6])])
 def test_B19_a_servo_is_told_five_times_to_let_go(times: int, on: list[int]) -> None:
     made = Servos()
-    bringup.arm_watchdogs(made.bus, IDS)
-    bringup.enable(made.bus, IDS)
+    torque.arm_watchdogs(made.bus, IDS)
+    torque.enable(made.bus, IDS)
     deaf_at_first(made, times)
-    assert bringup.disable(made.bus, IDS) == on
+    assert torque.disable(made.bus, IDS) == on
     assert [servo.get("id") for servo in made.twin.servos if servo.torque] == on
 
 
 def test_B19_watchdogs_go_off_with_the_torque_and_no_sooner() -> None:
     """A tripped one tells of a program that died, and stops a servo that still has torque."""
     made = Servos()
-    bringup.arm_watchdogs(made.bus, IDS)
-    bringup.enable(made.bus, IDS)
+    torque.arm_watchdogs(made.bus, IDS)
+    torque.enable(made.bus, IDS)
     write = made.servo(6).write
 
     def refuse(address: int, data: bytes) -> StatusError:
         return StatusError.RESULT_FAIL if (address, data) == (64, b"\0") else write(address, data)
 
     made.servo(6).write = refuse  # type: ignore[method-assign]
-    assert bringup.disable(made.bus, IDS) == [6]
+    assert torque.disable(made.bus, IDS) == [6]
     made.link.sleep(0.5)
     assert {servo.get("bus_watchdog") for servo in made.twin.servos if not servo.torque} == {0}
     assert made.servo(6).get("bus_watchdog") == -1
@@ -163,13 +163,13 @@ def test_B19_watchdogs_go_off_with_the_torque_and_no_sooner() -> None:
 
 def test_B19_a_bus_that_is_gone_makes_no_error_of_a_release() -> None:
     made = Servos()
-    bringup.enable(made.bus, IDS)
+    torque.enable(made.bus, IDS)
 
     def gone(*_: Any) -> Any:
         raise PortError("the wire is gone")
 
     made.link.write = made.link.read = made.link.drain = gone  # type: ignore[method-assign]
-    assert bringup.disable(made.bus, IDS) == IDS
+    assert torque.disable(made.bus, IDS) == IDS
 
 
 def ticked(made: Rig, end: float, act: Callable[[float], None]) -> None:
@@ -294,7 +294,7 @@ def test_a_packet_that_arming_lost_is_written_again(lost: int) -> None:
             write_all(address, data)
 
     made.bus.write_all = lossy  # type: ignore[method-assign]
-    bringup.enable(made.bus, IDS)
+    torque.enable(made.bus, IDS)
     assert all(servo.torque for servo in made.twin.servos)
     assert written[64] == 1 + lost  # torque enable
     assert [servo.get("goal_position") for servo in made.twin.servos] == [
@@ -313,7 +313,7 @@ def test_a_servo_that_takes_no_goal_is_named_with_what_it_has() -> None:
 
     made.bus.write_all = deaf  # type: ignore[method-assign]
     with pytest.raises(BringUpError, match=r"goal_position, found 3000 in servos \[6\]"):
-        bringup.enable(made.bus, IDS)
+        torque.enable(made.bus, IDS)
     assert not any(servo.torque for servo in made.twin.servos)
 
 

@@ -36,6 +36,7 @@ def _run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main([*WALL, "--out", str(place)]) == 0
     (place / "logs").mkdir()
     (place / "logs" / "descending-0.mcap").write_bytes(b"a log")
+    listed(place, "logs/descending-0.mcap")
     return place
 
 
@@ -47,6 +48,12 @@ def _there(_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def files(place: str = "run") -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in Path(place).rglob("*") if path.is_file()}
+
+
+def listed(place: Path, *names: str) -> None:
+    """Let the run of a folder be the one that wrote these files."""
+    with (place / "files.txt").open("a") as file:
+        file.writelines(f"{name}\n" for name in names)
 
 
 def program(*words: str, **environment: str) -> subprocess.Popen[bytes]:
@@ -155,6 +162,7 @@ def test_the_log_of_a_killed_first_trial_is_read_and_not_removed(
     new = Path("run/logs/open-0.mcap")
     new.parent.mkdir(exist_ok=True)
     new.write_bytes(b"a log that was begun")
+    listed(Path("run"), "logs/open-0.mcap")
     for words in (["log", "info"], ["log", "recover"], ["replay"], ["view"]):
         assert main([*words, "run"]) == 2  # it is no whole log
         assert "run/logs/open-0.mcap" in capsys.readouterr().err
@@ -181,6 +189,8 @@ from antennate.cli import main
 left = int(sys.argv[1])
 def watch(name, arguments):
     global left
+    if name == "open" and not arguments[2] & (os.O_WRONLY | os.O_RDWR):
+        return
     if name in ("os.rename", "os.remove", "os.mkdir", "os.link", "os.rmdir", "open"):
         path = str(arguments[0])
         if "run" in path and not path.endswith(".py") and "site-packages" not in path:
@@ -212,7 +222,7 @@ def test_killed_at_any_change_of_a_file_one_whole_run_is_there(first: int) -> No
         names = {str(path) for path in found if not path.name.startswith(".")}
         assert names <= {"config.toml", "versions.json", "command.txt", "result.json"} | {
             *("points.csv", "trials.csv", "report.html", "trials.partial.jsonl"),
-            "trials.store.jsonl",
+            *("trials.store.jsonl", "files.txt"),
         }
         assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
         assert not [path for path in Path("run").iterdir() if path.name.startswith(".")]
@@ -223,6 +233,7 @@ def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
     ours = [".config.toml.94e05034ca1ee134", "figures/.a.svg.00112233445566ff"]
     theirs = [".config.toml.94e0", ".mine.94e05034ca1ee134", "figures/.a.txt.00112233445566ff"]
     Path("run/figures").mkdir(exist_ok=True)
+    listed(Path("run"), "figures/a.svg")
     for name in [*ours, *theirs]:
         Path("run", name).write_text("half of a file")
     words = ["springs", "--no-figures", "--out", "run"]
@@ -252,3 +263,78 @@ def test_a_run_directory_reads_and_writes_only_its_own(tmp_path: Path) -> None:
         with pytest.raises(ConfigError, match="content: expected pieces of text, found"):
             run.write("x", content)  # type: ignore[arg-type]
     assert not Path("run/x").exists()
+
+
+def test_overwrite_takes_a_run_of_ours_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No file of a folder of somebody else goes, or comes beside theirs; nor behind a link."""
+    theirs = tmp_path / "theirs"
+    (theirs / "figures").mkdir(parents=True)
+    (theirs / "figures" / "mine.png").write_bytes(b"a picture")
+    Path("link").symlink_to(theirs)
+    Path("forged").mkdir()
+    for name in ("result.json", "config.toml", "versions.json"):
+        shutil.copy(f"run/{name}", f"forged/{name}")
+    for place in ("theirs", "link", "forged"):
+        before = files(place)
+        for words in (["springs"], WALL, ["replay", "no.mcap"], ["robot"]):
+            assert main([*words, "--out", place, "--overwrite"]) == 2
+            (line,) = capsys.readouterr().err.splitlines()
+            if words[0] != "replay":
+                assert f"{place}: expected a run of this program to overwrite" in line
+            assert files(place) == before
+        with pytest.raises(OutputError, match="expected a run of this program to overwrite"):
+            antennate.run("springs", out=place, overwrite=True)
+        assert files(place) == before
+    words = ["drive", "--esp32", "/dev/no-board", "--bus", "/dev/no-bus"]
+    assert main([*words, "--out", "theirs", "--overwrite"]) == 2
+    assert [path.name for path in files("theirs")] == ["mine.png"]
+
+
+@pytest.mark.parametrize("more", [["--overwrite"], ["--resume"]])
+def test_what_somebody_laid_into_a_run_stays_there(more: list[str]) -> None:
+    theirs = ["notes.txt", "figures/mine.png", "logs/of-the-robot.mcap"]
+    for name in theirs:
+        Path("run", name).parent.mkdir(exist_ok=True)
+        Path("run", name).write_text("mine")
+    words = ["wall", "--trials", "1", "--profiles", "descending", "--workers", "1", "--out", "run"]
+    code = main([*words, *more])
+    assert [Path("run", name).read_text() for name in theirs] == ["mine"] * 3
+    if more == ["--overwrite"]:
+        assert code == 0
+        assert not Path("run/logs/descending-0.mcap").exists()
+        assert main([*words, "--no-figures", "--overwrite"]) == 0
+        assert [path.name for path in Path("run/figures").iterdir()] == ["mine.png"]
+        assert [Path("run", name).read_text() for name in theirs] == ["mine"] * 3
+
+
+def test_a_file_of_somebody_with_the_name_of_one_of_a_run_is_not_replaced(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("run/frames.csv").write_text("mine")
+    before = files()
+    assert main([*WALL, "--out", "run", "--overwrite"]) == 2
+    assert "found frames.csv, which is of none" in capsys.readouterr().err
+    assert files() == before
+    Path("run/frames.csv").unlink()
+    figure = Path("run/figures/trials.svg")
+    figure.parent.mkdir()
+    figure.write_text("mine")
+    with (
+        pytest.raises(OutputError, match="found one of somebody else"),
+        RunDirectory.create("wall", "run", overwrite=True) as run,
+    ):
+        run.write("figures/trials.svg", "another")
+    assert figure.read_text() == "mine"
+
+
+def test_a_list_leads_to_no_file_outside_its_folder() -> None:
+    Path("secret.txt").write_text("of somebody")
+    Path("elsewhere").mkdir()
+    Path("elsewhere/secret.txt").write_text("of somebody")
+    Path("run/behind").symlink_to(Path("elsewhere").absolute())
+    listed(Path("run"), "../secret.txt", str(Path("secret.txt").absolute()), "behind/secret.txt")
+    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert Path("secret.txt").exists()
+    assert Path("elsewhere/secret.txt").exists()

@@ -202,7 +202,7 @@ def run_jog(patch: Patch, config: JogConfig, tmp_path: Path) -> None:
     keys = iter("++-q")
     typed = contextlib.nullcontext(lambda _: [next(keys)])
     patch.setattr(jog, "typed_keys", lambda: typed)
-    told(patch, jog, config, Path("robot.toml"), bus="the bus")
+    told(patch, jog, config, bus="the bus")
 
 
 def run_replay(patch: Patch, config: ReplayConfig, tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def run_replay(patch: Patch, config: ReplayConfig, tmp_path: Path) -> None:
 
 
 def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
-    patch.setattr(twin, "parse", lambda *_: (config, twin.Places()))
+    patch.setattr(twin, "parse_robot", lambda *_, **__: (config, twin.Places()))
     twin.command([])
     if config.factory or config.scene == "flat":
         return

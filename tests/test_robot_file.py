@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -69,7 +70,7 @@ def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -
     [
         ("[robot]\nbuad = 1\n", "robot.buad: expected a known key of robot (did you mean"),
         ("[record]\nmark = [0, 1]\n", "record.mark: expected a known key of record"),
-        ("marks = [0, 1]\n", "marks: expected a known key, found 'marks'"),
+        ("marks = [0, 1]\n", "marks: expected a known key (did you mean record.marks?)"),
         ("[doctor]\nlisten = 0.0\n", "doctor.listen: expected a number above 0"),
     ],
 )
@@ -81,6 +82,70 @@ def test_a_key_that_none_of_them_knows_is_an_error_in_all(
     told = capsys.readouterr().err
     assert f"robot.toml: {said}" in told
     assert told.count("\n") == 1
+
+
+SAID = "robot.toml of this folder is read"
+COMMANDS = {  # a word that each refuses once its file was read
+    "drive": ["--esp32", "a", "--bus", "a"],
+    "teleop": ["--hold-to-run"],
+    "doctor": ["--esp32", "a", "--bus", "a"],
+    "record": ["--esp32", "a"],
+    "jog": ["--joint", "none"],
+    "setup": ["--only", "none"],
+    "zero": [],
+    "twin": ["--tcp", "x"],
+    "robot": ["--out", "/dev/null/x"],
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_of_the_robot_reads_the_file_of_its_folder_and_says_so(
+    name: str, file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [name, *COMMANDS[name]]
+    file.write_text("[robot]\nbuad = 1\n")
+    assert main(words) == BAD_INPUT
+    said, why = capsys.readouterr().err.splitlines()
+    assert said.startswith(SAID)
+    assert "robot.toml: robot.buad: expected a known key" in why
+    writes = name in ("setup", "zero")
+    if writes:
+        assert said == SAID
+        assert main([*words, "--no-config"]) == BAD_INPUT
+        assert "expected a known flag" in capsys.readouterr().err
+    else:
+        assert said == f"{SAID}; --no-config leaves it"
+        assert main([*words, "--no-config"]) == BAD_INPUT
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "buad" not in line
+    file.rename("other.toml")
+    assert main([*words, "--config", "other.toml"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "other.toml: robot.buad: expected a known key" in line
+
+
+def test_a_file_that_is_named_is_read_alone(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file.write_text("a line that is no TOML\n")
+    Path("other.toml").write_text('[ports]\nesp32 = "one"\nbus = "one"\n')
+    assert main(["drive", "--config", "other.toml"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "expected two ports, found one twice" in line
+    assert main(["drive", "--config", "other.toml", "--no-config"]) == BAD_INPUT
+    assert "--no-config: expected no --config beside it, found both" in capsys.readouterr().err
+    assert main(["twin", "--servos", "1:none", "--duration", "1"]) == BAD_INPUT
+    assert SAID not in capsys.readouterr().err
+
+
+def test_twin_and_robot_take_the_robot_of_the_file(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file.write_text('duration = 9.0\nrobot = "hexapod"\n')
+    assert main(["twin"]) == BAD_INPUT
+    assert "expected a robot with antennae for the twin" in capsys.readouterr().err
+    file.write_text("duration = 9.0\n[robot.yaw]\nzeros = [2000, 2001, 2002, 2003, 2004]\n")
+    assert main(["robot", "--json", "--out", "run"]) == 0
+    joints = json.loads(capsys.readouterr().out)["joints"]
+    assert [joints[f"yaw{n}"]["zero"] for n in range(1, 6)] == [2000, 2001, 2002, 2003, 2004]
 
 
 def test_doctor_judges_the_antennae_by_the_calibration_file(file: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -23,12 +23,12 @@ from antennate.twin.servo_box import ServoBox, read_list
 
 def models(text: str) -> list[tuple[int, int, int]]:
     """Id, model number and baud code of each."""
-    servos = ServoBox(read_list(text)).servos
+    servos = ServoBox(read_list(text.split())).servos
     return [(s.get("id"), s.get("model_number"), s.get("baud_rate")) for s in servos]
 
 
 def test_a_list_of_servos_is_read_from_words_and_from_a_file(tmp_path: Path) -> None:
-    words = "1:xl330-m288,2:xl430-w250@1000000, 7:xc430-w240x2"
+    words = "1:xl330-m288 2:xl430-w250@1000000 7:xc430-w240x2"
     expected = [(1, 1200, 1), (2, 1060, 3), (7, 1080, 1), (7, 1080, 1)]
     assert models(words) == expected
     file = tmp_path / "box.toml"
@@ -37,7 +37,7 @@ def test_a_list_of_servos_is_read_from_words_and_from_a_file(tmp_path: Path) -> 
         '[[servo]]\nmodel = "xl430-w250"\nid = 2\nbaud = 1000000\nposition = 100.0\nname = "hip"\n'
     )
     assert models(str(file)) == expected[:2]
-    box = ServoBox(read_list(str(file)), plugged=("hip",))
+    box = ServoBox(read_list([str(file)]), plugged=("hip",))
     assert [servo.plugged for servo in box.servos] == [False, True]
     assert box.servos[1].get("present_position") == 100
 
@@ -51,11 +51,20 @@ def test_a_list_of_servos_is_read_from_words_and_from_a_file(tmp_path: Path) -> 
         ("1:xl330-m288@19200", "found 19200"),
         ("253:xl330-m288", "at most 252, found 253"),
         ("nowhere.toml", "nowhere.toml"),
+        ("box.toml 1:xl330-m288", "or a file alone that ends in .toml, found 'box.toml'"),
     ],
 )
 def test_what_is_no_servo_is_refused(text: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
-        ServoBox(read_list(text))
+        ServoBox(read_list(text.split()))
+
+
+def stand_alone() -> ServoBox:
+    return ServoBox(read_list(["1:xc430-w240", "2:xl330-m288", "3:xl430-w250"]))
+
+
+def of_the_robot() -> TwinRobot:
+    return watched(TwinConfig(factory=True))[0]
 
 
 def heard(box: ServoBox, t: float) -> list[int]:
@@ -68,7 +77,7 @@ def heard(box: ServoBox, t: float) -> list[int]:
 
 
 def test_a_box_of_new_servos_gets_its_ids_one_after_the_other() -> None:
-    box = ServoBox(read_list("1:xc430-w240x3"), plugged=("1",))
+    box = ServoBox(read_list(["1:xc430-w240x3"]), plugged=("1",))
     for n in range(3):
         t = 10.0 * n + 1.0
         box.advance(t)
@@ -86,7 +95,7 @@ def test_a_box_of_new_servos_gets_its_ids_one_after_the_other() -> None:
 
 
 def test_a_servo_that_was_unplugged_has_forgotten_its_ram() -> None:
-    box = ServoBox(read_list("1:xc430-w240"))
+    box = ServoBox(read_list(["1:xc430-w240"]))
     servo = box.servos[0]
     servo.set("led", 1)
     servo.set("torque_enable", 1)
@@ -98,13 +107,13 @@ def test_a_servo_that_was_unplugged_has_forgotten_its_ram() -> None:
 
 @pytest.mark.parametrize("text", ["", "go", "plug", "plug 4", "push 1", "push 1=20", "push 1=xdeg"])
 def test_an_order_that_is_none_is_refused(text: str) -> None:
-    box = ServoBox(read_list("1:xc430-w240x3"))
+    box = ServoBox(read_list(["1:xc430-w240x3"]))
     with pytest.raises(BadInputError, match="expected"):
         box.on_order(text)
 
 
 def test_a_shaft_without_torque_is_turned_and_one_with_torque_is_not() -> None:
-    box = ServoBox(read_list("1:xc430-w240x2"), pushes=("1=45deg@2s", "2=-0.5rad@2s"))
+    box = ServoBox(read_list(["1:xc430-w240x2"]), pushes=("1=45deg@2s", "2=-0.5rad@2s"))
     box.servos[1].set("torque_enable", 1)
     box.bus.receive(1.0, packets.ping())
     for n in range(500):
@@ -115,6 +124,29 @@ def test_a_shaft_without_torque_is_turned_and_one_with_torque_is_not() -> None:
             assert 2048 < box.servos[0].get("present_position") < 2048 + 512
     assert box.servos[0].get("present_position") == 2048 + 512
     assert box.servos[1].get("present_position") == 2048
+
+
+@pytest.mark.parametrize("make", [stand_alone, of_the_robot])
+def test_a_homing_offset_moves_the_present_position_of_a_standing_servo_at_once(
+    make: Callable[[], TwinRobot | ServoBox],
+) -> None:
+    """Present Position = Actual Position + Homing Offset; in position mode up to 1024."""
+    twin = make()
+    actual = {servo: servo.get("present_position") for servo in twin.bus.servos}
+    for register, value, shift in (
+        ("homing_offset", 500, 500),
+        ("homing_offset", -1024, -1024),
+        ("homing_offset", 1025, 0),
+        ("operating_mode", 4, 1025),
+        ("homing_offset", -1_044_479, -1_044_479),
+        ("homing_offset", 0, 0),
+    ):
+        twin.advance(twin.t + 0.1)
+        for servo in twin.bus.servos:
+            row = servo.table[register]
+            assert servo.write(row.address, row.encode(value)) == 0
+            present = int.from_bytes(servo.read(132, 4)[1], "little", signed=True)
+            assert present == actual[servo] + shift
 
 
 def test_orders_come_from_a_file_line_by_line(tmp_path: Path) -> None:
@@ -289,7 +321,7 @@ def test_a_fault_of_what_is_not_there_is_refused(fault: str) -> None:
 @pytest.fixture
 def twin() -> Iterator[Served]:
     pytest.importorskip("serial")
-    with served("1:xc430-w240x2", "--plugged", "1") as serving:
+    with served("1:xc430-w240", "2:xl430-w250", "--plugged", "1") as serving:
         yield serving
 
 

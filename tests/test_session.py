@@ -540,6 +540,10 @@ def test_L14_a_port_without_a_board_is_refused_and_the_text_says_what_came() -> 
     ("spoil", "said"),
     [
         (lambda robot: robot.bus.servos.pop(6), "id 7: silent"),
+        (
+            lambda robot: robot.servos[6].set("id", 8),
+            "id 7: silent, perhaps it answers as 8; id 8: two servos answer with this id; leave",
+        ),
         (lambda robot: robot.servos[0].set("model_number", 1200), "id 1: expected model XC430"),
         (lambda robot: robot.servos[8].set("operating_mode", 3), r"mode .* \[9\]"),
     ],

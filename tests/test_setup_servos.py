@@ -94,10 +94,10 @@ def test_nothing_on_the_bus_is_told_with_the_cure() -> None:
 def test_two_new_servos_on_the_bus_are_refused_and_nothing_is_written() -> None:
     box = Box()
     box.plug("yaw1", "yaw2")
-    with pytest.raises(SetupError, match="two servos with one id"):
+    with pytest.raises(SetupError, match="found two servos answer with this id"):
         setup(box).set_up(YAW1, ())
     box.plug("yaw1", BASE.name)  # two models: their answers to a ping differ
-    with pytest.raises(SetupError, match="two servos with one id"):
+    with pytest.raises(SetupError, match="two servos with this id"):
         setup(box).set_up(YAW1, ())
     assert [servo.eeprom_writes for servo in box.servos.values()] == [0] * 19
 

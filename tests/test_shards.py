@@ -42,7 +42,7 @@ def files() -> dict[Path, bytes]:
 
 
 def merge(*shards: str, out: str, overwrite: bool = False) -> int:
-    words = ["merge", "--shards", *shards, "--out", out, "--no-figures"]
+    words = ["merge", *shards, "--out", out, "--no-figures"]
     return main([*words, "--overwrite"] if overwrite else words)
 
 
@@ -107,7 +107,7 @@ def test_a_merge_names_the_shard_that_is_missing(
     assert merge(*shards, out="merged") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith(
-        f"--shards: expected 4 finished trials, found {found}: a shard is missing: {missing}"
+        f"merge: expected 4 finished trials, found {found}: a shard is missing: {missing}"
     )
     assert not Path("merged").exists()
 
@@ -152,7 +152,7 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
 
     before = files()
-    words = ["merge", "--shards", "1-2", "2-2", "--out", "merged", "--no-figures"]
+    words = ["merge", "1-2", "2-2", "--out", "merged", "--no-figures"]
     done = subprocess.run(
         [sys.executable, "-m", "antennate", *words],
         env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
@@ -181,9 +181,26 @@ def test_a_shard_without_trials_is_merged_as_any_other(count: int) -> None:
         assert Path("merged", name).read_bytes() == Path("whole", name).read_bytes()
 
 
-def test_folders_without_their_flag_are_refused_with_its_name(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["merge", "1-2", "2-2"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("merge: expected --shards before the folders, found '1-2'")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["1-2", "2-2", "--out", "merged"],
+        ["--out", "merged", "1-2", "2-2"],
+        ["1-2", "--out", "merged", "2-2"],
+        ["--shards", "1-2", "2-2", "--out", "merged"],
+        ["1-2", "--out", "merged", "--shards", "2-2"],
+    ],
+)
+def test_shards_are_named_anywhere_with_and_without_their_flag(words: list[str]) -> None:
+    assert main(["merge", *words, "--no-figures"]) == 0
+    assert Path("merged/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
+
+
+def test_no_shard_and_an_unknown_flag_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, told in (
+        (["--out", "merged"], "merge: expected the folders of all shards, found none"),
+        (["1-2", "2-2", "-x"], "merge: error: -x: expected a complete shard, found no shard.json"),
+    ):
+        assert main(["merge", *words]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert told in line

@@ -230,3 +230,10 @@ def test_a_sensor_of_another_kind_without_its_curve_is_refused_at_any_point(
     kinds = '"robot.antenna.sensor.kind" = ["flex", "fsr"]\n'
     Path("kinds.toml").write_text(f"[vary]\n{kinds}")
     assert "polarity must be 1 for a fsr sensor" in refusal(capsys, "study", "kinds.toml")
+
+
+@pytest.mark.parametrize("command", ["study", "design"])
+def test_without_a_file_one_is_asked_for(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in ([], ["--out", "run"]):
+        assert "expected a FILE that says what varies" in refusal(capsys, command, *words)
+    assert not Path("run").exists()

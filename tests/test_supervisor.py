@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from pathlib import Path
@@ -13,7 +14,7 @@ from hardware_faults import BAD, causes, together
 from hardware_rig import Ticker, armed, healthy
 
 from antennate.errors import ConfigError
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause, Inputs, State
 from antennate.hardware.safety.diagnosis import Finding
 from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
@@ -33,6 +34,14 @@ def test_every_cause_is_named_dated_and_as_severe_as_it_says(cause: Cause) -> No
     assert outputs.torque == (cause.severity < State.OFF)
     later = ticker.step(**BAD[cause])
     assert all(a.since < ticker.now for a in later.causes if a.cause is cause)
+
+
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(Inputs)])
+def test_an_input_that_is_forgotten_is_an_error_and_not_health(name: str) -> None:
+    given = dataclasses.asdict(healthy(0.01))
+    del given[name]
+    with pytest.raises(TypeError, match=name):
+        Inputs(**given)
 
 
 def test_causes_that_are_alike_are_listed_by_name() -> None:

@@ -400,7 +400,7 @@ def test_our_master_over_a_serial_line(server: PtyServer) -> None:
         for _ in range(20):
             answers = bus.read_all(IDS, MOTION, budget=2.0)
             assert positions(answers) == {i: 100 * i for i in IDS}
-        assert bus.ping(19) == Value(bytes([1200 % 256, 1200 // 256, 48]), alert=False)
+        assert bus.ping(19) == Value(bytes([1200 % 256, 1200 // 256, 52]), alert=False)
         with pytest.raises(PortError, match="in use by another program"):
             serial_port.SerialPort(server.path, 1_000_000)
     finally:

@@ -17,7 +17,6 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.connect import LATEST
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
@@ -27,6 +26,8 @@ from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
 from antennate.hardware.ports.port import Port
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
@@ -179,7 +180,7 @@ def rig(
     params = ControlParams(**dict(config.control))
     clock = LockstepClock(robot)
     board_port, bus_port = cable(BoardPort(robot, clock)), cable(clock)
-    bus = Bus(bus_port, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
+    bus = Bus(bus_port, Timing(config.robot.baud, latest=ANSWER), clock=clock.now)
     session = Session(
         board=Board(board_port, SupervisorParams().stale_age),
         actuators=DynamixelActuators(bus, Joints(config.robot), clock.now),
@@ -204,14 +205,14 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     robot = TwinRobot(watch.body, spec, period, boot_id=trial + 1)
     clock = LockstepClock(robot)
     board = Board(BoardPort(robot, clock), SupervisorParams().stale_age)
-    bus = Bus(clock, Timing(spec.baud, latest=LATEST), clock=clock.now)
+    bus = Bus(clock, Timing(spec.baud, latest=ANSWER), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())
     bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
-    bringup.arm_watchdogs(bus, spec.ids)
+    torque.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
-    bringup.enable(bus, spec.ids)
+    torque.enable(bus, spec.ids)
     body = HardwareRobot(board, DynamixelActuators(bus, Joints(spec), clock.now), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from antennate.errors import BadInputError
@@ -18,6 +20,12 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+\s*")
 _THOUSANDS = re.compile(r"\s*[+-]?\d{1,3}([,.' ])\d{3}(?:\1\d{3})*(?:[.,]\d*)?\s*")
 _UNIT = re.compile(r"[\[(]([^\])]*)[\])]\s*[\"']?\s*$")
 """A unit in brackets at the end of a column's name."""
+_SEPARATOR_LINE = re.compile(r"\s*\"?sep=.\"?,*\s*", re.IGNORECASE)
+"""First line of a file that tells a spreadsheet what stands between columns."""
+_SAMPLE = 100
+"""Rows by which the number of cells is compared with that of names."""
+MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none")
+"""What stands for no value, in small letters: R writes NA, spreadsheets #N/A."""
 LARGEST_WHOLE = 2.0**53
 """Beyond it a number of a file does not tell a whole number from the next one."""
 Row = tuple[int, list[str]]
@@ -33,6 +41,9 @@ def csv_rows(
     ended: bool = False,
 ) -> Iterator[Row]:
     """The rows of a file that are not empty, the names of the columns first; any line ends.
+
+    A line `sep=,` before them is skipped. A column without a name is called `column 3` by its
+    place, so are cells beyond the last name.
 
     Args:
         path: The file, for messages.
@@ -53,20 +64,39 @@ def csv_rows(
     except BadInputError as cause:
         raise error(f"{cause}; save it as CSV in UTF-8") from None
     reader = csv.reader(io.StringIO(text, newline=None))
+    rows = ((reader.line_num, cells) for cells in reader if cells)
     try:
-        header = [name.strip() for name in next(reader, [])]
-        _check_header(path, header, needed, error, cure)
+        line, header = next(rows, (1, []))
+        if _SEPARATOR_LINE.fullmatch(",".join(header)):
+            line, header = next(rows, (line + 1, []))
+        header = [name.strip() for name in header]
+        sample = list(itertools.islice(rows, _SAMPLE))
+        header = _named(header, [cells for _, cells in sample])
+        _check_header(path, line, header, needed, error, cure)
         if ended and not data.endswith((b"\n", b"\r")):
             raise error(
                 f"{path}: row {len(data.splitlines())}: expected a line break at its end, found "
                 "none (truncated); delete the last row, or add the line break if it is whole"
             )
-        yield reader.line_num, header
-        for cells in reader:
-            if cells:
-                yield reader.line_num, cells
+        yield line, header
+        yield from itertools.chain(sample, rows)
     except csv.Error as cause:
         raise error(f"{path}: row {reader.line_num}: expected CSV, found {cause}") from None
+
+
+def _named(header: list[str], sample: Sequence[list[str]]) -> list[str]:
+    """Names of all columns: a place where there is no name, also beyond the last name.
+
+    Rows with more cells than names may as well have decimal commas, or a first column of row names
+    (R writes no name above it). So two cells more must come with points somewhere, or be empty.
+    """
+    usual = Counter(map(len, sample)).most_common(1)[0][0] if sample else 0
+    more = [cells[len(header) :] for cells in sample if len(cells) == usual]
+    empty = not any(cell.strip() for cells in more for cell in cells)
+    pointed = any("." in cell for cells in sample for cell in cells)
+    longer = usual if len(header) > 1 and (empty or (usual > len(header) + 1 and pointed)) else 0
+    names = header + [""] * (longer - len(header))
+    return [name or f"column {place}" for place, name in enumerate(names, 1)]
 
 
 def column(header: Sequence[str], name: str) -> int | None:
@@ -80,9 +110,17 @@ def column(header: Sequence[str], name: str) -> int | None:
     return same[0] if len(same) == 1 else None
 
 
-def unit_of(cell: str) -> str:
-    """The unit that a column's name gives in brackets, empty without."""
-    return "".join(_UNIT.findall(cell)[-1:]).strip()
+def unit_of(cell: str, known: Collection[str]) -> str:
+    """The unit that a column's name gives in brackets, as `Time [s]`, or at its end, as `time_s`.
+
+    Args:
+        cell: The name.
+        known: Units that are looked for at the end, those of a letter or more.
+    """
+    bracketed = "".join(_UNIT.findall(cell)[-1:]).strip()
+    ends = (unit for unit in known if unit.isascii() and not unit.isdigit())
+    ends = [unit for unit in ends if cell.rstrip("\"' ").endswith("_" + unit.replace("/", "_"))]
+    return bracketed or max(ends, key=len, default="")
 
 
 def _plain(cell: str) -> str:
@@ -107,7 +145,12 @@ def number_of(cell: str) -> float:
 
 
 def _check_header(
-    path: Path, header: list[str], needed: Sequence[str], error: type[BadInputError], cure: str
+    path: Path,
+    row: int,
+    header: list[str],
+    needed: Sequence[str],
+    error: type[BadInputError],
+    cure: str,
 ) -> None:
     missing = [name for name in needed if column(header, name) is None]
     if not missing:
@@ -126,7 +169,7 @@ def _check_header(
     else:
         found = shortened(", ".join(header)) if line else "nothing"
         why = f"a column {missing[0]}, found {found}{cure}"
-    raise error(f"{path}: row 1: expected {why}")
+    raise error(f"{path}: row {row}: expected {why}")
 
 
 def _is_number(cell: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import traceback
 from pathlib import Path
 
@@ -60,6 +61,12 @@ class MissingPackageError(AntennateError, ImportError):
     """An optional package is needed for this and not installed; the text says how to get it."""
 
 
+def is_ctrl_c(error: BaseException) -> bool:
+    """Whether it may come of Ctrl-C: a worker process ignores that, so there it is of some code."""
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    return isinstance(error, KeyboardInterrupt) and not ignored
+
+
 _LONGEST = 300
 """Most characters of an exception that are quoted; it may hold anything."""
 
@@ -73,7 +80,16 @@ def in_one_line(error: BaseException) -> str:
         raise
     except BaseException:  # noqa: BLE001 anybody's __str__ may raise anything
         return name
-    return f"{name}: {text}"[:_LONGEST]
+    return f"{name}: {text}"[:_LONGEST] if text else name
+
+
+def reason(error: BaseException) -> str:
+    """Why something failed, in one line that is never empty.
+
+    What the system says of an OSError; else the text of the exception; of one without, its type.
+    """
+    said = getattr(error, "strerror", None) or str(error)
+    return " ".join(said.split()) or type(error).__name__
 
 
 def raised(error: BaseException) -> str:

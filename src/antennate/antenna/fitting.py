@@ -79,9 +79,10 @@ def check(samples: Samples) -> None:
         )
     low, high = np.percentile(counts, [1, 99])
     if high - low < NARROWEST_SPAN:
+        how = "constant" if low == high else f"a change of {high - low:.3g}"
         raise CalibrationError(
             f"row {samples.row[0]}: expected readings that change by {NARROWEST_SPAN:g} counts or "
-            f"more, found {low:g} to {high:g} (constant); check the wiring and the divider"
+            f"more, found {low:g} to {high:g} ({how}); check the wiring and the divider"
         )
     _check_monotonic(samples, high - low)
 

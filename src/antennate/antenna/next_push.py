@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.antenna.calibration import Calibration
+from antennate.antenna.calibration import FEWEST, Calibration
 from antennate.antenna.curves import MODELS, Samples, polarity, predict
+from antennate.antenna.fitting import FEWEST_PUSHES
+from antennate.antenna.holds import Relaxation, relaxation
 from antennate.antenna.rivals import (
     OTHER_DIVIDERS,
     Gain,
@@ -115,12 +117,13 @@ class NewPush:
 
     Attributes:
         error_95: Predictive interval: lowest and highest error of b, curve minus bend, between
-            which 95 % of the readings of a new push are expected, with 95 % confidence.
+            which 95 % of the readings of a new push are expected, with 95 % confidence. None with
+            two pushes: each is judged by the other, so that both err by the same.
         rmse: Root mean squared error of b on pushes left out; `worst_rmse` of the worst of them.
         pushes: Pushes that were left out in turn.
     """
 
-    error_95: tuple[float, float]
+    error_95: tuple[float, float] | None
     rmse: float
     worst_rmse: float
     pushes: int
@@ -136,6 +139,7 @@ class Assessment:
         new_push: None with a single push: nothing is known about the next one.
         rivals: Gain of each rival under each check; the first check is the recording as it is.
         named: Rivals that win beyond noise under every check.
+        relaxation: None if there is no hold after a change of the bend, or no time.
     """
 
     pushes: int
@@ -143,18 +147,20 @@ class Assessment:
     new_push: NewPush | None
     rivals: dict[str, dict[str, Gain]]
     named: tuple[str, ...]
+    relaxation: Relaxation | None
 
 
 RECORDED = "as recorded"
 """Name of the first check of a rival."""
 
 
-def assess(samples: Samples, found: Calibration) -> Assessment:
+def assess(samples: Samples, found: Calibration, t: Floats | None = None) -> Assessment:
     """Ask what a calibration is worth beyond its own pushes.
 
     Args:
         samples: The readings that it was fitted to, those of a trial in the order of time.
         found: The calibration.
+        t: Times of the readings [s], shape (n,); None if they are not known.
     """
     pushes = Pushes.of(samples)
     full_scale = (found.counts_low, found.counts_high) == (0.0, float(FULL_SCALE))
@@ -182,19 +188,26 @@ def assess(samples: Samples, found: Calibration) -> Assessment:
         _new_push(checks[RECORDED]["sigmoid"]),
         rivals,
         named,
+        None if t is None else relaxation(samples, t, found.counts_high - found.counts_low),
     )
 
 
 def _new_push(errors: list[Floats]) -> NewPush | None:
-    """The predictive interval: both ends of a push's errors are normal from push to push."""
+    """The predictive interval: both ends of a push's errors are normal from push to push.
+
+    Of two pushes the errors are those of one difference with either sign: their ends agree
+    wherever that difference is alike up and down, however large it is.
+    """
     if len(errors) < 2:
         return None
-    sizes = rms(errors)
-    spread = np.array([np.percentile(error, [2.5, 97.5]) for error in errors])
-    wide = student95(len(errors) - 1) * spread.std(axis=0, ddof=1) * np.sqrt(1 + 1 / len(errors))
-    low, high = spread.mean(axis=0) + wide * [-1.0, 1.0]
+    sizes, interval = rms(errors), None
+    if len(errors) >= FEWEST_PUSHES:
+        ends = np.array([np.percentile(error, [2.5, 97.5]) for error in errors])
+        wide = student95(len(errors) - 1) * ends.std(axis=0, ddof=1) * np.sqrt(1 + 1 / len(errors))
+        low, high = (ends.mean(axis=0) + wide * [-1.0, 1.0]).tolist()
+        interval = low, high
     return NewPush(
-        (float(low), float(high)),
+        interval,
         float(np.sqrt(np.mean(np.concatenate(errors) ** 2))),
         float(sizes.max()),
         len(errors),
@@ -256,15 +269,15 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
         interval,
         float(levels[np.argmax(abs(levels))]),
         len(each),
-        (_one_way_r2(samples, pushes.way > 0), _one_way_r2(samples, pushes.way < 0)),
+        (sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)),
     )
 
 
-def _one_way_r2(samples: Samples, rows: Bools) -> float:
-    """R² of a sigmoid fitted to some of the readings alone."""
+def sigmoid_r2(samples: Samples, rows: Bools) -> float:
+    """R² of a sigmoid fitted to some of the readings alone, 0 of too few."""
     counts, level = samples.counts[rows], samples.level[rows]
-    if np.ptp(counts) == 0 or np.ptp(level) == 0:
+    if len(counts) < FEWEST or np.ptp(counts) == 0 or np.ptp(level) == 0:
         return 0.0
-    sign, x = polarity(samples), (counts - counts.min()) / np.ptp(counts)
-    error = predict("sigmoid", x, level, x, sign) - level
+    x = (counts - counts.min()) / np.ptp(counts)
+    error = predict("sigmoid", x, level, x, polarity(samples)) - level
     return float(1.0 - (error**2).mean() / level.var())

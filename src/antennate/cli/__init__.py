@@ -59,8 +59,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         output.flush()
         if output.error is None or isinstance(output.error, BrokenPipeError):
             return code  # the reader of the pipe has ended, as `head` does
-        reason = output.error.strerror or output.error
-        sys.stderr.write(f"{name}: error: standard output: expected to write, found: {reason}\n")
+        from antennate.errors import reason
+
+        why = reason(output.error)
+        sys.stderr.write(f"{name}: error: standard output: expected to write, found: {why}\n")
         return BAD_INPUT
 
 
@@ -97,7 +99,7 @@ def _run(words: Sequence[str], name: str) -> int:
         return OK
     from antennate.cli.arguments import HelpRequest
     from antennate.cli.output import write_result
-    from antennate.errors import AntennateError, BadInputError
+    from antennate.errors import AntennateError, BadInputError, reason
     from antennate.messages import nearest, one_line, shortened
 
     try:
@@ -114,7 +116,7 @@ def _run(words: Sequence[str], name: str) -> int:
         write_result(str(page))
         return OK
     except AntennateError as error:
-        sys.stderr.write(f"{name}: error: {one_line(str(error))}\n")
+        sys.stderr.write(f"{name}: error: {one_line(reason(error))}\n")
         return BAD_INPUT
 
 

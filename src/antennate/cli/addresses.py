@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import FromFile, parse
 from antennate.cli.options import option
+from antennate.cli.status import write
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.ports import same
 from antennate.hardware.ports.finder import is_udp
@@ -26,7 +27,14 @@ USUAL = Path("robot.toml")
 
 
 @dataclass(frozen=True)
-class RobotOptions(FromFile):
+class RobotFileOptions(FromFile):
+    """Which file describes the robot."""
+
+    no_config: bool = option(False, f"leave {USUAL} of this folder, which else is read")
+
+
+@dataclass(frozen=True)
+class RobotOptions(RobotFileOptions):
     """Where the robot is."""
 
     esp32: str = option(
@@ -41,7 +49,7 @@ class RobotOptions(FromFile):
 
 
 @dataclass(frozen=True)
-class BusOptions(FromFile):
+class BusOptions(RobotFileOptions):
     """Where the servos are."""
 
     bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
@@ -52,7 +60,21 @@ class PortOptions(BusOptions, RobotOptions):
     """Where both are."""
 
 
-Chosen = TypeVar("Chosen", bound=FromFile)
+Chosen = TypeVar("Chosen", bound=RobotFileOptions)
+
+
+def usual_file(chosen: RobotFileOptions) -> Path | None:
+    """The file to read: the one of --config, else robot.toml of this folder, which is said.
+
+    Raises:
+        ConfigError: One is named, and none is to be read.
+    """
+    if chosen.config is not None and chosen.no_config:
+        raise ConfigError("--no-config: expected no --config beside it, found both")
+    if chosen.config is not None or chosen.no_config or not USUAL.exists():
+        return chosen.config
+    write(f"{USUAL} of this folder is read; --no-config leaves it\n")
+    return USUAL
 
 
 def parse_robot(
@@ -61,7 +83,9 @@ def parse_robot(
     take: Callable[[RobotFile], Config],
     argv: Sequence[str],
     options: type[Chosen],
-    file_of: Callable[[Path | None], Path | None] = lambda given: given,
+    file_of: Callable[[Chosen], Path | None] = usual_file,
+    without: Sequence[str] = (),
+    named: type[Config] | None = None,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command that talks to a robot.
 
@@ -71,7 +95,9 @@ def parse_robot(
         take: What it takes of a robot's file.
         argv: Its words.
         options: Its other options.
-        file_of: Which file is read, of the one that --config names.
+        file_of: Which file is read.
+        without: Fields of the other options that this command has not.
+        named: What the file of --config holds, if it is no robot's file.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -81,11 +107,13 @@ def parse_robot(
 
     def read(path: Path) -> Config:
         nonlocal known
+        if named is not None and path is not USUAL:
+            return read_file(path, named)
         known = read_file(path, RobotFile)
         return take(known)
 
     model = type(take(known))
-    config, chosen = parse(command, description, model, argv, options, read, (), file_of)
+    config, chosen = parse(command, description, model, argv, options, read, without, file_of)
     return config, _with_ports(chosen, known.ports)
 
 
@@ -107,11 +135,16 @@ def parse_writer(
         HelpRequest: Help was asked for.
     """
 
-    def file_of(given: Path | None) -> Path | None:
-        path = given or USUAL
-        return path if path.exists() or not (given is None or may_make) else None
+    def file_of(chosen: Chosen) -> Path | None:
+        path = chosen.config or USUAL
+        if not path.exists() and (chosen.config is None or may_make):
+            return None
+        if chosen.config is None:
+            write(f"{USUAL} of this folder is read\n")
+        return path
 
-    config, chosen = parse_robot(command, description, take, argv, options, file_of)
+    without = ["no_config"]
+    config, chosen = parse_robot(command, description, take, argv, options, file_of, without)
     return config, chosen, chosen.config or USUAL
 
 
@@ -149,10 +182,10 @@ def key_of(options: RobotOptions) -> bytes | None:
     return b""
 
 
-def at_hand(options: FromFile) -> str:
+def at_hand(options: RobotFileOptions) -> str:
     """A hint at the robot's file in this folder, else at the commands that find or make a port."""
-    if options.config is None and USUAL.is_file():
-        return f"; {USUAL} is here, --config {USUAL} takes its ports"
+    if options.no_config and USUAL.is_file():
+        return f"; {USUAL} is here, without --no-config its ports are taken"
     return f"; `{typed('setup')}` finds it, `{typed('twin')}` simulates a robot"
 
 

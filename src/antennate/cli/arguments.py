@@ -64,7 +64,7 @@ def parse(
     options: type[Chosen],
     read: Callable[[Path], Config] | None = None,
     without: Sequence[str] = (),
-    file_of: Callable[[Path | None], Path | None] = lambda given: given,
+    file_of: Callable[[Any], Path | None] = lambda chosen: chosen.config,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command.
 
@@ -76,7 +76,7 @@ def parse(
         options: Its other options.
         read: Reads a file that holds more than this configuration.
         without: Fields of the other options that this command has not.
-        file_of: Which file is read, of the one that --config names.
+        file_of: Which file is read, by the other options.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -101,7 +101,7 @@ def parse(
     chosen = _filled(options, {}, {p: v for p, v in values.items() if p[0] in names})
     _refuse_alone([each for each in [*others, *parameters] if each.path in values], chosen)
     base: Mapping[str, Any] = {}
-    if isinstance(chosen, FromFile) and (file := file_of(chosen.config)) is not None:
+    if isinstance(chosen, FromFile) and (file := file_of(chosen)) is not None:
         config = read_file(file, model) if read is None else read(file)
         base = config.model_dump(exclude_unset=True)
         _refuse_code(file, base, values)
@@ -133,12 +133,10 @@ def _refuse_unread(config: Params, flags: Mapping[tuple[str, ...], Any]) -> None
         ConfigError: There is one.
     """
     why = config.unread_here() if config.shared else {}
-    for path, default, value in changes(config, why):
+    for path, value in changes(config, why):
         parts = tuple(path.split("."))
         if any(parts[:n] in flags for n in range(1, len(parts) + 1)):
-            raise ConfigError(
-                f"{flag_of(parts)}: expected {default}, as {why[path]}, found {found(value)}"
-            )
+            raise ConfigError(config.unread_error(path, why[path], value).text(flag_of))
 
 
 _CODE = ("controller", "controllers", "scene", "experiment")

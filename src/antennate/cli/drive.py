@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic.dataclasses import dataclass
 
@@ -26,7 +26,7 @@ from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.lateness import late_sentence
+from antennate.hardware.driving.lateness import MANY, Recent, late_sentence
 from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.priority import Priority, urgent
 from antennate.hardware.driving.session import Session
@@ -39,13 +39,16 @@ from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
-from antennate.studies.run_files import LOG
+from antennate.studies.run_files import LOG, LOG_PARTS
 from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import part, parts
 from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 from antennate.types import Controller
+
+if TYPE_CHECKING:
+    from antennate.telemetry.view.process import ViewProcess
 
 _LONGEST_DRAWN = 12_000
 """Most ticks of a log that is drawn for the report: it takes some four seconds."""
@@ -58,7 +61,7 @@ verified.
 
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
-off, and if it was armed and never walked."""
+off, if it was armed and never walked, and if its log ended before the drive did."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +120,12 @@ def walk(
     given, config = config, config.calibrated()
     key = key_of(orders)
     with (
-        page_of(orders) or contextlib.nullcontext() as page,
+        page_of(orders, idle=True) or contextlib.nullcontext() as page,
         _operator(config, orders) as operator,
         folder_for(view, orders, config, argv) as folder,
     ):
         folder.without_trials()
+        folder.claim_names(LOG_PARTS)
         with connect(config, orders.esp32, orders.bus, key) as session:
             if operator.stop is not None:
                 operator.stop.closed = True  # until the first tick: from here on there is a result
@@ -137,7 +141,7 @@ def walk(
             )
             file = None if page is None else page.channel.fileno()
             record = _Record(header, folder.path / LOG, config.record_required, file)
-            result = _carry_out(view.name, config, session, orders, record, operator)
+            result = _carry_out(view.name, config, session, orders, record, operator, page)
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
@@ -150,7 +154,7 @@ def walk(
                 folder.write_figures({"drive": _figure(log)})
             except (LogError, OutputError) as error:
                 viewer.say(error)
-    return BAD_INPUT if _failed(result) else OK
+    return BAD_INPUT if _failed(result) or result["log_cut"] else OK
 
 
 def _figure(log: Path) -> Any:
@@ -192,7 +196,7 @@ def _calibration(config: DriveConfig) -> str:
 def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
     """Table and sentences; `log` are the words with which `replay` reads the log."""
     again = f"What was read and decided: {typed('replay')} {log}"
-    again = again if result["logs"] else f"No log was kept: {result['log_failure']}."
+    again = again if result["logs"] else f"No log was kept: {_why(result)}."
     tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
 
 
@@ -215,16 +219,21 @@ def _carry_out(
     orders: Orders,
     record: _Record,
     operator: Operator,
+    page: ViewProcess | None,
 ) -> dict[str, Any]:
-    """Drive, with the log and the status line in a process of their own."""
+    """Drive, with the log and the status line in a process of their own, as with a page."""
     feed = Feed(record.words, record.header.pack(), files=record.files)
     log = record.log
-    unlogged = False
+    unlogged, recent = False, Recent()
 
     def keep(session: Session, t: float) -> None:
-        nonlocal unlogged
+        nonlocal unlogged, page
+        tick = Tick.of(session, t)
+        if page is not None and (missed := recent.step(t, tick.missed)) > MANY:
+            page.give_up(f"the loop missed {missed} ticks within a second; the drive goes on")
+            page = None
         try:
-            feed.send(Tick.of(session, t).pack())
+            feed.send(tick.pack())
         except LogError as error:  # the robot walks on without this tick in its log
             feed.skip(str(error))
             if not unlogged:
@@ -235,13 +244,17 @@ def _carry_out(
     operator = dataclasses.replace(operator, watches=lambda: feed.watched)
     with feed, urgent() as priority:
         report = drive(session, config, orders.arm, keep, operator)
+    logs = [each.name for each in parts(log) if each.exists()]
+    kept = feed.complete and bool(logs)
+    why = feed.failure or ("" if kept else f"{log} is not there any more")
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
     tail = {
         "priority": priority.value,
-        "unlogged": 0 if feed.complete else feed.offered - count(log),
-        "log_complete": feed.complete,
-        "log_failure": feed.failure,
-        "logs": [each.name for each in parts(log) if each.exists()],
+        "unlogged": 0 if kept else feed.offered - count(log),
+        "log_complete": kept,
+        "log_cut": feed.failed or not logs,
+        "log_failure": why,
+        "logs": logs,
     }
     return head | report.result(session) | tail
 
@@ -292,9 +305,13 @@ def _note(result: Mapping[str, Any]) -> str:
         )
     if not result["log_complete"] and result["logs"]:
         files = f"Its files: {', '.join(result['logs'])}."
-        why = result.get("log_failure")  # results of older versions have none
-        lines.append(f"The log is not complete{f': {why}' if why else ''}. {files}")
+        lines.append(f"The log is not complete: {_why(result)}. {files}")
     return "\n".join(lines)
+
+
+def _why(result: Mapping[str, Any]) -> str:
+    """Why the log is not complete; results of older versions do not tell."""
+    return result.get("log_failure") or "nothing is known of the reason"
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

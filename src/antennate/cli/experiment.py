@@ -28,6 +28,7 @@ from antennate.errors import (
     raised,
 )
 from antennate.experiments.running import keep, require_films, write_films
+from antennate.messages import typed
 from antennate.params.base import Params
 from antennate.studies.engines import WARP
 from antennate.studies.experiment import Experiment, Outcome
@@ -96,6 +97,11 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
         StudyOptions if experiment.continued else Options,
         without=_without(experiment),
     )
+    if experiment.continued and options.config is None and "assumed" not in config.model_fields_set:
+        raise ConfigError(
+            f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
+            "found none"
+        )
     experiment.check(config)
     trial = _filmed(options)
     if trial is not None:
@@ -144,7 +150,7 @@ def carry_out(
     ):
         if view is not None:
             view.results = str(run.path)
-        run.keeps_store = experiment.continued
+        run.keeps_store = experiment.continued or experiment.grows is not None
         workers = replace(workers, store=run.store, shared=environment(kind, config))
         try:
             if shards and run.store is not None:
@@ -179,7 +185,8 @@ def _folder(
         how: dict[str, Any] = {"command": "merge", "reads": reads}
     elif experiment.on_workers:
         resume = options.resume or options.retry or experiment.continued
-        how = {"resume": resume, "retry": options.retry}
+        tasks = experiment.grows if options.shard is None else None
+        how = {"resume": resume, "retry": options.retry, "tasks": tasks}
     else:
         how = {}
     return folder_for(experiment.view, options, config, argv, identity, **how)
@@ -227,6 +234,8 @@ def _outcome(
     view: SimulationView | None,
 ) -> Outcome:
     """Run it: watched, logged, or neither."""
+    if options.log:
+        run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
     logs = run.folder(LOGS) if options.log else None
     interim = Interim()
 

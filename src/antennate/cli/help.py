@@ -21,7 +21,8 @@ _LEAST_TEXT = 24
 SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
-_LATER = ("--view", "--foxglove", "--video", "--slurm", "--shard")
+_LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--key")
+_LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
 """Options that nobody uses first: they come last on the short page."""
 
 
@@ -50,9 +51,9 @@ def short_page(command: Command) -> str:
     the other half leaves.
     """
     outside = (option for option in command.parameters if len(option.path) == 1)
-    top = sorted(outside, key=lambda option: not option.metavar.startswith("NAME"))
+    top = sorted(outside, key=lambda each: (_rank(each), not each.metavar.startswith("NAME")))
     head = _usage(command, command.description.split("\n\n")[0])
-    tail = [*_groups(command.model, command.parameters), ""]
+    tail = [*_groups(command.model, command.parameters), "", *_lists(command)]
     tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
     room = SHORT_LINES - len(head) - len(tail)
     others = sorted(command.others, key=_rank)
@@ -92,7 +93,7 @@ def long_page(command: Command) -> str:
         by_group.setdefault(option.path[:-1], []).append(option)
     for group, options in by_group.items():
         lines += _section(_title(command.model, group), options)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "", *_lists(command)]).rstrip() + "\n"
 
 
 def width() -> int:
@@ -107,9 +108,15 @@ def paragraphs(text: str) -> list[str]:
 
 
 def _usage(command: Command, description: str) -> list[str]:
-    free = "".join(f" {option.metavar}" for option in command.others if option.positional)
+    free = "".join(f" {option.free}" for option in command.others if option.free)
     usage = f"usage: antennate {command.name}{free} [OPTIONS]"
     return [usage, "", *paragraphs(description)]
+
+
+def _lists(command: Command) -> list[str]:
+    """How a list is given, if the command takes one."""
+    many = any(option.many for option in [*command.others, *command.parameters])
+    return ["A list (...) is words separated by spaces."] if many else []
 
 
 def _section(title: str, options: Sequence[Option]) -> list[str]:
@@ -119,7 +126,7 @@ def _section(title: str, options: Sequence[Option]) -> list[str]:
 
 def _block(option: Option) -> list[str]:
     """An option in one line or more."""
-    head = option.metavar if option.positional else option.offered
+    head = option.free or option.offered
     if not option.positional and option.metavar:
         head += f" {option.metavar}{'...' if option.many else ''}"
     text = "; ".join(filter(None, [option.meaning, option.limits]))

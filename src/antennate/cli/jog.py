@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import BusOptions, parse_writer, require_bus
+from antennate.cli.addresses import BusOptions, parse_robot, require_bus
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, typed_keys
 from antennate.cli.options import option
@@ -19,6 +19,7 @@ from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.safety.deadlines import JOG_PERIOD
 from antennate.hardware.setup.config import JogConfig
 from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.servos import joints_of
@@ -30,8 +31,6 @@ positive sense, - or the left arrow back, n and p go to the next and the previou
 
 Torque is on that joint alone and off at the end, verified. If the program dies, the joint stops
 within 0.2 s by its own watchdog. A servo that is not set up for its joint gets no torque."""
-_PERIOD = 0.04
-"""Time between two readings [s]: a fifth of the watchdog's."""
 _REST = 0.3
 """Time for a joint to come to rest once the keys have ended [s] (assumed)."""
 _STEPS = {"+": 1, "=": 1, "right": 1, "up": 1, "-": -1, "left": -1, "down": -1}
@@ -51,7 +50,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
     """
-    config, orders, _ = parse_writer("jog", DESCRIPTION, RobotFile.for_jog, argv, Orders)
+    config, orders = parse_robot("jog", DESCRIPTION, RobotFile.for_jog, argv, Orders)
     names = config.robot.joint_names
     if orders.joint and orders.joint not in names:
         raise ConfigError(
@@ -103,12 +102,12 @@ def _move(jog: Jog, speed: float, keys: ReadKeys, clock: HostClock, status: Stat
     last, arrives = "", math.inf
     jog.begin()
     while last not in (*_OTHERS, "q") and clock.now() < arrives:
-        last = _carry_out(jog, keys(_PERIOD if last != END else 0.0)) or last
+        last = _carry_out(jog, keys(JOG_PERIOD if last != END else 0.0)) or last
         now = jog.look()
         if last != END:
             arrives = clock.now() + abs(now.goal - now.angle) / speed + _REST
         else:
-            clock.sleep_until(clock.now() + _PERIOD)
+            clock.sleep_until(clock.now() + JOG_PERIOD)
         if status.due(clock.now()):
             status.show(_line(now, jog.joint.name))
     return last

@@ -17,7 +17,7 @@ from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.replay import complain, say_unguarded
 from antennate.cli.results import ResultOptions, log_of, tell
-from antennate.errors import ConfigError, MissingPackageError, OutputError
+from antennate.errors import ConfigError, MissingPackageError, OutputError, reason
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import extra, one_line, shortened, typed
 from antennate.params.base import Params
@@ -47,7 +47,7 @@ _ENDINGS = {
 _ROWS = 4096
 """Ticks that are written to a Parquet file at once."""
 _SHOWN = 10
-"""Most events that `info` prints."""
+"""Most events that `info` prints at either end of a log."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _target(path: Path, options: Options) -> Path:
     except OSError as error:
         raise OutputError(
             f"--out: expected a name that can be written, found {shortened(str(target))}: "
-            f"{error.strerror}"
+            f"{reason(error)}"
         ) from None
     return target
 
@@ -245,9 +245,9 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
 
 def _table(result: Mapping[str, Any]) -> Table:
     events, start = result["events"], result["start_ns"]
-    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events[:_SHOWN]]
-    if len(events) > _SHOWN:
-        lines.append(f"and {len(events) - _SHOWN} more events; --json has all")
+    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events]
+    if (hidden := len(events) - 2 * _SHOWN) > 0:
+        lines[_SHOWN:-_SHOWN] = [f"... {hidden} more events; --json has all"]
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]
     note = "\n".join(map(one_line, lines))
     return Table(f"Log of {one_line(result['controller'])}", ["messages"], rows, note)

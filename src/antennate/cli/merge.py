@@ -16,7 +16,6 @@ from antennate.cli.experiment import Options, Shards, carry_out
 from antennate.cli.options import option
 from antennate.cli.run_options import shard_of
 from antennate.errors import BadInputError, ConfigError
-from antennate.messages import shown
 from antennate.params.base import Params
 from antennate.studies.identity import differences
 from antennate.studies.pool import places_of
@@ -38,7 +37,7 @@ _NAMED = 3
 class MergeOptions:
     """Which shards, and where the run goes."""
 
-    shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD")
+    shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD", positional=True)
     out: Path | None = option(None, "folder for the run, else runs/COMMAND-N", "FOLDER")
     overwrite: bool = option(False, "replace the results that the folder holds", needs=["--out"])
     json: bool = option(False, "print the content of result.json and nothing else")
@@ -51,11 +50,9 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no shard, trials are missing, or nothing can be written.
     """
-    if argv and not argv[0].startswith("-"):
-        raise ConfigError(f"merge: expected --shards before the folders, found {shown(argv[0])}")
     _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
     if not options.shards:
-        raise ConfigError("--shards: expected the folders of all shards, found none")
+        raise ConfigError("merge: expected the folders of all shards, found none")
     shards = _gathered(options.shards)
     name = str(shards.identity["command"])
     if name not in experiments.names():
@@ -160,6 +157,6 @@ def _require_all(part: _Part, found: Set[int]) -> None:
     if missing:
         named = ", ".join(missing[:_NAMED]) + (", …" if missing[_NAMED:] else "")
         raise BadInputError(
-            f"--shards: expected {part.trials} finished trials, found {len(found)}: a shard is "
+            f"merge: expected {part.trials} finished trials, found {len(found)}: a shard is "
             f"missing: {named}"
         )

@@ -7,6 +7,7 @@ is not used: it takes values such as -1e-3 and -inf for flags, and answers in wo
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,10 +19,12 @@ from pydantic.fields import FieldInfo
 
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shortened, shown
-from antennate.params.base import GATHERED, meaning
+from antennate.params.base import meaning
 from antennate.params.faults import group_of
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
+_WITH_COMMAS = frozenset({"FILE", "NAME=VALUE"})
+"""What stands for values in which a comma may be."""
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
 
@@ -57,7 +60,6 @@ class Option:
         model: Group that the field belongs to.
         examples: Known values among others, for completion.
         many: Whether it takes several values.
-        gathered: Whether those of a flag given again add to the first ones.
         choices: All valid values, if they are few.
         limits: Bounds in words, such as `at least 1`.
         default: Its default in words, empty if there is none to tell.
@@ -71,7 +73,6 @@ class Option:
     model: type
     examples: tuple[str, ...]
     many: bool = False
-    gathered: bool = False
     choices: tuple[Any, ...] = ()
     limits: str = ""
     default: str = ""
@@ -91,6 +92,11 @@ class Option:
     def flag(self) -> str:
         """The flag, such as `--tunnel.free-width`."""
         return flag_of(self.path)
+
+    @property
+    def free(self) -> str:
+        """What stands for it in the usage of its command, if it is given without a flag."""
+        return f"{self.metavar}{'...' if self.many else ''}" if self.positional else ""
 
     @property
     def meaning(self) -> str:
@@ -184,7 +190,6 @@ def _option(path: tuple[str, ...], model: type, default: Any) -> Option | None:
         path=path,
         metavar="" if switch else str(extra.get("metavar", metavar)),
         many=many,
-        gathered=GATHERED in field.metadata,
         choices=choices,
         examples=tuple(map(str, field.examples or ())),
         model=model,
@@ -243,7 +248,8 @@ def _words(value: Any) -> str:
 def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str, ...], Any]:
     """Values by the path of their field.
 
-    Of a flag given twice the last one counts, unless its values are gathered.
+    A list takes all words up to the next flag, and those of a flag given again besides. Of other
+    flags given twice the last one counts.
 
     Raises:
         ConfigError: A flag is unknown, or has too few or too many values.
@@ -261,8 +267,8 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
         elif not words:
             raise ConfigError(f"{name}: expected {_count(option)}, found none")
         elif option.many:
-            before = values.get(option.path, ()) if option.gathered else ()
-            values[option.path] = (*before, *map(option.value, words))
+            _refuse_commas(option, words)
+            values[option.path] = (*values.get(option.path, ()), *map(option.value, words))
             rest = []
         else:
             values[option.path] = option.value(words[0])
@@ -271,9 +277,30 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
             if not free:
                 meant = nearest(word, by_flag) if word.startswith("-") else ""
                 raise ConfigError(f"expected flags only{meant}, found {shown(word)}")
-            first = free.pop(0)
-            values[first.path] = first.value(word)
+            first = free[0]
+            if first.many:
+                values[first.path] = (*values.get(first.path, ()), first.value(word))
+            else:
+                values[free.pop(0).path] = first.value(word)
     return values
+
+
+def _refuse_commas(option: Option, words: Sequence[str]) -> None:
+    """Refuse a list in one word.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    listed = [word for word in words if "," in word and "/" not in word]
+    if not listed or option.metavar in _WITH_COMMAS or Path in option.kinds:
+        return
+    parts = [part.strip() for part in ",".join(words).split(",") if part.strip()]
+    how = "values separated by spaces"
+    if option.kinds & {int, float}:
+        how = "numbers separated by spaces, with decimal points"
+    elif parts:
+        how += f", as {option.flag} {shortened(shlex.join(parts))}"
+    raise ConfigError(f"{option.flag}: expected {how}, found {shown(' '.join(words))}")
 
 
 def require_text(flag: str, text: str) -> None:

@@ -18,7 +18,7 @@ from antennate.files import write_whole
 from antennate.params.base import Params
 from antennate.studies.report import View, command_of, compare, report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import REPORT, files_of, is_same
+from antennate.studies.run_files import REPORT, files_of, is_same, listed
 
 DESCRIPTION = """\
 Write a run as one HTML page that needs nothing else: what was run, what came out with its
@@ -66,6 +66,8 @@ def command(argv: Sequence[str]) -> int:
     else:
         raise ConfigError("expected the folder of a run, or --compare RUN RUN, found none")
     _require_no_source(place, runs)
+    if options.run is not None and own and listed(options.run) is not None:
+        RunDirectory.open(options.run).claim_names([REPORT])
     write_whole(place, text.encode(), overwrite=own or options.overwrite)
     sys.stderr.write(f"written to {place}\n")
     return OK

@@ -22,6 +22,7 @@ from antennate.studies.replaced import settle_if_free
 from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOG, LOGS, require_apart
+from antennate.studies.store import Tasks
 from antennate.telemetry.recover import RECOVERED
 
 
@@ -45,6 +46,7 @@ def folder_for(
     retry: bool = False,
     command: str = "",
     reads: Sequence[Path] = (),
+    tasks: Tasks | None = None,
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
 
@@ -59,6 +61,7 @@ def folder_for(
         resume: Go on with the run that the folder holds, if there is one; None if it never can.
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
+        tasks: As for `RunDirectory.create`.
         reads: Files that it reads, beside those that the configuration names.
 
     Raises:
@@ -71,7 +74,7 @@ def folder_for(
     given = [] if options.config is None else [options.config]
     require_apart(options.out, config.model_dump(), [*reads, *given])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
-    with RunDirectory.create(*place) as folder:
+    with RunDirectory.create(*place, tasks=tasks) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])
         yield folder
         write_report(folder, view)

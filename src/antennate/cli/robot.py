@@ -6,9 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from antennate.cli.arguments import parse
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.addresses import RobotFileOptions, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import Params
 from antennate.robots.parts import bill
 from antennate.robots.servos import EXTENDED_MODE
@@ -39,13 +42,22 @@ class DescribedRobot(Params):
     robot: RobotSpec = RobotSpec()
 
 
+@dataclass(frozen=True)
+class Options(ResultOptions, RobotFileOptions):
+    """Where the results go, and which file describes the robot."""
+
+
+def _of_robot(file: RobotFile) -> DescribedRobot:
+    return DescribedRobot(robot=file.robot)
+
+
 def command(argv: Sequence[str]) -> int:
     """Describe the robot, and write the diagram and the bill.
 
     Raises:
         AntennateError: The robot or the folder cannot be used.
     """
-    config, options = parse("robot", DESCRIPTION, DescribedRobot, argv, ResultOptions)
+    config, options = parse_robot("robot", DESCRIPTION, _of_robot, argv, Options)
     robot = config.robot
     with folder_for(VIEW, options, config, argv) as folder:
         from antennate.robots.wiring import wiring  # slow to import

@@ -14,6 +14,9 @@ _EVERY = 0.2
 """Time between two lines on a terminal [s]."""
 _EVERY_PLAIN = 1.0
 _COLUMNS = 80
+_GAP = "... "
+_END = 3
+"""The end of a line without an instruction gets this part of the width."""
 _CLEAR = "\r\x1b[K"
 
 
@@ -38,10 +41,17 @@ class StatusLine:
         self._due = now + (_EVERY if self.terminal else _EVERY_PLAIN)
         return True
 
-    def show(self, text: str) -> None:
-        """Show a line; on a terminal cut at its width, since a line that wraps stays."""
+    def show(self, text: str, instruction: str = "") -> None:
+        """Show a line; on a terminal shortened to its width, since a line that wraps stays.
+
+        Args:
+            text: The line; its middle goes first.
+            instruction: What a person is to do, behind the line; it goes last.
+        """
+        text = f"{text} | {instruction}" if instruction else text
         if self.terminal:
-            text = _CLEAR + one_line(text)[: self._columns() - 1]
+            end = len(one_line(instruction)) or (self._columns() - 1) // _END
+            text = _CLEAR + shortened(one_line(text), self._columns() - 1, end)
         self._open = self.terminal
         write(text if self.terminal else text + "\n")
 
@@ -66,6 +76,15 @@ class StatusLine:
             return os.get_terminal_size(sys.stderr.fileno()).columns or _COLUMNS
         except (OSError, ValueError):
             return _COLUMNS
+
+
+def shortened(text: str, width: int, end: int) -> str:
+    """A line of at most so many characters without its middle; of its end so many stay."""
+    if len(text) <= width:
+        return text
+    end = min(end, width)
+    begin = max(0, width - end - len(_GAP))
+    return f"{text[:begin]}{_GAP if begin else ''}{text[len(text) - end :]}"
 
 
 def write(text: str) -> None:

@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import FromFile, parse
+from antennate.cli.addresses import RobotFileOptions, parse_robot, usual_file
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import stop_signals
 from antennate.cli.twin_kept import Kept, KeptOptions
 from antennate.cli.view_options import PageOptions, page_of
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, reason
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
+from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
 from antennate.twin.config import TwinConfig, watched
@@ -30,6 +31,7 @@ from antennate.twin.endpoints import Endpoint
 from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.passage import Passage
+from antennate.twin.rfc2217 import Rfc2217Endpoint
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
@@ -41,14 +43,25 @@ if TYPE_CHECKING:
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
-_OF_SERVOS = ("duration", "fault", "push", "plugged", "config", "servos", "tcp", "orders")
+_OF_SERVOS = (
+    "duration",
+    "fault",
+    "push",
+    "plugged",
+    "config",
+    "no_config",
+    "servos",
+    "tcp",
+    "rfc2217",
+    "orders",
+)
 """What servos alone read."""
 
 DESCRIPTION = """\
 Serve the simulated robot in a scene on two serial ports (pseudo-terminals), which carry the same
 bytes as those of a real robot: one the frames of the antenna board, one a DYNAMIXEL bus with all
 servos. Prints one JSON line with the paths when ready. Physics begins when the first servo gets
-torque. --fault and --touch may be repeated.
+torque.
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,
@@ -57,7 +70,7 @@ no servo has torque.
 
 --push yaw1=20deg@3s turns a joint whose servo has no torque.
 
---servos 1:xl330-m288,2:xl430-w250@1000000,1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
+--servos 1:xl330-m288 2:xl430-w250@1000000 1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
 as delivered. --orders reads lines while it runs: plug NAME, unplug NAME, only NAME, next,
 push NAME=ANGLE, where a NAME is a joint, a number from 1 on, or all; touch left:20mm, to follow
 the marks of `antennate record`; fault servo:7=silent.
@@ -72,11 +85,14 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 
 
 @dataclass(frozen=True)
-class Places(FromFile, KeptOptions, PageOptions):
+class Places(RobotFileOptions, KeptOptions, PageOptions):
     """Where to serve; two pseudo-terminals if no port is given."""
 
     tcp: str | None = option(
         None, "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT"
+    )
+    rfc2217: str | None = option(
+        None, "TCP likewise, with speed, DTR and RTS for clients that need them", "[HOST:]PORT"
     )
     udp: str | None = option(None, "the board on a UDP port instead, likewise", "[HOST:]PORT")
     key: Path | None = option(
@@ -85,8 +101,8 @@ class Places(FromFile, KeptOptions, PageOptions):
         "FILE",
         needs=["--udp"],
     )
-    servos: str | None = option(
-        None, "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT],..."
+    servos: tuple[str, ...] = option(
+        (), "these servos alone, without a robot; or a TOML file", "ID:MODEL[@BAUD][xCOUNT]"
     )
     orders: Path | None = option(
         None, "take orders from a file, a named pipe or - for stdin", "FILE"
@@ -106,11 +122,23 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
-    config, places = parse("twin", DESCRIPTION, TwinConfig, argv, Places)
+    config, places = parse_robot(
+        "twin", DESCRIPTION, _of_robot, argv, Places, file_of=_file, named=TwinConfig
+    )
     orders = None if places.orders is None else Orders(str(places.orders), _say)
-    if places.servos is None:
+    if not places.servos:
         return _serve_robot(config, places, orders)
     return _serve_servos(config, places, read_list(places.servos), orders)
+
+
+def _of_robot(file: RobotFile) -> TwinConfig:
+    """What the twin takes of a robot's file: the robot."""
+    return TwinConfig(robot=file.robot)
+
+
+def _file(places: Places) -> Path | None:
+    """The file to read; servos alone have no robot."""
+    return places.config if places.servos is not None else usual_file(places)
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
@@ -119,8 +147,8 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
         Kept(places, robot) as kept,
-        page_of(places) or nullcontext() as page,
-        TwinServer(robot, faults, *_endpoints(places), orders) as server,
+        page_of(places, idle=True) or nullcontext() as page,
+        TwinServer(robot, faults, *_endpoints(places, robot), orders) as server,
     ):
         _watch(robot, passage, faults, kept, places.passed)
         if page is not None:
@@ -185,7 +213,8 @@ def _serve_servos(
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)
     box = ServoBox(entries, config.plugged, config.push)
-    bus = TcpEndpoint(*_place("--tcp", places.tcp)) if places.tcp is not None else None
+    kind, host, port = _tcp(places)
+    bus = None if kind is None else kind(host, port)
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
         server.run(_until(config, server.paths, lambda: True))
     return OK
@@ -199,7 +228,7 @@ def _require_of_servos(config: TwinConfig, places: Places) -> None:
     """
     options = [(name, getattr(places, name), field) for name, field in fields_of(Places).items()]
     given = [(name, value) for name, value, field in options if value != field.default]
-    given += [(path, value) for path, _, value in changes(config, paths_of(TwinConfig))]
+    given += list(changes(config, paths_of(TwinConfig)))
     for path, value in given:
         if path not in _OF_SERVOS:
             raise ConfigError(
@@ -242,19 +271,34 @@ def _tell(passage: Passage, file: Path | None) -> None:
         try:
             file.touch()
         except OSError as error:
-            sys.stderr.write(f"--passed: expected to make {file}, found: {error.strerror}\n")
+            sys.stderr.write(f"--passed: expected to make {file}, found: {reason(error)}\n")
 
 
-def _endpoints(places: Places) -> tuple[Endpoint | None, Endpoint | None]:
+def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
-    board = bus = None
+    kind, host, port = _tcp(places)
+    board: Endpoint | None = None
     if places.udp is not None:
         board = UdpEndpoint(*_place("--udp", places.udp), read_key(places.key))
-    if places.tcp is not None:
-        host, port = _place("--tcp", places.tcp)
-        board = board or TcpEndpoint(host, port)
-        bus = TcpEndpoint(host, port and port + 1)
-    return board, bus
+    elif kind is Rfc2217Endpoint:
+        board = Rfc2217Endpoint(host, port, robot.set_lines)
+    elif kind is not None:
+        board = kind(host, port)
+    return board, None if kind is None else kind(host, port and port + 1)
+
+
+def _tcp(places: Places) -> tuple[type[TcpEndpoint] | None, str, int]:
+    """The kind of TCP endpoint that is wanted, if any, with its host and port.
+
+    Raises:
+        ConfigError: Both are.
+    """
+    if places.tcp is not None and places.rfc2217 is not None:
+        raise ConfigError("--rfc2217: expected none beside --tcp, found both")
+    for kind, text in ((TcpEndpoint, places.tcp), (Rfc2217Endpoint, places.rfc2217)):
+        if text is not None:
+            return kind, *_place(kind.flag, text)
+    return None, "", 0
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:

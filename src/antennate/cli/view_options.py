@@ -68,8 +68,12 @@ def foxglove_of(options: FoxgloveOptions) -> int | None:
     return options.foxglove_port if options.foxglove else None
 
 
-def page_of(options: PageOptions) -> ViewProcess | None:
+def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:
     """The process of the page that is wanted, None of none; it is to be closed.
+
+    Args:
+        options: What is wanted.
+        idle: Whether it gives way to everything else, as beside a loop in real time.
 
     Raises:
         AntennateError: It cannot be served.
@@ -80,7 +84,7 @@ def page_of(options: PageOptions) -> ViewProcess | None:
     from antennate.telemetry.view.process import ViewProcess
 
     port = options.view_port if options.view else None
-    return ViewProcess(port, view_server.__name__, foxglove, on_lost=_say)
+    return ViewProcess(port, view_server.__name__, foxglove, on_lost=_say, idle=idle)
 
 
 def _say(line: str) -> None:

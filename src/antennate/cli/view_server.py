@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 from antennate.cli.status import write
 from antennate.errors import AntennateError
+from antennate.hardware.driving.priority import give_way
 from antennate.messages import one_line
 from antennate.telemetry.view.channel import FAILED, READY, Channel
+from antennate.telemetry.view.process import IDLE
 
 if TYPE_CHECKING:
     from antennate.telemetry.view.show import Display
@@ -24,13 +26,14 @@ def main() -> int:
     """Serve until the program that is shown has ended; words as for `ViewProcess`."""
     for number in _STOPS:  # that program decides when it is over
         signal.signal(number, signal.SIG_IGN)
-    channel_file, page_file, foxglove = sys.argv[1:4]
+    channel_file, page_file, foxglove, *more = sys.argv[1:]
     channel = Channel(socket.socket(fileno=int(channel_file)))
     try:
         _serve(
             channel,
             None if page_file == _NONE else socket.socket(fileno=int(page_file)),
             None if foxglove == _NONE else int(foxglove),
+            IDLE in more,
         )
     except AntennateError as error:
         channel.send(FAILED, one_line(str(error)).encode())
@@ -38,7 +41,9 @@ def main() -> int:
     return 0
 
 
-def _serve(channel: Channel, listener: socket.socket | None, foxglove: int | None) -> None:
+def _serve(
+    channel: Channel, listener: socket.socket | None, foxglove: int | None, idle: bool
+) -> None:
     from antennate.telemetry.view.show import run
 
     displays: list[Display] = []
@@ -47,6 +52,8 @@ def _serve(channel: Channel, listener: socket.socket | None, foxglove: int | Non
             displays.append(_sink(foxglove))
         if listener is not None:
             displays.append(_page(channel, listener, stack))
+        if idle:
+            give_way()
         channel.send(READY)
         run(channel, displays)
 

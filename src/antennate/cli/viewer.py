@@ -33,7 +33,7 @@ REQUIRED, PAGE = "required", "page="
 _STDOUT = 1
 _BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
 """A cause that is also shown while the robot is not armed."""
-_ASKED = re.compile(r"touch=\((.*?)\)")
+_ASKED = re.compile(r"touch=\((.*)\)(?= drift=|$)")
 """What a person is to do, within the note of a tick."""
 
 
@@ -52,7 +52,8 @@ class Display:
             self.status.say(f"{asked[0].upper()}{asked[1:]}.")
         self._asked = asked
         if self.status.due(tick.now):
-            self.status.show(line(tick, unlogged))
+            text = line(tick, unlogged)
+            self.status.show(text.replace(f"({asked})", "asked") if asked else text, asked)
 
 
 def line(tick: Tick, unlogged: int) -> str:

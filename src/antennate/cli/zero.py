@@ -17,10 +17,10 @@ from antennate.cli.results import print_table
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.driving.connect import require_servos
-from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.safety import torque
 from antennate.hardware.setup.config import ZeroConfig
 from antennate.hardware.setup.person import Quit
 from antennate.hardware.setup.robot_toml import change
@@ -69,7 +69,7 @@ def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: P
     robot, clock = config.robot, HostClock()
     with master(opener_of(orders.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
-        if left := bringup.disable(bus, robot.ids):
+        if left := torque.disable(bus, robot.ids):
             raise BringUpError(f"expected torque off, servos {left} did not confirm it")
         positions = Positions(bus, robot, lambda time: clock.sleep_until(clock.now() + time))
         zeroing = Zeroing(robot, config.setup, positions)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antennate.errors import ControllerError, raised
+from antennate.errors import ControllerError, is_ctrl_c, raised
 from antennate.robots.spec import RobotSpec
 from antennate.types import (
     AntennaFrame,
@@ -60,9 +60,9 @@ class CheckedController:
         """
         try:
             self._controller.reset(rows, phase)
-        except KeyboardInterrupt:
-            raise
         except BaseException as error:
+            if is_ctrl_c(error):
+                raise
             raise ControllerError(f"reset raised {raised(error)}") from error
 
     def step(self, frame: AntennaFrame) -> JointCommand:
@@ -79,9 +79,11 @@ class CheckedController:
             self._require_shapes(command)
             self.maneuver = self._controller.maneuver
             sound = self._all_sound(command)
-        except (KeyboardInterrupt, ControllerError):
+        except ControllerError:
             raise
         except BaseException as error:
+            if is_ctrl_c(error):
+                raise
             raise ControllerError(f"step raised {raised(error)}") from error
         if not sound:
             self._find_faults(command)

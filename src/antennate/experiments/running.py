@@ -117,7 +117,7 @@ def run(
         overwrite: Replace a run that `out` holds.
         video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
-        resume: Go on with the run that `out` holds, if there is one.
+        resume: Go on with the run that `out` holds, if there is one; with more trials, too.
         engine: Where the workers are: local, dask, dask://HOST:PORT, slurm, or an object with
             `submit` as those of concurrent.futures have.
         settings: Fields of its configuration where a name was given, with nested groups as objects
@@ -147,8 +147,8 @@ def run(
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
     require_apart(out, config.model_dump())
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
-    with RunDirectory.create(*place) as directory:
-        directory.keeps_store = found.continued
+    with RunDirectory.create(*place, tasks=found.grows) as directory:
+        directory.keeps_store = found.continued or found.grows is not None
         directory.describe(config)
         pool = replace(pool, store=directory.store)
         outcome = found.run(config, pool, on_step, directory.append)

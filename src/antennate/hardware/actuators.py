@@ -34,9 +34,11 @@ class Tally:
     echoes: int = 0
 
 
-@dataclass
+@dataclass(kw_only=True)
 class ActuatorState:
     """What is known of the actuators; ids are those of the robot's description.
+
+    What the supervisor decides on has no default: what a bus cannot tell has to be said.
 
     Attributes:
         missed: Answers missed in a row, by id.
@@ -50,13 +52,13 @@ class ActuatorState:
         tracebacks: Of errors that nobody expected while torque was taken off.
     """
 
-    missed: dict[int, int] = field(default_factory=dict[int, int])
-    errors: dict[int, str] = field(default_factory=dict[int, str])
-    watchdogs: tuple[int, ...] = ()
-    disarmed: tuple[int, ...] = ()
-    supply: float = math.nan
+    missed: dict[int, int]
+    errors: dict[int, str]
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
+    supply: float
+    bus_error: str
     angles: tuple[float, ...] = ()
-    bus_error: str = ""
     tracebacks: Tracebacks = field(default_factory=Tracebacks)
 
     def silent(self, missed: int) -> bool:

@@ -20,10 +20,8 @@ from pydantic import (
 )
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.params.faults import describe
+from antennate.params.faults import Unread, describe
 
-GATHERED = "gathered"
-"""Marks a list whose flag, given again, adds to it; of other flags the last one counts."""
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
 ALLOWED = "allowed"
@@ -79,22 +77,27 @@ class Params(Strict):
         never = (path for path in self.unread if not path.startswith(f"{ROBOT}."))
         why = {**dict.fromkeys(never, "it is not read here"), **self.unread_here()}
         allowed = (info.context or {}).get(ALLOWED, ())
-        for path, default, found in changes(self, why):
+        for path, found in changes(self, why):
             if path not in allowed:
-                raise ValueError(f"{path}: expected {default}, as {why[path]}, found {found}")
+                raise self.unread_error(path, why[path], found)
         return self
 
+    def unread_error(self, path: str, why: str, found: Any) -> Unread:
+        """The error of a dotted parameter that nothing reads and that has a value of its own."""
+        never = {*self.unread, *self.unread_here()}
+        read = [name for name in paths_of(type(self)) if name not in never]
+        return Unread(path, why, found, read)
 
-def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any, Any]]:
-    """Those of these dotted parameters that differ from their default: path, default and value."""
+
+def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any]]:
+    """Those of these dotted parameters that differ from their default, with their values."""
     for path in paths:
         *groups, name = path.split(".")
         group: Any = config
         for part in groups:
             group = getattr(group, part)
-        default, found = type(group).model_fields[name].default, getattr(group, name)
-        if found != default:
-            yield path, default, found
+        if (found := getattr(group, name)) != type(group).model_fields[name].default:
+            yield path, found
 
 
 def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
@@ -150,7 +153,14 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
         )
 
 
-def number(default: Any, unit: str, source: str, needs: Sequence[str] = (), **bounds: Any) -> Any:
+def number(
+    default: Any,
+    unit: str,
+    source: str,
+    needs: Sequence[str] = (),
+    metavar: str = "",
+    **bounds: Any,
+) -> Any:
     """Declare one parameter with its unit and source; the docstring below it is its meaning.
 
     Args:
@@ -158,9 +168,12 @@ def number(default: Any, unit: str, source: str, needs: Sequence[str] = (), **bo
         unit: Its unit, "1" if it has none.
         source: Where the default comes from.
         needs: Flags of which one must be given beside its own.
+        metavar: What stands for its value in the help, such as FILE; else its type.
         bounds: As for pydantic's Field.
     """
     extra: dict[str, Any] = {"unit": unit, "source": source}
+    if metavar:
+        extra["metavar"] = metavar
     if needs:
         extra["needs"] = list(needs)
     return Field(default, json_schema_extra=extra, **bounds)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from antennate.messages import nearest, one_line, shown
+from antennate.messages import nearest, one_line, shortened, shown
 
 Place = tuple[int | str, ...]
 
@@ -39,6 +39,53 @@ _KINDS = {
 """What pydantic's families of error types ask for, by the first word of the type."""
 
 
+_MOST_NAMED = 6
+"""Most parameters or groups that are named in place of a parameter that nothing reads."""
+
+
+class Unread(ValueError):
+    """A parameter that nothing reads has a value of its own.
+
+    Args:
+        path: The parameter, dotted.
+        why: Why nothing reads it.
+        found: Its value.
+        read: Parameters of the same configuration that are read, dotted.
+    """
+
+    def __init__(self, path: str, why: str, found: Any, read: Sequence[str] = ()) -> None:
+        self.path, self.why, self.found, self.read = path, why, found, read
+        super().__init__(self.text())
+
+    def text(self, where: Callable[[Place], str] | None = None, inside: Place = ()) -> str:
+        """What was expected and found.
+
+        Args:
+            where: How a place is written, with dots by default.
+            inside: Place of the configuration that the path begins in.
+        """
+        spell = dotted if where is None else where
+        names = [spell((*inside, *name.split("."))) for name in (self.path, *self._instead())]
+        such = f", such as {', '.join(names[1:])}" if names[1:] else ""
+        found = shortened(str(self.found))
+        return f"{names[0]}: expected a parameter that is read{such}, found {found}, but {self.why}"
+
+    def _instead(self) -> list[str]:
+        """Those read of the same name, else of its group or one around it, else groups with some.
+
+        None of a robot, whose parts are what they are.
+        """
+        top, group, name = (*self.path.partition(".")[:1], *self.path.rpartition(".")[::2])
+        if top == "robot":
+            return []
+        read = [each.rpartition(".")[::2] for each in self.read if each.startswith(f"{top}.")]
+        found = [f"{place}.{last}" for place, last in read if last == name]
+        while not found and "." in group:
+            found = [f"{place}.{last}" for place, last in read if place == group]
+            group = group.rpartition(".")[0]
+        return (found or list(dict.fromkeys(f"{p}.*" for p, _ in read if p != top)))[:_MOST_NAMED]
+
+
 def dotted(path: Place) -> str:
     """`("tunnel", "segments", 0)` as `tunnel.segments[0]`."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
@@ -66,6 +113,8 @@ def describe(
     kind, path, context = first["type"], first["loc"], first.get("ctx", {})
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if kind == "value_error":
+        if isinstance(context["error"], Unread):
+            return context["error"].text(where, path) + more
         spell = dotted if _keys(model, path) else where  # a group is no flag
         place = f"{spell(path)}: " if path else ""
         return f"{place}{context['error']}{more}"
@@ -98,11 +147,19 @@ def group_of(annotation: Any) -> type[BaseModel] | None:
 
 
 def _keys(model: type[BaseModel], path: Place) -> list[str]:
-    """Keys of the group at `path`, none if it is not known."""
+    """Keys of the group at `path`, then those of its groups with dots; none if it is not known."""
     for part in path:
         field = model.model_fields.get(str(part))
         group = None if field is None else group_of(field.annotation)
         if group is None:
             return []
         model = group
-    return list(model.model_fields)
+    return [*model.model_fields, *_deeper(model, "")]
+
+
+def _deeper(model: type[BaseModel], start: str) -> Iterator[str]:
+    """Keys of the groups within a group, with dots."""
+    for name, field in model.model_fields.items():
+        if (group := group_of(field.annotation)) is not None:
+            yield from (f"{start}{name}.{key}" for key in group.model_fields)
+            yield from _deeper(group, f"{start}{name}.")

@@ -18,6 +18,7 @@ from antennate.antenna.dynamics import link_inertia
 from antennate.errors import MissingPackageError, OutputError, SimulationError, in_one_line
 from antennate.messages import extra
 from antennate.params.bench import Solver
+from antennate.params.faults import Unread
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.antenna_part import STOPS
@@ -85,9 +86,10 @@ def require_read(solver: Solver, physics: PhysicsParams) -> None:
     """
     usual = type(physics).model_fields["sleep_tolerance"].default
     if solver == "chain" and physics.sleep_tolerance != usual:
-        raise ValueError(
-            f"physics.sleep_tolerance: expected {usual:g}, as nothing sleeps with the solver "
-            f"chain, found {physics.sleep_tolerance:g}"
+        raise Unread(
+            "physics.sleep_tolerance",
+            "nothing sleeps with the solver chain",
+            physics.sleep_tolerance,
         )
 
 

@@ -16,7 +16,7 @@ from antennate.messages import extra, shown
 
 BACKENDS = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
 """Ways to draw, best first, and the Debian packages of each."""
-_NAME = "MUJOCO_GL"
+_NAME, _OFF = "MUJOCO_GL", "disable"
 _PATIENCE = 60.0
 """Longest wait for a trial [s]; the first one compiles shaders."""
 _TRIAL = """
@@ -32,12 +32,14 @@ _wish = [""]
 
 
 def keep_wish() -> None:
-    """Take MUJOCO_GL away and keep what it says for `backend`.
+    """Keep what MUJOCO_GL says for `backend`, and let the engine load no way to draw.
 
     The engine reads it when it is imported, and raises there if it cannot be used, even where
-    nothing is drawn.
+    nothing is drawn. If it says nothing, the engine loads GLFW, which starts a process. Processes
+    of workers inherit the setting.
     """
-    _wish[0] = os.environ.pop(_NAME, "")
+    _wish[0] = os.environ.get(_NAME, "")
+    os.environ[_NAME] = _OFF
 
 
 @functools.cache
@@ -53,7 +55,8 @@ def backend() -> str:
         raise MissingPackageError(
             f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"
         )
-    wanted = (os.environ.get(_NAME) or _wish[0]).strip().lower()
+    said = os.environ.get(_NAME, "")
+    wanted = (_wish[0] if said == _OFF else said).strip().lower()
     if wanted and wanted not in BACKENDS:
         raise BadInputError(f"{_NAME}: expected {' or '.join(BACKENDS)}, found {shown(wanted)}")
     names = [wanted] if wanted in BACKENDS else list(BACKENDS)

@@ -11,17 +11,22 @@ from antennate.errors import OutputError
 from antennate.studies.replaced import Replaced, settle
 from antennate.studies.run_files import (
     CALIBRATION,
-    ENDINGS,
+    FILES,
+    FOLDERS,
     PARTIAL,
+    ROOM,
+    add_to_list,
     files_of,
     holds_run,
     is_finished,
+    others_of,
     outdated,
     place_of,
+    require_replaceable,
     sweep,
     writing,
 )
-from antennate.studies.store import STORE, Store, open_store
+from antennate.studies.store import STORE, Store, Tasks, open_store
 
 
 class Claim(NamedTuple):
@@ -51,33 +56,40 @@ def claim(
     identity: Mapping[str, Any] | None,
     resume: bool | None,
     retry: bool,
+    tasks: Tasks | None = None,
 ) -> Claim:
     """Take a directory; see `RunDirectory.create`."""
     place = place_of(command, path)
     with writing(place):
         missing = [p for p in (place, *place.parents) if not p.exists()]
         place.mkdir(parents=True, exist_ok=path is not None)
-        for folder in ENDINGS:
+        for folder in FOLDERS:
             if (place / folder).is_symlink():
                 raise OutputError(f"expected {place / folder} within its run, found a link")
         settle(place)
-        held = files_of(place)
-        goes_on = bool(resume) and not overwrite and (place / STORE) in held
-        if held and not overwrite and not goes_on:
-            raise holds_run(place, held, resume)
+        sweep(place)
+        held, others = files_of(place), others_of(place)
+        goes_on = bool(resume) and not overwrite and not others and (place / STORE) in held
+        if overwrite:
+            require_replaceable(place)
+        elif (held or others) and not goes_on:
+            raise holds_run(place, [*others, *held], resume)
         stays = CALIBRATION if command == "calibrate" else ""
         replaced = Replaced(place, held, stays) if held and overwrite else None
         try:
-            store = open_store(place, identity)
-            sound = store is not None and not store.damaged
+            known = (stays,) if stays and held else ()
+            add_to_list(place, (PARTIAL, STORE, ROOM, *known))
+            store = open_store(place, identity, tasks if goes_on else None)
+            sound = store is not None and not store.damaged and store.holds_all(tasks)
             finished = goes_on and not retry and sound and is_finished(place)
             for file in outdated(held, stays, finished) if goes_on else ():
                 file.unlink()
-            sweep(place)
             partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
         except BaseException:
             if replaced is not None:
                 replaced.settle()
+            elif files_of(place) == [place / FILES]:
+                (place / FILES).unlink()
             with contextlib.suppress(OSError):
                 for each in missing:
                     each.rmdir()

@@ -7,6 +7,7 @@ its result in a run directory, prints its tables and its closing sentence, and d
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -100,6 +101,7 @@ class Experiment(Generic[Config, Found]):
         parts: What `on_step` counts.
         logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
             well; None if there are no controllers to log.
+        logs: Names of the logs that `logged` and `viewed` write into that folder.
         viewed: viewed(config, on_step, on_row, view, logs) runs as `run` does, in this process, and
             shows each trial on a page; the folder for logs may be None. None where nothing can be
             shown.
@@ -111,6 +113,8 @@ class Experiment(Generic[Config, Found]):
         measures: What it tells of its trials; studies take labels and units from them.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
+        tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
+            trials; None if it is the list of `trials`, or if a run does not go on with more.
         in_shards: Whether its trials are known from the start, so that shards can divide them.
     """
 
@@ -126,6 +130,7 @@ class Experiment(Generic[Config, Found]):
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
     logged: Callable[[Config, Workers, OnStep, OnRow, Path], Found] | None = None
+    logs: Callable[[Config], Sequence[str]] = lambda config: ()
     viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
@@ -135,6 +140,7 @@ class Experiment(Generic[Config, Found]):
     captions: Mapping[str, str] = field(default_factory=dict)
     on_workers: bool = True
     in_shards: bool = True
+    tasks: Callable[[Config], Sequence[Any]] | None = None
 
     @property
     def view(self) -> View:
@@ -144,6 +150,14 @@ class Experiment(Generic[Config, Found]):
             body=self.body,
             captions=self.captions,
         )
+
+    @property
+    def grows(self) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
+        """Tasks of a configuration as JSON has it; None if a run does not go on with more."""
+        tasks = self.tasks or (self.trials.every if self.trials else None)
+        if tasks is None:
+            return None
+        return lambda values: tasks(self.config.model_validate_json(json.dumps(values)))
 
     @classmethod
     def of_folder(

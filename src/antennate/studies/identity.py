@@ -168,6 +168,14 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     return ", ".join(told[:_SHOWN]) + more
 
 
+def but_trials(known: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What is run, without how many trials of it."""
+    config = {k: v for k, v in known["config"].items() if k != "trials"}
+    if isinstance(settings := config.get("settings"), Mapping):
+        config["settings"] = {k: v for k, v in settings.items() if k != "trials"}
+    return {**known, "config": config}
+
+
 def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
     group, name = path[0], ".".join(path[1:])
     if group == "code":

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from antennate.errors import WorkerError
 from antennate.studies.codec import decoded, encoded
 from antennate.studies.processes import Processes
-from antennate.studies.store import Store
+from antennate.studies.store import Store, key_of
 from antennate.studies.work import Engine, Failure, Here, Work
 
 Result = TypeVar("Result")
@@ -107,11 +107,6 @@ def chunk_of(total: int, workers: int | Workers, most: int) -> int:
     return max(1, min(most, math.ceil(total / (3 * workers_from(workers).count))))
 
 
-def _key(call: int, place: int) -> str:
-    """The name under which a task is kept."""
-    return f"{call}.{place}"
-
-
 def places_of(records: Iterable[str]) -> set[int]:
     """Places of the tasks that a shard kept, by the keys of its records: those of one call."""
     return {int(key.removeprefix("0.")) for key in records if key.startswith("0.")}
@@ -137,7 +132,7 @@ class _Call:
     def emit(self, place: int, result: Any) -> None:
         """Keep a result."""
         if self._workers.store is not None:
-            self._workers.store.append(_key(self._number, place), {"result": encoded(result)})
+            self._workers.store.append(key_of(self._number, place), {"result": encoded(result)})
         self._finish(place, result)
 
     def fail(self, place: int, failure: Failure) -> None:
@@ -147,7 +142,7 @@ class _Call:
         result = self._lost(place, failure)
         if self._workers.store is not None:
             content = {"failure": [failure.status, failure.reason]}
-            self._workers.store.append(_key(self._number, place), content)
+            self._workers.store.append(key_of(self._number, place), content)
         self._finish(place, result)
 
     def _finish(self, place: int, result: Any) -> None:
@@ -159,7 +154,7 @@ class _Call:
         """Take what was finished before."""
         records = self._workers.store.records if self._workers.store is not None else {}
         for place in range(self._total) if records else ():
-            record = records.pop(_key(self._number, place), None)
+            record = records.pop(key_of(self._number, place), None)
             if record is None:
                 continue
             if "failure" in record:

@@ -15,12 +15,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from multiprocessing.spawn import get_preparation_data
 from pathlib import Path
 from typing import Any
 
-from antennate.errors import WorkerError, in_one_line
+from antennate.errors import WorkerError, in_one_line, raised
 from antennate.lookup import ADDED, NotSent
 from antennate.sim.engine_warnings import dropped
 from antennate.studies.processor import processor
@@ -317,7 +319,19 @@ def _serve(connection: Connection, added: Packed) -> None:
         while True:
             part: Part = connection.recv()
             connection.send((_BEGUN, 0, None))  # what it needs is imported by now
-            part.carry_out(emit, fail)
+            replace(part, function=partial(_uninterrupted, part.function)).carry_out(emit, fail)
+
+
+def _uninterrupted(function: Callable[..., Any], *given: Any) -> Any:
+    """What a function returns; no Ctrl-C arrives in a worker, so that one is of the user's code.
+
+    Raises:
+        WorkerError: The code raised KeyboardInterrupt.
+    """
+    try:
+        return function(*given)
+    except KeyboardInterrupt as error:
+        raise WorkerError(raised(error)) from None
 
 
 def _end_with_parent() -> None:

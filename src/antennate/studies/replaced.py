@@ -18,7 +18,7 @@ from pathlib import Path
 from antennate.errors import OutputError
 from antennate.studies.run_files import (
     CALIBRATION,
-    ENDINGS,
+    FOLDERS,
     LOG_PARTS,
     PARTIAL,
     RESULT,
@@ -61,7 +61,7 @@ class Replaced:
             self._lock = _locked(folder)
             for file in held:
                 target = folder / file.relative_to(place)
-                target.parent.mkdir(exist_ok=True)
+                target.parent.mkdir(parents=True, exist_ok=True)
                 (os.link if file.name == stays else os.rename)(file, target)
             folder.rename(place / _ASIDE)
         except BaseException:
@@ -162,7 +162,7 @@ def _put_back(place: Path) -> None:
     for file in files_of(place):
         if not is_same(file, place / _ASIDE / file.name):
             file.unlink()
-    for name in ENDINGS:
+    for name in FOLDERS:
         if is_folder(place / name):
             with contextlib.suppress(OSError):
                 (place / name).rmdir()
@@ -174,7 +174,7 @@ def _move_back(place: Path) -> None:
     folder = place / _MOVING
     for file in [each for each in folder.rglob("*") if not is_folder(each)]:
         target = place / file.relative_to(folder)
-        target.parent.mkdir(exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
         file.replace(target)
     shutil.rmtree(folder)
 

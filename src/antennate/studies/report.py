@@ -146,7 +146,7 @@ def _images(run: RunDirectory, view: View) -> dict[str, str]:
             read_limited(path.with_suffix(".svg"), LARGEST),
             view.caption(path.stem),
         )
-        for path in sorted((run.path / FIGURES).glob("*.png"))
+        for path in run.made(FIGURES, ".png")
     }
 
 
@@ -159,7 +159,7 @@ def _films(run: RunDirectory) -> dict[str, str]:
         found = (i for i, name in enumerate(names) if path.stem.startswith(name))
         return next(found, len(names)), path.stem
 
-    found = sorted((run.path / FILMS).glob("*.mp4"), key=place)
+    found = sorted(run.made(FILMS, ".mp4"), key=place)
     return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
 
 

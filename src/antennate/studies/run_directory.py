@@ -1,7 +1,8 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
-Files are written whole. While a run goes on, finished trials are appended to
-`trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`. A directory that
+Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are
+appended to `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`,
+which stays where more trials may follow. A directory that
 holds a run is left alone unless told otherwise; then the files of that run are set aside, and go
 once the new one has something to keep, so that nothing old stands beside the new. Only a
 calibration stays until the next one replaces it, so that a robot is never without.
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -36,6 +38,7 @@ from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
     FIGURES,
+    FILES,
     LOGS,
     PARTIAL,
     REPORT,
@@ -43,12 +46,15 @@ from antennate.studies.run_files import (
     ROOM,
     TABLE,
     VERSIONS,
+    add_to_list,
     files_of,
     inside,
+    listed,
     read_as,
     remove_described,
     writing,
 )
+from antennate.studies.store import Tasks
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -71,6 +77,8 @@ class RunDirectory:
         self._created, self._replaced = taken.created, taken.replaced
         self._partial = taken.partial
         self._kept = taken.partial is None
+        self._described: dict[str, str] = {}
+        self._listed = set(listed(taken.path) or ())
 
     @classmethod
     def create(
@@ -81,6 +89,7 @@ class RunDirectory:
         identity: Mapping[str, Any] | None = None,
         resume: bool | None = False,
         retry: bool = False,
+        tasks: Tasks | None = None,
     ) -> RunDirectory:
         """Claim a directory for a run of `command`.
 
@@ -93,6 +102,8 @@ class RunDirectory:
                 files that are missing are written, and the report with them. None if `command`
                 goes on with none.
             retry: Whether trials that failed are run again, so that no run is finished.
+            tasks: What each task is, of a configuration as JSON has it, so that a run goes on with
+                more trials than it was begun with; None if it does not.
 
         Raises:
             BadInputError: The run that is to go on is another one, the path is none, or the command
@@ -100,7 +111,7 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it.
         """
-        return cls(claim(command, path, overwrite, identity, resume, retry))
+        return cls(claim(command, path, overwrite, identity, resume, retry, tasks))
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -153,6 +164,12 @@ class RunDirectory:
         decode = formats.sound_json if name.endswith(".json") else str
         return read_as(path, decode) if path.exists() else ""
 
+    def made(self, folder: str, ending: str) -> list[Path]:
+        """Files of the run in a folder of it; of a run of an older version all that are there."""
+        files = sorted((self.path / folder).glob(f"*{ending}"))
+        own = files_of(self.path)
+        return [file for file in files if file in own or not own]
+
     def describe(self, config: Params, command: Sequence[str] = ()) -> None:
         """Write what is known before the run: configuration, versions and command.
 
@@ -165,11 +182,12 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         checks.instance("config", config, Params)
-        self.write(CONFIG, formats.to_toml(config))
-        self.write(VERSIONS, self._versions())
+        self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
         if command:
             resumed = self.store is not None and self.store.holds_trials
-            self.write(COMMAND, f"{shlex.join(command)}\n{dates.begun(resumed)}")
+            self._described[COMMAND] = f"{shlex.join(command)}\n{dates.begun(resumed)}"
+        for name, text in self._described.items():
+            self.write(name, text)
 
     def _versions(self) -> str:
         """Versions of what the numbers depend on, and the models of the processors."""
@@ -207,6 +225,8 @@ class RunDirectory:
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
         """Write the result and, if there are rows, their table; then drop the partial file.
 
+        What `describe` wrote is written again where somebody removed it meanwhile.
+
         Raises:
             ConfigError: The result is no dictionary, or a row is neither that nor a dataclass.
             OutputError: Something cannot be written.
@@ -217,6 +237,9 @@ class RunDirectory:
         if table:
             self.write(TABLE, table)
         self._give_room()
+        for name, text in self._described.items():
+            if not (self.path / name).exists():
+                self.write(name, text)
         if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
             self.write(VERSIONS, self._versions())
         self.write(RESULT, formats.to_json(result))
@@ -257,10 +280,29 @@ class RunDirectory:
         if self._finished and path.exists() and (name != REPORT or self.untouched):
             return
         self.untouched = False
+        self.claim_names([name])
         with writing(path):
             path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
             file.writelines(formats.pieces(content))
+
+    def claim_names(self, names: Iterable[str]) -> None:
+        """Put names into the list of files of this run, before these files are made.
+
+        Raises:
+            OutputError: There is such a file, which this run has not made.
+        """
+        new = [name for name in names if name not in self._listed]
+        for name in new:
+            if os.path.lexists(self.path / name):
+                raise OutputError(
+                    f"{self.path}: expected no file {name} but of this run, found one of somebody "
+                    "else; move it, or choose another folder"
+                )
+        if new:
+            with writing(self.path / FILES):
+                add_to_list(self.path, new)
+            self._listed.update(new)
 
     def folder(self, name: str) -> Path:
         """A folder in the directory for files of the run, made if it is not there.

@@ -1,4 +1,8 @@
-"""The names of the files of a run, and which of them a folder holds."""
+"""The names of the files of a run, and which of them a folder holds.
+
+`files.txt` lists the files that a run writes, each before it is made. Without that list a folder
+holds no run of this program, and nothing in it is replaced.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from typing import Any, TypeVar
 
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.files import decoded, read_limited, remove_abandoned
+from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
 from antennate.studies.identity import texts
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
@@ -23,10 +27,11 @@ RESULT, TABLE, PARTIAL = "result.json", "trials.csv", "trials.partial.jsonl"
 SHARD = "shard.json"
 """File of a shard whose trials are all finished."""
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
-FIGURES, FILMS, LOGS = "figures", "films", "logs"
-"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap), which belong to the run."""
-ENDINGS = {FIGURES: (".svg", ".png"), FILMS: (".mp4",), LOGS: (".mcap",)}
-"""What the files of each of these folders end with."""
+FILES = "files.txt"
+"""The list of the files of the run."""
+_TITLE = "# Files that this run wrote. --overwrite replaces these alone."
+FOLDERS = FIGURES, FILMS, LOGS = "figures", "films", "logs"
+"""Folders of figures (svg, png), films (mp4) and logs of trials (mcap)."""
 BY_HAND = "by-hand.txt"
 """What a person changed while the run went on: it does not follow from its configuration then."""
 CALIBRATION, LOG, REPORT = "calibration.json", "drive.mcap", "report.html"
@@ -52,15 +57,66 @@ _NAMES = (RESULT, PARTIAL, STORE, SHARD, TABLE, CONFIG, VERSIONS, COMMAND, ROOM,
 """Every file that a run may write beside its figures."""
 
 
+def listed(place: Path) -> list[str] | None:
+    """Names of files that the run of a directory wrote; None if it holds no run of this program."""
+    if (place / FILES).is_symlink():
+        return None
+    try:
+        with open_regular(place / FILES) as file:
+            title, *names = file.read(LARGEST).decode().splitlines() or [""]
+    except (OSError, UnicodeDecodeError):
+        return None
+    return list(dict.fromkeys(names)) if title == _TITLE else None
+
+
+def add_to_list(place: Path, names: Iterable[str]) -> None:
+    """Add names to the list of the files of a run, which is begun if there is none; none twice.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    if not os.path.lexists(place / FILES):
+        write_whole(place / FILES, f"{_TITLE}\n".encode())
+    known = listed(place) or ()
+    with (place / FILES).open("ab", buffering=0) as file:
+        file.write("".join(f"{name}\n" for name in names if name not in known).encode())
+
+
 def files_of(place: Path) -> list[Path]:
-    """Files of a run that a directory holds."""
-    inner = [
-        path
-        for folder, endings in ENDINGS.items()
-        for path in (sorted((place / folder).iterdir()) if is_folder(place / folder) else ())
-        if path.suffix in endings
-    ]
-    return [place / name for name in _NAMES if os.path.lexists(place / name)] + inner
+    """Files of its run that a directory holds, by their list, which comes last."""
+    names = listed(place)
+    if names is None:
+        return []
+    return [*(place / name for name in names if _is_file_within(place, name)), place / FILES]
+
+
+def _is_file_within(place: Path, name: str) -> bool:
+    """Whether there is such a file in the directory or a folder of it, none behind a link."""
+    path = Path(name)
+    folders = [place / each for each in path.parents if each != Path()]
+    sound = not path.is_absolute() and ".." not in path.parts and all(map(is_folder, folders))
+    return sound and os.path.lexists(place / path) and not is_folder(place / path)
+
+
+def others_of(place: Path) -> list[Path]:
+    """Files with names that a run writes, which are none of the run that a directory holds."""
+    own = files_of(place)
+    paths = [place / name for name in (FILES, *_NAMES)]
+    return [path for path in paths if os.path.lexists(path) and path not in own]
+
+
+def require_replaceable(place: Path) -> None:
+    """Check that a directory is empty, or that all that would be replaced is of its run.
+
+    Raises:
+        OutputError: It holds files of somebody else.
+    """
+    others = others_of(place) if listed(place) is not None else sorted(place.iterdir())
+    if others:
+        raise OutputError(
+            f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
+            f"found {others[0].name}, which is of none; choose another folder"
+        )
 
 
 def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputError:
@@ -76,9 +132,11 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputE
             f"{place}: expected an unfinished run, found a finished one, which takes no more "
             "trials; choose another folder, or give --overwrite to run all of them anew"
         )
+    first = place / RESULT if place / RESULT in held else held[0]
     return OutputError(
-        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {held[0]}; "
-        "choose another or give --overwrite"
+        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {first}; "
+        "choose another"
+        + (" or give --overwrite" if place / FILES in held else "")
         + (" or --resume" if place / STORE in held and resume is False else "")
     )
 
@@ -120,15 +178,17 @@ def outdated(held: Sequence[Path], stays: str, finished: bool) -> list[Path]:
     """
     if finished:
         return [file for file in held if file.name in (PARTIAL, ROOM)]
-    return [file for file in held if file.parent.name != LOGS and file.name not in (STORE, stays)]
+    stay = (STORE, FILES, stays)
+    return [file for file in held if file.parent.name != LOGS and file.name not in stay]
 
 
 def sweep(place: Path) -> None:
     """Remove what killed processes left in a directory that wrote files of its run."""
-    remove_abandoned(place, lambda name: name in _NAMES)
-    for folder, endings in ENDINGS.items():
+    names = {FILES, *(listed(place) or ())}
+    remove_abandoned(place, names.__contains__)
+    for folder in FOLDERS:
         if is_folder(place / folder):
-            remove_abandoned(place / folder, lambda name, e=endings: name.endswith(e))
+            remove_abandoned(place / folder, lambda name, f=folder: f"{f}/{name}" in names)
 
 
 def is_finished(place: Path) -> bool:
@@ -165,7 +225,7 @@ def inside(place: Path, name: str) -> Path:
         ConfigError: The name leads out of it.
     """
     found = Path(checks.text("name", name))
-    if found.is_absolute() or ".." in found.parts:
+    if found.is_absolute() or ".." in found.parts or not name.isprintable():
         raise ConfigError(f"name: expected one within the run, found {name}")
     return place / found
 
@@ -197,8 +257,11 @@ def remove_described(place: Path) -> None:
     for file in files_of(place):
         if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == place / LOGS:
             file.unlink()
+    if files_of(place) == [place / FILES]:
+        (place / FILES).unlink()
     if is_folder(place / LOGS):
-        (place / LOGS).rmdir()
+        with contextlib.suppress(OSError):  # it holds files of somebody else
+            (place / LOGS).rmdir()
 
 
 def place_of(command: str, path: str | Path | None) -> Path:

@@ -1,8 +1,9 @@
 """Finished trials on disk: one line of JSON each with a checksum, only ever appended.
 
-The first line says what is run. A line that a killed process left torn, or that was damaged since,
-fails its checksum: its trial counts as not run. The file is locked while somebody appends to it;
-the system frees the lock when that process ends, however it ends.
+The first line says what is run; a later one may say that it was continued with more trials, and
+what the keys of those before are from there on. A line that a killed process left torn, or that was
+damaged since, fails its checksum: its trial counts as not run. The file is locked while somebody
+appends to it; the system frees the lock when that process ends, however it ends.
 """
 
 from __future__ import annotations
@@ -15,16 +16,18 @@ import os
 import re
 import time
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from antennate.errors import BadInputError, OutputError
 from antennate.files import open_regular
 from antennate.studies.codec import dumped
-from antennate.studies.identity import differences
+from antennate.studies.identity import but_trials, differences
 
 STORE = "trials.store.jsonl"
+Tasks = Callable[[Mapping[str, Any]], Sequence[Any]]
+"""What each task of a configuration is, by its place: the same for any number of trials."""
 _NOTE = logging.getLogger(__name__)
 _SYNC = 1.0
 """Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
@@ -81,11 +84,15 @@ class Store:
             self._append(b"\n")
         return found.damaged
 
-    def begin(self, identity: Mapping[str, Any]) -> None:
-        """Say what is run, or find that it is what the file was begun with.
+    def begin(self, identity: Mapping[str, Any], tasks: Tasks | None = None) -> None:
+        """Say what is run, or find that it is what the file was begun with, or more trials of it.
+
+        Args:
+            identity: What is run.
+            tasks: Of a configuration; None if there cannot be more trials.
 
         Raises:
-            BadInputError: It is something else; the text says what differs.
+            BadInputError: It is something else, or fewer trials; the text says what differs.
             OutputError: It cannot be written.
         """
         if self.identity is None and self.records:
@@ -96,11 +103,34 @@ class Store:
         if self.identity is None:
             self._append(line({"identity": identity}))
             self.identity = identity
-        elif changes := differences(self.identity, identity):
+        elif not (changes := differences(self.identity, identity)):
+            return
+        elif tasks is not None and but_trials(self.identity) == but_trials(identity):
+            self._grow(identity, tasks(self.identity["config"]), tasks(identity["config"]), changes)
+        else:
             raise BadInputError(
                 f"{self.path.parent}: expected the run that it was begun with, found another: "
                 f"{changes}; choose another folder or give --overwrite"
             )
+
+    def _grow(
+        self, identity: Mapping[str, Any], old: Sequence[Any], new: Sequence[Any], changes: str
+    ) -> None:
+        """Go on with more trials, of which each has another place."""
+        places = {task: place for place, task in enumerate(new)}
+        if any(task not in places for task in old):
+            raise BadInputError(
+                f"{self.path.parent}: expected no fewer trials than this run has, found {changes}; "
+                "choose another folder for fewer"
+            )
+        keys = {key_of(0, i): key_of(0, places[task]) for i, task in enumerate(old)}
+        self._append(line({"identity": identity, "keys": keys}))
+        self.identity, self.records = identity, _moved(self.records, keys)
+
+    def holds_all(self, tasks: Tasks | None) -> bool:
+        """Whether no trial of what is run is missing, as far as its tasks are known."""
+        count = 0 if tasks is None or self.identity is None else len(tasks(self.identity["config"]))
+        return all(key_of(0, place) in self.records for place in range(count))
 
     def append(self, key: str, content: Mapping[str, Any]) -> None:
         """Keep one trial.
@@ -193,17 +223,25 @@ class Store:
             os.close(self._file)
 
 
+def key_of(call: int, place: int) -> str:
+    """The key of a task: the number of the call that carries it out, and its place in that."""
+    return f"{call}.{place}"
+
+
 def nobody_else(place: Path) -> OutputError:
     """The error of a folder that another process works on."""
     return OutputError(f"{place}: expected a run that nobody works on, found another process at it")
 
 
-def open_store(place: Path, identity: Mapping[str, Any] | None) -> Store | None:
+def open_store(
+    place: Path, identity: Mapping[str, Any] | None, tasks: Tasks | None = None
+) -> Store | None:
     """The finished trials of a run that can be resumed; nobody else may work on them.
 
     Args:
         place: The run directory.
         identity: What is run; None for a run that cannot be resumed.
+        tasks: As for `Store.begin`.
 
     Raises:
         BadInputError: They are of another run.
@@ -214,7 +252,7 @@ def open_store(place: Path, identity: Mapping[str, Any] | None) -> Store | None:
         return None
     store = Store(place / STORE)
     try:
-        store.begin(identity)
+        store.begin(identity, tasks)
     except BaseException:
         store.close(remove=store.was_empty)
         raise
@@ -258,11 +296,19 @@ def parsed(data: bytes) -> Parsed:
             damaged += 1
         elif "identity" in content and identity is None:
             identity, records, processors = content["identity"], {}, []
+        elif "identity" in content and "keys" in content:
+            identity, records = content["identity"], _moved(records, content["keys"])
         elif "key" in content:
             records[content["key"]] = content
         elif "processor" in content:
             processors.append(content["processor"])
     return Parsed(identity, records, processors, damaged)
+
+
+def _moved(records: Mapping[str, Any], keys: Mapping[str, str]) -> dict[str, Any]:
+    """Records by new keys."""
+    found = {key: {**content, "key": keys[key]} for key, content in records.items() if key in keys}
+    return {content["key"]: content for content in found.values()}
 
 
 def _contents(data: bytes) -> Iterator[dict[str, Any] | None]:

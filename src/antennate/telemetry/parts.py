@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 MOST_PARTS = 10
 """Files that one log can have."""
+
+
+def log_name(name: str) -> str:
+    """File of the log of a simulated trial or walk with a name of any characters."""
+    return re.sub(r"[^\w.-]", "_", name) + ".mcap"
 
 
 def part(path: Path, number: int) -> Path:

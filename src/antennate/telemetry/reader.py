@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple, Never
 
-from antennate.errors import LogError
+from antennate.errors import LogError, reason
 from antennate.files import in_units, open_regular
 from antennate.telemetry.chunks import Fault
 from antennate.telemetry.contents import Chunk
@@ -78,7 +78,7 @@ class LogReader:
         try:
             self._file = open_regular(path)
         except OSError as error:
-            raise LogError(f"expected a log, found {path}: {error.strerror}") from None
+            raise LogError(f"expected a log, found {path}: {reason(error)}") from None
         self.parts = parts(path)
         self._part, self._before = path, 0
         self._declared: dict[int, Topic] = {}
@@ -193,7 +193,7 @@ class LogReader:
         try:
             return by_summary(self._file, self._channels)
         except OSError as error:
-            raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
+            raise LogError(f"expected to read {self._part}, found: {reason(error)}") from None
 
     def _grouped(
         self, offset: int, held: Sequence[Record]
@@ -266,7 +266,7 @@ class LogReader:
                         self.end = closed
                         break
         except OSError as error:
-            raise LogError(f"expected to read {self._part}, found: {error.strerror}") from None
+            raise LogError(f"expected to read {self._part}, found: {reason(error)}") from None
 
     def _is_of_this_log(self, chunk: Chunk) -> bool:
         """Whether a later file has the header of the first one, and ticks after its last one."""

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from antennate import __version__
-from antennate.errors import LogError
+from antennate.errors import LogError, reason
 from antennate.files import require_room
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.chunks import LIBRARY
@@ -85,6 +85,7 @@ class LogWriter:
         self._names = header.robot.joint_names
         self.written = self.kept = self._size = self._time = 0
         self._since, self._state = math.inf, ""
+        self._told: set[str] = set()  # causes of this state
         self.failure = ""
         self._called = called or path
         require_room(self._called, least_free, LogError)
@@ -117,8 +118,12 @@ class LogWriter:
             return
         stamp = self._stamp(tick.now)
         messages = list(tick.messages(self._names, stamp))
+        named = {cause.partition(":")[0] for cause in tick.causes}
         if tick.state != self._state:
+            self._told.clear()
+        if tick.state != self._state or not named <= self._told:
             messages.append((EVENTS, self._event(tick, stamp)))
+            self._told |= named
         for topic, data in messages:
             self.add(topic, tick.number, stamp, data)
         self._state = tick.state
@@ -236,20 +241,23 @@ class LogWriter:
         return max(self._time, min(max(0, self._header.start + since), _LATEST))
 
     def _event(self, tick: Tick, stamp: int) -> bytes:
-        before = f" after {self._state}" if self._state else ""
+        before = f" after {self._state}" if self._state not in ("", tick.state) else ""
         words = "; ".join([f"{tick.state or 'no state'}{before}", *tick.causes])
         level = _LEVELS.get(tick.state, 20)
         time = divmod(stamp, 10**9)
         return EVENTS.type.encode(*time, level, "supervisor", words, "", "", 0)
 
     def _fail(self, error: OSError) -> None:
-        self.failure = str(error.strerror or error)
+        self.failure, left = reason(error), f"the log ends after {self.kept} ticks"
+        if isinstance(error, _GoneError):
+            left, self.kept = f"{self.kept} ticks went with it", 0
         with contextlib.suppress(OSError):
             self._file.close()
-        raise LogError(
-            f"expected to write {self._called}, found: {self.failure}; the log ends after "
-            f"{self.kept} ticks"
-        ) from None
+        raise LogError(f"expected to write {self._called}, found: {self.failure}; {left}") from None
+
+
+class _GoneError(OSError):
+    """A file that is written has lost its name: what it takes, nobody can read."""
 
 
 class _NewFile(io.BufferedIOBase):
@@ -266,7 +274,7 @@ class _NewFile(io.BufferedIOBase):
                 f"expected a log that does not exist yet, found {called}; choose another name"
             ) from None
         except OSError as error:
-            raise LogError(f"expected to write {called}, found: {error.strerror}") from None
+            raise LogError(f"expected to write {called}, found: {reason(error)}") from None
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
         """Hold it until the next flush."""
@@ -286,12 +294,26 @@ class _NewFile(io.BufferedIOBase):
         held, self._held = self._held, bytearray()
         if self._lost:
             raise OSError(self._lost)
+        self._require_name()
         if not held:
             return
         count = os.write(self._file, held)
         self._at += count
         if count < len(held):
             raise OSError(f"only {count} of {len(held)} bytes were taken; the disk is full")
+
+    def _require_name(self) -> None:
+        """Whether it is still where it was made; a file that was removed goes on to take bytes.
+
+        Raises:
+            _GoneError: It is not.
+        """
+        try:
+            there = os.path.samestat(self._path.stat(), os.fstat(self._file))
+        except (FileNotFoundError, NotADirectoryError):
+            there = False
+        if not there:
+            raise _GoneError("it was removed or renamed meanwhile")
 
     def sync(self) -> None:
         """Wait until the disk has it."""
@@ -313,7 +335,7 @@ class _NewFile(io.BufferedIOBase):
             while not self._over.wait(period):
                 _sync_data(self._file)
         except OSError as error:
-            self._lost = str(error.strerror or error)
+            self._lost = reason(error)
 
     def close(self) -> None:
         """Close it; what is held is lost."""

@@ -40,7 +40,6 @@ class ServoBus:
         baud: Bits per second while the master's are not known; a byte is ten bits.
         loss: Share of answers that get lost between the wire and the master.
         rng: Which of them.
-        fast: They understand fast sync reads.
 
     Attributes:
         trouble: Faults of servos, by the id that each had when the bus was made.
@@ -58,13 +57,11 @@ class ServoBus:
         baud: int = 1_000_000,
         loss: float = 0.0,
         rng: np.random.Generator | None = None,
-        fast: bool = True,
     ) -> None:
         self.servos = list(servos)
         self.trouble: dict[int, Trouble] = {}
         self._first_ids = {id(servo): servo.get("id") for servo in self.servos}
         self.loss = loss
-        self.fast = fast
         self.latency = 0.0
         self.echo = False
         self.noise = Noise(seed=1)
@@ -174,12 +171,15 @@ class ServoBus:
         self._join(t, present, _bulk(params))
 
     def _join(self, t: float, present: list[Servo], asked: list[tuple[int, int, int]]) -> None:
-        """Let servos answer with one packet together: id, address and length of each."""
+        """Let servos answer with one packet together: id, address and length of each.
+
+        A firmware that does not know the instruction is silent, and so are those behind it.
+        """
         chain: list[tuple[Servo, Status]] = []
         known = {s.get("id"): s for s in reversed(present) if s.get("status_return_level")}
-        for name, address, length in asked if self.fast else []:
+        for name, address, length in asked:
             servo = known.get(name)
-            if servo is None:
+            if servo is None or servo.get("firmware_version") < servo.table.fast_read_firmware:
                 break
             error, data = servo.read(address, length)
             chain.append((servo, instructions.status(servo, error, data.ljust(length, b"\0"))))

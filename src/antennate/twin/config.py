@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from antennate.params.base import GATHERED, Params, number, paths_of
+from antennate.params.base import Params, number, paths_of
 from antennate.params.control import GaitParams
 from antennate.params.gaits import LiftParams
 from antennate.params.twin import BatteryParams
@@ -52,11 +52,11 @@ class TwinConfig(TrialConfig):
     """Trial of the seed."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
     """Time to serve."""
-    fault: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: nothing is broken")
+    fault: tuple[str, ...] = number((), "1", "assumed: nothing is broken")
     """Faults, such as servo:7=silent@3s."""
-    touch: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: no touch unless wanted")
+    touch: tuple[str, ...] = number((), "1", "assumed: no touch unless wanted")
     """Touches of the standing robot: left@2s or left:20mm@2s, from the beginning of each client."""
-    push: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: no touch unless wanted")
+    push: tuple[str, ...] = number((), "1", "assumed: no touch unless wanted")
     """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
     mains: float = number(
         50.02, "Hz", "assumed: mains of 50 Hz wander by some hundredths", gt=0, le=1000
@@ -64,7 +64,7 @@ class TwinConfig(TrialConfig):
     """Frequency of the hum on the readings, a fault."""
     factory: bool = number(False, "1", "assumed: they are set up")
     """Servos as delivered: all id 1 at 57600 bit/s."""
-    plugged: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: all")
+    plugged: tuple[str, ...] = number((), "1", "assumed: all")
     """Joints whose servos are on the bus at first, or `none`."""
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()

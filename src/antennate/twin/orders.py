@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, reason
 from antennate.twin.push import Pushes
 from antennate.twin.registers import Servo
 
@@ -46,12 +46,11 @@ class Plugging:
         Raises:
             BadInputError: A name is not known.
         """
-        names = [name for text in plugged for name in text.split(",") if name]
-        if not names:
+        if not plugged:
             return
         chosen = {
             place
-            for name in names
+            for name in plugged
             if name != NONE
             for place in self._pushes.places(name, "--plugged")
         }
@@ -111,7 +110,7 @@ class Orders:
             way = os.O_RDWR if fifo else os.O_RDONLY
             self._file: int | None = os.open(path, way | os.O_NONBLOCK) if self._mine else 0
         except OSError as error:
-            raise BadInputError(f"--orders: cannot read {path}: {error.strerror}") from None
+            raise BadInputError(f"--orders: cannot read {path}: {reason(error)}") from None
 
     @property
     def files(self) -> list[int]:

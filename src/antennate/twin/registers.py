@@ -29,7 +29,6 @@ from antennate.twin.trouble import Trouble
 BOOT_TIME = 0.25
 """Time after a reboot in which it takes nothing [s]; assumed, the manual says nothing."""
 
-_FIRMWARE = 48
 _ROOM_TEMPERATURE = 25
 _TORQUE_AT_START, _RAM_AT_START = 1, 2
 """Bits of Startup Configuration."""
@@ -67,17 +66,17 @@ class Servo:
         self.plugged = True
         self.registered: tuple[int, bytes] | None = None
         self.trouble: Trouble | None = None
-        self._untold = True
+        self._moved, self._told = True, -1
         self._t = self._fed = self._boot = t
         self.set("id", servo)
-        self.set("firmware_version", _FIRMWARE)
+        self.set("firmware_version", table.firmware)
         self._start(t)
 
     # for the twin and for tests: anything goes
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        if self._untold and name in _TOLD:
+        if name in _TOLD:
             self._tell()
         return self.memory.get(name)
 
@@ -156,8 +155,7 @@ class Servo:
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
-        if self._untold:
-            self._tell()
+        self._tell()
         return self.memory.read(address, length)
 
     def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
@@ -286,7 +284,7 @@ class Servo:
 
     def _move(self, t: float) -> None:
         self._refresh()
-        self._untold |= self.motion.move(t)
+        self._moved |= self.motion.move(t)
         self._t = max(self._t, t)
         since = max(self._t - self._boot, 0.0)
         self.memory.show("realtime_tick", int(1e3 * since) % 32_768)
@@ -294,9 +292,11 @@ class Servo:
     def _show(self) -> None:
         """Something has happened that registers tell, once anybody reads them."""
         self._refresh()
-        self._untold = True
+        self._moved = True
 
     def _tell(self) -> None:
-        self._refresh()
-        self._untold = False
-        self.motion.show(self._t)
+        """Let registers tell what the shaft does, if it or a register has changed since."""
+        if self._moved or self._told != self.memory.version:
+            self._refresh()
+            self._moved, self._told = False, self.memory.version
+            self.motion.show(self._t)

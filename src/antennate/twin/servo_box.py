@@ -1,4 +1,4 @@
-"""Any set of DYNAMIXEL servos on a bus, without a robot: `1:xl330-m288,2:xl430-w250`."""
+"""Any set of DYNAMIXEL servos on a bus, without a robot: `1:xl330-m288 2:xl430-w250`."""
 
 from __future__ import annotations
 
@@ -69,21 +69,21 @@ def _known(found: Any, known: Mapping[Any, Any], what: str) -> Any:
     return known[found]
 
 
-def read_list(text: str) -> tuple[ServoEntry, ...]:
-    """Servos from `ID:MODEL[@BAUD][xCOUNT],...` or from a TOML file.
+def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
+    """Servos from `ID:MODEL[@BAUD][xCOUNT]` each, or from one TOML file.
 
     Raises:
         ConfigError: It is neither.
     """
-    if text.endswith(".toml"):
-        return read_file(Path(text), ServoList).servo
+    if len(words) == 1 and words[0].endswith(".toml"):
+        return read_file(Path(words[0]), ServoList).servo
     entries: list[dict[str, Any]] = []
-    for part in text.split(","):
-        match = _FORM.fullmatch(part.strip())
+    for word in words:
+        match = _FORM.fullmatch(word)
         if match is None:
             raise ConfigError(
-                "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file that "
-                f"ends in .toml, found {part!r}"
+                "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file alone "
+                f"that ends in .toml, found {word!r}"
             )
         model, count = match["model"], match["count"]
         if count and not match["baud"] and model not in MODELS:

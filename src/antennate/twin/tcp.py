@@ -21,18 +21,21 @@ class TcpEndpoint:
         BadInputError: The port cannot be had.
     """
 
+    flag, scheme = "--tcp", "tcp"
+
     def __init__(self, host: str, port: int) -> None:
         try:
             self._listener = socket.create_server((host, port), backlog=4)
         except OSError as error:
             raise BadInputError(
-                f"--tcp: expected a free port, found {host}:{port}: {error}"
+                f"{self.flag}: expected a free port, found {host}:{port}: {error}"
             ) from None
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
+        self._rest = b""
         self._ready = selectors.DefaultSelector()
         self._ready.register(self._listener, selectors.EVENT_READ)
-        self.path = f"tcp://{host}:{self._listener.getsockname()[1]}"
+        self.path = f"{self.scheme}://{host}:{self._listener.getsockname()[1]}"
 
     def fileno(self) -> int:
         """Ready to be read if a client comes, sends or goes."""
@@ -54,16 +57,20 @@ class TcpEndpoint:
             return came
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._client = client
+        self._client, self._rest = client, b""
         self._ready.register(client, selectors.EVENT_READ)
+        self._begin()
         return came
 
     def write(self, data: bytes) -> None:
-        """Send; bytes that find no room because nobody reads are lost, as on a real line."""
+        """Send all of it, or nothing where there is no room because nobody reads."""
         if self._client is None:
             return
         try:
-            self._client.send(data)
+            if self._rest:
+                self._rest = self._rest[self._client.send(self._rest) :]
+            if not self._rest:
+                self._rest = data[self._client.send(data) :]
         except BlockingIOError:
             return
         except OSError:
@@ -75,6 +82,9 @@ class TcpEndpoint:
             self._part(self._client)
         self._ready.close()
         self._listener.close()
+
+    def _begin(self) -> None:
+        """A client has come."""
 
     def _receive(self, client: socket.socket) -> bytes:
         try:
@@ -88,6 +98,8 @@ class TcpEndpoint:
         return b""
 
     def _part(self, client: socket.socket) -> None:
+        if client is not self._client:
+            return
         self._ready.unregister(client)
         client.close()
         self._client = None

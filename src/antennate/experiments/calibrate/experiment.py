@@ -10,11 +10,14 @@ from antennate.antenna.next_push import RECORDED
 from antennate.antenna.plateau import Plateau
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
+from antennate.experiments.calibrate.readings import told
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
 _95 = "  95 %"
+_MUCH = 0.1
+"""Hysteresis over the span beyond which a poor fit is partly its work."""
 CURVE = (
     Measure("slope", "slope", form=".3f"),
     Measure("slope_95", _95, form=".3f"),
@@ -45,6 +48,9 @@ NEXT = (
     Measure("hysteresis.largest", "  largest gap", "% of the span", form="+.1f", scale=100.0),
     Measure("hysteresis.at_bend", "  at a bend of"),
     Measure("hysteresis.level", "  largest gap in b", form="+.3f"),
+    Measure("relaxation.mean", "relaxation in a hold", "% of the span", form="+.1f", scale=100.0),
+    Measure("relaxation.mean_95", _95, form="+.1f", scale=100.0),
+    Measure("relaxation.time", "  length of a hold", "s", form=".2g"),
 )
 
 
@@ -62,11 +68,48 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             {found["sensor_id"]: found},
             CURVE,
             f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}.\n"
-            f"{_over(found)}",
+            f"{_over(found)}\n{_file(result)}".rstrip(),
         ),
         Table.of("The one curve at each speed", speeds, SPEED),
         _next_push(result),
     )
+
+
+def _file(result: Mapping[str, Any]) -> str:
+    """What was done to the file of a recording, in lines."""
+    handled = result.get("recording")
+    if not handled:
+        return ""
+    lines = [told(handled["conversion"])] if handled["conversion"] else []
+    lines += [f"{w['clock'].capitalize()} wrapped in row {w['row']}." for w in handled["wraps"]]
+    if handled["damaged"]:
+        row, why = handled["damages"][0]
+        lines.append(f"Row {row} is damaged: {why}.")
+    if handled["outliers"]:
+        far = handled["outliers"][0]
+        lines.append(
+            f"Row {far['row']} is an outlier: {far['counts']:.4g} counts where others at its bend "
+            f"are {far['usual']:.4g}."
+        )
+    return "\n".join(lines)
+
+
+def _handled(result: Mapping[str, Any]) -> str:
+    """What was left out of the file of a recording, or mended, as a sentence."""
+    handled = result.get("recording")
+    if not handled:
+        return ""
+    rows, far = handled["rows"], len(handled["outliers"])
+    kept = "kept, as they are many" if handled["outliers_kept"] else "left out"
+    counted = (
+        (handled["damaged"], f"{handled['damaged']} damaged left out"),
+        (far, f"{far} outlier{'s' * (far > 1)} {kept}"),
+        (len(handled["wraps"]), "a clock that wraps unwrapped"),
+    )
+    said = ", ".join(text for number, text in counted if number)
+    unit = handled["conversion"]["unit"] if handled["conversion"] else ""
+    become = f" Readings in {unit} became counts: see the table." if unit else ""
+    return (f" Of {rows} rows: {said}." if said else "") + become
 
 
 def _over(found: Mapping[str, Any]) -> str:
@@ -97,6 +140,8 @@ def _next_push(result: Mapping[str, Any]) -> Table:
     notes = []
     if known["new_push"] is None:
         notes.append("One push only: nothing is known about the next one; record more pushes.")
+    elif known["new_push"]["error_95"] is None:
+        notes.append("Two pushes say too little for an interval of the next one; record three.")
     if known["hysteresis"] is None:
         notes.append("No push was bent and released: nothing is known about hysteresis.")
     notes += [_rival(name, checks) for name, checks in known["rivals"].items() if checks]
@@ -121,16 +166,16 @@ def sentence(result: Mapping[str, Any]) -> str:
     """How well one curve serves all pushes."""
     found = result["calibration"]
     following = result["assessment"]["new_push"]
-    errors = Measure("error_95", form="+.2f").cell(following) if following else ""
-    ahead = (
-        f"in a new push b errs by {errors} (95 %)"
-        if following
-        else "nothing is known about the next push"
-    )
+    ahead = "nothing is known about the next push"
+    if following:
+        errors = Measure("error_95", form="+.2f").cell(following)
+        ahead = f"in a new push b errs by {errors} (95 %)"
+        if following["error_95"] is None:
+            ahead = "two pushes say too little about the next one"
     interval = _no_interval(found) or f"95 % interval {shown(found['slope_95'], '.1f')}"
     return (
         f"One sigmoid explains R² {found['r2']:.2f} of {_pushes(found)}, with a slope of "
-        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}."
+        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}.{_handled(result)}"
     )
 
 
@@ -147,17 +192,36 @@ def _saturated(result: Mapping[str, Any]) -> str:
 def _poor(result: Mapping[str, Any]) -> str:
     if not result["poor"]:
         return ""
+    known = result["assessment"]
+    loop = known["hysteresis"]
     if result.get("hysteretic"):
-        known = result["assessment"]["hysteresis"]
-        there, back = known["one_way_r2"]
+        there, back = loop["one_way_r2"]
         return (
-            f"; the rest is hysteresis, {100 * abs(known['mean']):.0f} % of the span: loading "
+            f"; the rest is hysteresis, {100 * abs(loop['mean']):.0f} % of the span: loading "
             f"alone fits with R² {there:.2f}, unloading alone with {back:.2f}, and one curve "
-            "cannot follow both"
+            f"cannot follow both{_relaxing(known)}"
+        )
+    ends = loop and loop["mean_95"]
+    if ends and ends[0] * ends[1] > 0 and abs(loop["mean"]) > _MUCH:
+        return (
+            f"; hysteresis, {100 * abs(loop['mean']):.0f} % of the span, is a part of the rest; "
+            f"the figure shows what else is: noise, or marks that do not match{_relaxing(known)}"
         )
     return (
         "; look at the figure: perhaps marks and readings do not match, or the flex sensor "
-        "slipped; record again before a robot relies on it"
+        f"slipped; record again before a robot relies on it{_relaxing(known)}"
+    )
+
+
+def _relaxing(known: Mapping[str, Any]) -> str:
+    """How far readings move while the bend is held, if they do beyond noise."""
+    found = known.get("relaxation")
+    if not found or not found["mean_95"] or found["mean_95"][0] * found["mean_95"][1] <= 0:
+        return ""
+    way = "on" if found["mean"] > 0 else "back"
+    return (
+        f"; it relaxes, too: held for {found['time']:.2g} s its readings move {way} by "
+        f"{100 * abs(found['mean']):.0f} % of the span"
     )
 
 

@@ -30,7 +30,7 @@ def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
     above, below = upper.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     _draw_speeds(above, below, samples, outcome.levels())
     _draw_curve(above, result["calibration"])
-    if known["new_push"] is not None:
+    if known["new_push"] is not None and known["new_push"]["error_95"] is not None:
         ends = known["new_push"]["error_95"]
         below.axhspan(*ends, color=style.FAINT, alpha=0.6, linewidth=0, zorder=0)
         below.set_title("grey: 95 % of the readings of a new push")

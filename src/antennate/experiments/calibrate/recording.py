@@ -7,7 +7,7 @@ import hashlib
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
@@ -16,17 +16,34 @@ import numpy as np
 from antennate.antenna.curves import Samples
 from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit_of
 from antennate.errors import CalibrationError
+from antennate.experiments.calibrate.clock import TIME_UNITS, Wrap, out_of_place, seconds, unwrapped
+from antennate.experiments.calibrate.clock import check as check_time
+from antennate.experiments.calibrate.readings import (
+    READING_UNITS,
+    Conversion,
+    Outlier,
+    impossible,
+    outliers,
+    to_counts,
+    unit_named,
+    usual,
+)
 from antennate.files import read_limited
 from antennate.params.base import Params, number
+from antennate.robots.sensor import SensorParams
 from antennate.types import Floats, Ints
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 BEND_UNITS = {"1": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
+SPEED_UNITS = {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001}
 _LARGEST_BEND = {"1": 1.05, "rad": 2 * math.pi, "deg": 360.0, "m": 1.0, "mm": 1000.0}
 """Beyond these a value was hardly meant in its unit."""
+_LARGEST_SPEED = 1.0
+"""Beyond it a speed was hardly meant in its unit [m/s]: nobody pushes an antenna faster."""
 _LARGEST_FILE = 50_000_000
-_LONGEST_PERIOD = 1.0
-"""Readings lie closer together in time [s]; 100 Hz in ms that is declared as s lies 10 s apart."""
+_NAMED = 20
+"""Most rows that are named one by one."""
+_TRIAL, _SPEED, _TIME, _READING, _BEND = range(5)
+"""Columns of a recording as it is read."""
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
 
 
@@ -38,7 +55,11 @@ class RecordingParams(Params):
     time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI")
     """Its unit."""
     counts_column: str = number("counts", "1", "assumed: plain")
-    """Column of readings [counts]."""
+    """Column of readings."""
+    reading_unit: Literal["counts", "ohm", "kohm", "V", "mV"] = number(
+        "counts", "1", "assumed: what the board sends"
+    )
+    """Its unit; others become counts by the divider and converter of antenna.sensor."""
     bend_column: str = number("bend", "1", "assumed: plain")
     """Column of bend or position."""
     bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
@@ -52,7 +73,36 @@ class RecordingParams(Params):
     trial_column: str = number("trial", "1", "assumed: plain")
     """Column that numbers pushes, if any."""
     speed_column: str = number("speed_m_s", "1", "assumed: plain")
-    """Column of pushing speed [m/s], if any."""
+    """Column of pushing speed, if any."""
+    speed_unit: Literal["m/s", "cm/s", "mm/s"] = number("m/s", "1", "assumed: SI")
+    """Its unit."""
+    most_lost: float = number(
+        0.02, "1", "assumed: far more than the serial logs we have seen", ge=0, le=0.5
+    )
+    """Share of damaged rows, and of outliers, up to which they are left out and counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Handled:
+    """What was wrong with a file, and what was done about it.
+
+    Attributes:
+        rows: Rows of the file below its header.
+        damaged: How many were left out: too many or few cells, no number, a time out of place.
+        damages: Row and reason of the first of these.
+        outliers: Readings that were left out, or kept if they are more than `most_lost`.
+        outliers_kept: Whether they are kept.
+        wraps: Where the clock began at 0 again and was unwrapped.
+        conversion: How readings became counts, None if they are.
+    """
+
+    rows: int
+    damaged: int
+    damages: tuple[tuple[int, str], ...]
+    outliers: tuple[Outlier, ...]
+    outliers_kept: bool
+    wraps: tuple[Wrap, ...]
+    conversion: Conversion | None
 
 
 @dataclass(frozen=True)
@@ -63,39 +113,75 @@ class Recording:
         t: Time of each reading [s], shape (n,).
         samples: Readings and bends.
         sha256: Hash of the file's bytes.
+        handled: What was wrong with the file; None of a rig.
     """
 
     t: Floats
     samples: Samples
     sha256: str
+    handled: Handled | None = None
 
 
-def read(path: Path, params: RecordingParams, rate: float | None = None) -> Recording:
+def read(
+    path: Path,
+    params: RecordingParams,
+    rate: float | None = None,
+    sensor: SensorParams | None = None,
+) -> Recording:
     """Read a recording.
 
     Args:
         path: The file.
         params: Its columns and units.
         rate: Readings a second [Hz] of a file without a column of time.
+        sensor: Divider and converter, for readings that are no counts; the default ones if None.
 
     Raises:
         CalibrationError: Names the row and the cure.
     """
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
-    rows = _rows(path, data, params, rate)
-    table = np.array([values for _, values in rows])
-    lines = np.array([line for line, _ in rows], dtype=np.int64)
-    trial, speed, t, counts, raw = table.T
-    trial = _numbered(path, trial, lines, params.trial_column)
+    table, lines, damages = _rows(path, data, params, rate)
+    total = len(table) + len(damages)
+    trial = _numbered(path, table[:, _TRIAL], lines, params.trial_column)
     if rate is None:
-        t = t * TIME_UNITS[params.time_unit]
-        _check_time(path, t, trial, lines, params)
+        t, wraps = unwrapped(table[:, _TIME] * TIME_UNITS[params.time_unit], trial, lines)
+        astray = out_of_place(t, trial)
+        if astray.mean() <= params.most_lost:
+            why = f"expected time to rise within a push, found {params.time_column} out of place"
+            damages = sorted([*damages, *((int(line), why) for line in lines[astray])])
+            table, t = table[~astray], t[~astray]
+            lines, trial = lines[~astray], trial[~astray]
+        check_time(path, t, trial, lines, params.time_unit)
     else:
-        t = _counted(trial) / rate
-    _check_counts(path, counts, lines)
-    bend = _normalised(path, raw, lines, params)
-    samples = Samples(counts, bend, trial, speed, lines)
-    return Recording(t, samples, hashlib.sha256(data).hexdigest())
+        t, wraps = _counted(trial) / rate, []
+    _check_share(path, damages, total, params.most_lost)
+    readings, bend = table[:, _READING], _normalised(path, lines, table[:, _BEND], params)
+    counts, conversion = to_counts(
+        path, params.reading_unit, readings, lines, sensor or SensorParams()
+    )
+    speed: Floats = np.abs(table[:, _SPEED]) * SPEED_UNITS[params.speed_unit]
+    samples, t, far, kept = _without_outliers(Samples(counts, bend, trial, speed, lines), t, params)
+    handled = Handled(
+        total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion
+    )
+    return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
+
+
+def _without_outliers(
+    samples: Samples, t: Floats, params: RecordingParams
+) -> tuple[Samples, Floats, tuple[Outlier, ...], bool]:
+    """Readings and times without outliers, these, and whether they are kept as there are many."""
+    far = outliers(samples)
+    found = tuple(
+        Outlier(int(row), float(value), float(other))
+        for row, value, other in zip(
+            samples.row[far], samples.counts[far], usual(samples)[far], strict=True
+        )
+    )
+    if far.mean() > params.most_lost:
+        return samples, t, found, True
+    used = Samples(*(getattr(samples, field.name)[~far] for field in fields(Samples)))
+    return used, t[~far], found, False
 
 
 def _numbered(path: Path, trial: Floats, lines: Ints, name: str) -> Ints:
@@ -122,7 +208,11 @@ def _counted(trial: Ints) -> Ints:
 
 def _rows(
     path: Path, data: bytes, params: RecordingParams, rate: float | None
-) -> list[tuple[int, list[float]]]:
+) -> tuple[Floats, Ints, list[tuple[int, str]]]:
+    """Numbers of the rows that are whole, their lines, and lines and reasons of those that are not.
+
+    Rows may be damaged: a serial line merges two, cuts one, or mixes in what a board says at boot.
+    """
     needed = [params.time_column] * (rate is None) + [params.counts_column, params.bend_column]
     cure = "; name yours with --columns.*-column"
     cure += ", or give --rate if there is no time" if rate is None else ""
@@ -136,10 +226,27 @@ def _rows(
     names = (params.trial_column, params.speed_column, params.time_column, *needed[-2:])
     places = _places(path, header, names)
     _check_units(path, header, places, params)
-    rows = [(line, _values(path, line, header, cells, places)) for line, cells in lines]
-    if not rows:
+    rows, numbers, damages = list[list[float]](), list[int](), list[tuple[int, str]]()
+    for line, cells in lines:
+        values = _values(header, cells, places, params)
+        if isinstance(values, str):
+            damages.append((line, values))
+        else:
+            rows.append(values)
+            numbers.append(line)
+    if not rows and not damages:
         raise CalibrationError(f"{path}: row 2: expected readings, found none; record longer")
-    return rows
+    _check_share(path, damages, len(rows) + len(damages), params.most_lost)
+    return np.array(rows), np.array(numbers, dtype=np.int64), damages
+
+
+def _check_share(path: Path, damages: list[tuple[int, str]], rows: int, most: float) -> None:
+    """Refuse a file of which too large a share is damaged, by its first damaged row."""
+    if len(damages) <= most * rows:
+        return
+    line, why = damages[0]
+    more = f" ({len(damages)} of {rows} rows are like it)" if len(damages) > 1 else ""
+    raise CalibrationError(f"{path}: row {line}: {why}{more}")
 
 
 def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | None]:
@@ -154,86 +261,75 @@ def _check_units(
 ) -> None:
     """Refuse a column whose name gives another unit than the one declared."""
     columns = (
+        (places[1], SPEED_UNITS, params.speed_unit, "speed-unit"),
         (places[2], TIME_UNITS, params.time_unit, "time-unit"),
-        (places[3], ("V", "mV", "%"), "counts", "counts-column"),
+        (places[3], (*READING_UNITS, "%"), params.reading_unit, "reading-unit"),
         (places[4], BEND_UNITS, params.bend_unit, "bend-unit"),
     )
     for place, known, declared, flag in columns:
-        named = unit_of(header[place]) if place is not None else ""
-        if named in known and named != declared:
+        if place is None:
+            continue
+        named = unit_of(header[place], known)
+        plain = unit_named(named) if flag == "reading-unit" else named
+        if plain in known and plain != declared:
             raise CalibrationError(
-                f"{path}: row 1: expected {header[place or 0]} in {declared} as declared, found "
+                f"{path}: row 1: expected {header[place]} in {declared} as declared, found "
                 f"{named}; is it the right --columns.{flag}?"
             )
 
 
 def _values(
-    path: Path, line: int, header: list[str], cells: list[str], places: list[int | None]
-) -> list[float]:
+    header: list[str], cells: list[str], places: list[int | None], params: RecordingParams
+) -> list[float] | str:
+    """Numbers of a row, or what was expected of it and found."""
     if len(cells) != len(header):
-        few = len(cells) < len(header)
-        why = " (truncated); delete the row" if few else "; are there decimal commas? write points"
-        raise CalibrationError(
-            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
-        )
-    values = []
-    for place in places:
+        why = "; are there decimal commas? write points"
+        if len(cells) < len(header):
+            why = " (truncated); delete the row"
+        elif any("." in cell for cell in cells):
+            why = "; is it merged with another, or a column without a name?"
+        return f"expected {len(header)} cells, found {len(cells)}{why}"
+    values = list[float]()
+    for i, place in enumerate(places):
         if place is None:
             values.append(math.nan)
             continue
-        found = f"in {header[place]}, found {cells[place][:40]!r}"
+        cell = cells[place]
+        found = f"in {header[place]}, found {cell[:40]!r}"
         try:
-            value = number_of(cells[place])
+            value = number_of(cell)
         except ValueError as error:
-            raise CalibrationError(f"{path}: row {line}: expected {error} {found}") from None
+            return f"expected {error} {found}"
+        if i == _TIME and (clock := seconds(cell)) is not None:
+            value = clock / TIME_UNITS[params.time_unit]
         if not math.isfinite(value):
-            raise CalibrationError(
-                f"{path}: row {line}: expected a finite number {found}; delete the row"
-            )
+            return f"expected a finite number {found}; delete the row"
+        if why := _impossible(i, value, header[place], params):
+            return why
         values.append(value)
     return values
 
 
-def _check_time(path: Path, t: Floats, trial: Ints, lines: Ints, params: RecordingParams) -> None:
-    steps = np.diff(t)[np.diff(trial) == 0]
-    at = lines[1:][np.diff(trial) == 0]
-    if (steps <= 0).any():
-        row = at[int(np.argmax(steps <= 0))]
-        raise CalibrationError(
-            f"{path}: row {row}: expected time to rise within a push, found it standing or going "
-            "back; sort the rows, or number pushes in a column trial"
-        )
-    if len(steps) and np.median(steps) > _LONGEST_PERIOD:
-        raise CalibrationError(
-            f"{path}: row {at[0]}: expected readings less than {_LONGEST_PERIOD:g} s apart, found "
-            f"{np.median(steps):g} s; is {params.time_unit} the right --columns.time-unit?"
-        )
+def _impossible(place: int, value: float, name: str, params: RecordingParams) -> str:
+    """What was expected of a number that its unit hardly allows, empty if it does."""
+    unit, flag, wanted = params.reading_unit, "reading-unit", ""
+    if place == _READING:
+        wanted = impossible(unit, value)
+    elif place == _SPEED:
+        unit, flag = params.speed_unit, "speed-unit"
+        if abs(value) * SPEED_UNITS[unit] > _LARGEST_SPEED:
+            wanted = f"speeds up to {_LARGEST_SPEED:g} m/s in {name}"
+    elif place == _BEND:
+        unit, flag = params.bend_unit, "bend-unit"
+        if abs(value) > _LARGEST_BEND[unit]:
+            wanted = f"at most {_LARGEST_BEND[unit]:g} in {name}"
+    if not wanted:
+        return ""
+    return f"expected {wanted}, found {value:g}; is {unit} the right --columns.{flag}?"
 
 
-def _check_counts(path: Path, counts: Floats, lines: Ints) -> None:
-    bad = (counts < 0) | (counts > 4095)
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise CalibrationError(
-            f"{path}: row {lines[i]}: expected 0 to 4095 counts, found {counts[i]:g}; give raw "
-            "readings, not volts or percent"
-        )
-    if counts.max() <= 5 and (counts != np.round(counts)).any():
-        raise CalibrationError(
-            f"{path}: row {lines[0]}: expected raw counts, found {counts[0]:g} and none above 5; "
-            "are these volts? multiply by 4095 / 3.3"
-        )
-
-
-def _normalised(path: Path, raw: Floats, lines: Ints, params: RecordingParams) -> Floats:
+def _normalised(path: Path, lines: Ints, raw: Floats, params: RecordingParams) -> Floats:
     unit = params.bend_unit
-    beyond = abs(raw) > _LARGEST_BEND[unit]
-    if beyond.any():
-        i = int(np.argmax(beyond))
-        raise CalibrationError(
-            f"{path}: row {lines[i]}: expected at most {_LARGEST_BEND[unit]:g} in unit {unit}, "
-            f"found {raw[i]:g}; is it the right --columns.bend-unit?"
-        )
     zero = float(raw.min()) if params.bend_zero is None else params.bend_zero
     full = float(raw.max()) if params.bend_full is None else params.bend_full
     if unit == "1" and params.bend_zero is None and params.bend_full is None:

@@ -18,15 +18,16 @@ from pydantic import model_validator
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
-from antennate.antenna.next_push import Assessment, Pushes, assess
+from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.plateau import Plateau, plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
+from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.experiments.reading import mean_since
-from antennate.params.base import Params, number, require_default
+from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
@@ -37,7 +38,9 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
-_OF_THE_RIG = ("rig", "antenna", "variation", "physics", "solver", "seed")
+_BETTER = 0.2
+"""How much more of the level each direction alone explains where hysteresis is asked about."""
+_OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
 
 
 class CalibrateConfig(Params):
@@ -91,7 +94,9 @@ class CalibrateConfig(Params):
         if self.recording is None:
             require_default(self, "without a recording it is not read", "columns", "rate")
         else:
-            require_default(self, "with a recording it is not read", *_OF_THE_RIG)
+            used = {f"antenna.sensor.{n}" for n in parameters_of(self.columns.reading_unit)}
+            antenna = sorted({*paths_of(AntennaSpec, "antenna")} - used)
+            require_default(self, "with a recording it is not read", *_OF_THE_RIG, *antenna)
         named = {"time_column", "time_unit"} & self.columns.model_fields_set
         if self.rate is not None and named:
             raise ValueError(
@@ -132,7 +137,7 @@ class CalibrateOutcome(Outcome):
     @functools.cached_property
     def assessment(self) -> Assessment:
         """What is known about the next push."""
-        return assess(self.recording.samples, self.calibration)
+        return assess(self.recording.samples, self.calibration, self.recording.t)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -144,14 +149,21 @@ class CalibrateOutcome(Outcome):
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
             "plateau": None if (found := self._plateau()) is None else asdict(found),
+            "recording": None if self.raw.handled is None else asdict(self.raw.handled),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
 
     def _hysteretic(self) -> bool:
-        """Whether the fit is poor although loading and unloading each are fitted well."""
-        found, good = self.assessment.hysteresis, self.config.good_r2
-        return self.calibration.r2 < good and found is not None and min(found.one_way_r2) >= good
+        """Whether the fit is poor, and loading and unloading are fitted far better on their own.
+
+        That is: each well, or with half the variance left or less.
+        """
+        found, good, r2 = self.assessment.hysteresis, self.config.good_r2, self.calibration.r2
+        if found is None or r2 >= good:
+            return False
+        alone = min(found.one_way_r2)
+        return alone >= good or 1.0 - alone <= (1.0 - r2) / 2.0
 
     def _plateau(self) -> Plateau | None:
         """Readings that stand at their highest, too few to refuse them."""
@@ -258,7 +270,8 @@ def run(
     if config.recording is None:
         raw = record(config, workers, on_step)
     else:
-        raw = read(Path(config.recording), config.columns, config.rate)
+        sensor = config.antenna.sensor
+        raw = read(Path(config.recording), config.columns, config.rate, sensor)
     used = averaged(raw, config.averaging_time)
     pushes = Pushes.of(used.samples)
     used = replace(used, samples=replace(used.samples, trial=pushes.number))
@@ -274,5 +287,17 @@ def run(
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""
-        raise CalibrationError(f"{where}{error}") from None
+        raise CalibrationError(f"{where}{error}{_hysteresis(used.samples, pushes)}") from None
     return CalibrateOutcome(config, used, raw, found)
+
+
+def _hysteresis(samples: Samples, pushes: Pushes) -> str:
+    """A hint at hysteresis beside a fault, if each direction alone would be fitted far better."""
+    there, back = (sigmoid_r2(samples, pushes.way == sign) for sign in (1, -1))
+    both = sigmoid_r2(samples, pushes.way != 0)
+    if min(there, back) < both + _BETTER:
+        return ""
+    return (
+        f"; or is it hysteresis? Loading alone fits with R² {there:.2f}, unloading alone with "
+        f"{back:.2f}"
+    )

@@ -18,6 +18,7 @@ from antennate.experiments.study.subject import (
     find,
     nested,
     numbers,
+    table_of,
 )
 from antennate.messages import nearest, shortened
 from antennate.params.base import Params
@@ -135,8 +136,12 @@ class Evaluator:
             )
         return ends[0] if ends else None
 
-    def configured(self, point: Point) -> Any:
+    def configured(self, point: Point, where: str = "") -> Any:
         """The configuration of a design.
+
+        Args:
+            point: The design.
+            where: The table of a file that holds it, for errors.
 
         Raises:
             ConfigError: A value is out of bounds, or does not fit another one.
@@ -148,8 +153,11 @@ class Evaluator:
         try:
             return self._subject.configured(found)
         except ConfigError as error:
-            label = "" if self.label == self.name else f"evaluate.{self.label}: "
-            raise ConfigError(f"{label}{error}") from None
+            if table_of(str(error), self._asked.settings, self._subject) == "settings":
+                where = f"evaluate.{self.label}.settings: "
+            elif self.label != self.name:
+                where += f"evaluate.{self.label}: "
+            raise ConfigError(f"{where}{error}") from None
 
     def check(self, point: Point) -> None:
         """Find what cannot be run.

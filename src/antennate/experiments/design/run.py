@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from antennate.errors import ConfigError
 from antennate.experiments.design.config import Axis, DesignConfig
 from antennate.experiments.design.designs import DesignOutcome
@@ -12,7 +9,6 @@ from antennate.experiments.design.evaluate import ends_of, evaluators
 from antennate.experiments.design.propose import package
 from antennate.experiments.design.search import Search
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
-from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, workers_from
 
 
@@ -33,10 +29,10 @@ def check(config: DesignConfig) -> None:
     found = evaluators(config)
     for name, value in ends_of(config):
         for evaluator in found:
-            _named(f"search.{name}", evaluator.configured, {name: value})
+            evaluator.configured({name: value}, f"search.{name}: ")
     for name, point in config.reference.items():
         for evaluator in found:
-            _named(f"reference.{name}", evaluator.configured, point)
+            evaluator.configured(point, f"reference.{name}: ")
     first = next(iter(config.reference.values()), dict([next(ends_of(config))]))
     for evaluator in found:
         evaluator.check(first)
@@ -55,13 +51,6 @@ def _check_objectives(config: DesignConfig) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"evaluate.{name}: expected an objective once, found it twice")
-
-
-def _named(where: str, configure: Callable[[Point], Any], point: Point) -> None:
-    try:
-        configure(point)
-    except ConfigError as error:
-        raise ConfigError(f"{where}: {error}") from None
 
 
 def run(

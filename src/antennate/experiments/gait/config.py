@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 from pydantic import model_validator
 
@@ -11,7 +11,6 @@ from antennate.control.readers import unread_lift
 from antennate.errors import ConfigError
 from antennate.experiments.gait.unknown import Unknown, changed
 from antennate.params.base import (
-    GATHERED,
     Params,
     number,
     require_default,
@@ -46,7 +45,7 @@ class GaitStudyConfig(Params):
     """What counts as a body length; the length of the robot if not given."""
     measured: float | None = number(None, "1", "assumed: nobody measured it")
     """Body lengths a cycle that a real robot was measured to walk."""
-    unknown: Annotated[tuple[str, ...], GATHERED] = number((), "1", "assumed: all is known")
+    unknown: tuple[str, ...] = number((), "1", "assumed: all is known")
     """Numbers that are not known, each with its range: robot.leg_friction=0.18:0.25."""
     draws: int = number(100, "1", "assumed: enough for an interval", ge=1, le=10_000)
     """Draws of the unknown numbers, if there are any."""

@@ -105,6 +105,7 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     parts="walks",
     logged=lambda config, workers, on_step, _, logs: gait.run(config, workers, on_step, logs=logs),
+    logs=gait.log_names,
     viewed=lambda config, on_step, _, view, logs: gait.run(config, 1, on_step, view, logs),
     captions=CAPTIONS,
 )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +33,7 @@ from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
@@ -234,7 +234,7 @@ def _log(
     folder: Path, config: GaitStudyConfig, name: str, world: World, decisions: Decisions
 ) -> SimulatedLog:
     """The log of a walk, in place of what a killed run left of it."""
-    path = folder / (re.sub(r"[^\w.-]", "_", name) + ".mcap")
+    path = folder / log_name(name)
     path.unlink(missing_ok=True)
     params = ControlParams(rate=config.rate, gait=config.gait)
     header = Header(controller=LOGGED, params=params, robot=config.robot)
@@ -245,6 +245,11 @@ def _no_chance(robot: RobotSpec, period: float) -> Disturbance:
     """A disturbance that disturbs nothing; the control here does not look at sensor noise."""
     still = VariationParams(start_lateral=0, start_heading=0, joint_bias=0, slip_log_sd=0)
     return Disturbance(np.random.default_rng(0), still, robot, period)
+
+
+def log_names(config: GaitStudyConfig) -> list[str]:
+    """Names of the logs of all walks."""
+    return [log_name(name) for _, name, _, _ in _tasks(config)]
 
 
 def _tasks(config: GaitStudyConfig) -> list[_Task]:

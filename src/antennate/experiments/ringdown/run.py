@@ -100,7 +100,7 @@ class RingdownConfig(Params):
         (6, 14, 40, MOST_HINGES), "1", "assumed: the robot's, the animal model's, and more"
     )
     """Hinges of the chains that stand for a cone."""
-    beside: tuple[str, ...] = number((), "1", "assumed: none")
+    beside: tuple[str, ...] = number((), "1", "assumed: none", metavar="FILE")
     """Files of robots whose antennae stand beside this one, by the first mode of their chains."""
     antenna: AntennaSpec = AntennaSpec()
     physics: BenchPhysicsParams = BenchPhysicsParams()

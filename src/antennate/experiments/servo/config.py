@@ -16,7 +16,7 @@ class ServoConfig(Params):
     unread: ClassVar[tuple[str, ...]] = tuple(
         f"servos.{name}.p_gain" for name in ServosParams.model_fields
     )
-    recording: tuple[str, ...] = number((), "1", "assumed: has to be named")
+    recording: tuple[str, ...] = number((), "1", "assumed: has to be named", metavar="FILE")
     """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""
     joint: str | None = number(None, "1", "assumed: has to be named if a recording is a log")
     """Joint of a log."""

@@ -153,5 +153,6 @@ EXPERIMENT = Experiment.of_folder(
     check=study.check,
     failed=lambda result: measures.NO_RESULT.issuperset(result["statuses"]),
     continued=True,
+    tasks=study.every,
     captions=CAPTIONS,
 )

@@ -31,9 +31,9 @@ from antennate.studies.work import Fail, Failure
 STATUS, REASON = "status", "reason"
 _Task = tuple[str, Sequence[str], int, Any, Trial]
 """What is run, what varies, number of the point, its configuration, the trial."""
-_Numbered = tuple[int, str, Sequence[str], int, Any, Trial]
-"""The same behind the place of the task."""
-_Emit = Callable[[int, tuple[int, Rows]], None]
+_Name = tuple[int, str, int]
+"""What a task is, whatever the number of trials: its point, condition and trial."""
+_Emit = Callable[[int, tuple[_Name, Rows]], None]
 
 
 @dataclass(frozen=True)
@@ -152,6 +152,27 @@ def _require_response(config: StudyConfig, columns: Columns) -> None:
         )
 
 
+def every(config: StudyConfig) -> list[_Name]:
+    """What each task is: all trials, point by point."""
+    subject = find(config.experiment)
+    return [_name(task) for task in _tasks(config, subject, configurations(config, subject))]
+
+
+def _tasks(
+    config: StudyConfig, subject: Subject, points: Sequence[tuple[Point, Any]]
+) -> list[_Task]:
+    axes = list(config.axes(subject.model))
+    return [
+        (config.experiment, axes, number, configured, trial)
+        for number, (_, configured) in enumerate(points)
+        for trial in subject.every(configured)
+    ]
+
+
+def _name(task: _Task) -> _Name:
+    return task[2], *task[4]
+
+
 def run(
     config: StudyConfig,
     workers: int | Workers = 1,
@@ -167,34 +188,31 @@ def run(
     subject = find(config.experiment)
     points = configurations(config, subject)
     axes = config.axes(subject.model)
-    tasks: list[_Task] = [
-        (config.experiment, list(axes), number, configured, trial)
-        for number, (_, configured) in enumerate(points)
-        for trial in subject.every(configured)
-    ]
-    found: list[tuple[int, Rows]] = []
+    tasks = _tasks(config, subject, points)
+    found: list[tuple[_Name, Rows]] = []
     checked = False
 
-    def lost(place: int, failure: Failure) -> tuple[int, Rows]:
+    def lost(place: int, failure: Failure) -> tuple[_Name, Rows]:
         condition, trial = tasks[place][4]
         row = {"trial": trial, STATUS: failure.status, REASON: failure.reason}
-        return place, [({subject.condition: condition} if subject.condition else {}) | row]
+        return _name(tasks[place]), [
+            ({subject.condition: condition} if subject.condition else {}) | row
+        ]
 
-    def take(item: tuple[int, Rows]) -> None:
+    def take(item: tuple[_Name, Rows]) -> None:
         found.append(item)
         for row in item[1]:
             nonlocal checked
             if not checked and row[STATUS] in ("ok", "nan"):
                 _require_response(config, columns_in(row))
                 checked = True
-            on_row({"point": tasks[item[0]][2], **row})
+            on_row({"point": item[0][0], **row})
 
     chunk = chunk_of(len(tasks), workers, subject.most)
-    numbered = [(place, *task) for place, task in enumerate(tasks)]
     interrupted = False
     try:
         gather(
-            *(_run, numbered, workers, on_step, take),
+            *(_run, tasks, workers, on_step, take),
             chunk=chunk,
             together=True,
             lost=lost,
@@ -210,22 +228,22 @@ def run(
     )
 
 
-def _run(tasks: Sequence[_Numbered], emit: _Emit) -> None:
+def _run(tasks: Sequence[_Task], emit: _Emit) -> None:
     """Run some trials, those of one point at once."""
-    subject = find(tasks[0][1], tasks[0][2])
+    subject = find(tasks[0][0], tasks[0][1])
     for _, config, trials, take in _by_point(tasks, emit):
         subject.run(config, trials, take)
 
 
-def _run_batched(tasks: Sequence[_Numbered], emit: _Emit, fail: Fail, device: str | None) -> None:
+def _run_batched(tasks: Sequence[_Task], emit: _Emit, fail: Fail, device: str | None) -> None:
     """The same on a GPU, a batch for each point; a point that cannot be run fails alone.
 
     Raises:
         ConfigError: What is run has no batches, or there is no such device.
     """
-    subject, ended = find(tasks[0][1], tasks[0][2]), set[int]()
+    subject, ended = find(tasks[0][0], tasks[0][1]), set[int]()
 
-    def take(index: int, result: tuple[int, Rows]) -> None:
+    def take(index: int, result: tuple[_Name, Rows]) -> None:
         ended.add(index)
         emit(index, result)
 
@@ -238,18 +256,18 @@ def _run_batched(tasks: Sequence[_Numbered], emit: _Emit, fail: Fail, device: st
 
 
 def _by_point(
-    tasks: Sequence[_Numbered], emit: _Emit
+    tasks: Sequence[_Task], emit: _Emit
 ) -> Iterator[tuple[list[int], Any, list[Trial], EmitRows]]:
     """For each point indices of its tasks, configuration, trials, and what takes their rows."""
     by_point: dict[int, list[int]] = {}
     for index, task in enumerate(tasks):
-        by_point.setdefault(task[3], []).append(index)
+        by_point.setdefault(task[2], []).append(index)
     for indices in by_point.values():
 
         def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
-            emit(indices[i], (tasks[indices[i]][0], [with_status(row) for row in rows]))
+            emit(indices[i], (_name(tasks[indices[i]]), [with_status(row) for row in rows]))
 
-        yield indices, tasks[indices[0]][4], [tasks[index][5] for index in indices], take
+        yield indices, tasks[indices[0]][3], [tasks[index][4] for index in indices], take
 
 
 def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[str, Any]:
@@ -270,14 +288,14 @@ def _table(
     subject: Subject,
     points: Sequence[Point],
     tasks: Sequence[_Task],
-    found: Sequence[tuple[int, Rows]],
+    found: Sequence[tuple[_Name, Rows]],
 ) -> Rows:
     """All rows in the order of the plan, each with the same columns."""
-    in_order = sorted(found, key=lambda item: item[0])
+    rows = dict(found)
     whole = [
-        {"point": tasks[place][2], **cells(points[tasks[place][2]]), **row}
-        for place, rows in in_order
-        for row in rows
+        {"point": task[2], **cells(points[task[2]]), **row}
+        for task in tasks
+        for row in rows.get(_name(task), ())
     ]
     return aligned(whole)
 

@@ -75,7 +75,7 @@ def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, A
         try:
             found.append((point, subject.configured(put_over(settings, nested(point)), assumed)))
         except ConfigError as error:
-            raise ConfigError(f"{_table_of(str(error), settings, subject)}: {error}") from None
+            raise ConfigError(f"{table_of(str(error), settings, subject)}: {error}") from None
     return found
 
 
@@ -92,7 +92,7 @@ def _require_groups(settings: Mapping[str, Any], name: str) -> None:
         group = part
 
 
-def _table_of(fault: str, settings: Mapping[str, Any], subject: Subject) -> str:
+def table_of(fault: str, settings: Mapping[str, Any], subject: Subject) -> str:
     """The table of a file that a fault of a point is in."""
     try:
         subject.configured(settings)

@@ -17,10 +17,12 @@ from antennate.experiments.tracks.track import Track
 from antennate.types import Bools, Floats, Ints
 
 COUNTED = (
-    "duplicated", "absent", "still", "low_likelihood", "missing", "swapped", "outliers", "bridged",
+    "unsorted", "duplicated", "absent", "still", "low_likelihood", "missing", "swapped", "outliers",
+    "bridged",
 )  # fmt: skip
-"""What is counted: frames that stand twice, are absent, or repeat all points of the last; points of
-low likelihood and missing ones; frames with exchanged sides; wrong points; and bridged ones."""
+"""What is counted: rows after one of a later frame; frames that stand twice, are absent, or repeat
+all points of the last; points of low likelihood and missing ones; frames with exchanged sides;
+wrong points; and bridged ones."""
 _MOST_EXCHANGED, _MOST_ACROSS = 0.5, 0.8
 """Shares of frames beyond which left and right are not exchanged now and then but always: with two
 antennae, and with one, which may swing across the body axis."""
@@ -43,6 +45,7 @@ class Antennae:
         places: The same points as in the file's frame.
         contact: Whether each antenna touches, shape (n,), where the file has it.
         counts: What was wrong, by the names in `COUNTED`.
+        empty: Names of points that were never known.
     """
 
     track: Track
@@ -51,11 +54,16 @@ class Antennae:
     places: dict[str, Floats]
     contact: dict[str, Floats]
     counts: dict[str, int]
+    empty: tuple[str, ...]
 
     @property
     def frames(self) -> int:
         """Number of frames, absent ones included."""
         return len(next(iter(self.sides.values())))
+
+    def known(self, side: str) -> int:
+        """Frames in which every point of an antenna is known."""
+        return int(np.isfinite(self.sides[side]).all(axis=(1, 2)).sum())
 
 
 def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Antennae:
@@ -93,7 +101,8 @@ def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Ante
     places = {s: np.einsum("nij,nki->nkj", frame, v) + axis[:, 1:] for s, v in body.items()}
     outwards = {s: v * (1.0, 1.0 if s == "left" else -1.0) for s, v in body.items()}
     contact = {side: _whole(track, values) for side, values in track.contact.items()}
-    return Antennae(track, rate, outwards, places, contact, counts)
+    empty = tuple(name for name, values in points.items() if np.isnan(values).all())
+    return Antennae(track, rate, outwards, places, contact, counts, empty)
 
 
 def _refuse_far_apart(track: Track) -> None:
@@ -126,7 +135,7 @@ def _each_frame_once(
     """Points with a row for each frame from first to last; what is not known is NaN."""
     kept = np.concatenate([[True], np.diff(track.frames) > 0])
     cutoff = track.cutoff if params.likelihood is None else params.likelihood
-    counts["duplicated"] = int((~kept).sum())
+    counts["unsorted"], counts["duplicated"] = track.unsorted, int((~kept).sum())
     counts["absent"] = int(track.frames[-1] - track.frames[0] + 1 - kept.sum())
     found = {}
     for name, raw in track.points.items():
@@ -152,10 +161,7 @@ def _exchange(track: Track, body: dict[str, Floats], counts: dict[str, int]) -> 
     the last frame as well.
     """
     if set(body) != {"left", "right"}:
-        for side, values in body.items():
-            ahead, out = (values[:, -1] - values[:, 0]).T
-            across = (-out if side == "left" else out) > _CLEARLY * np.hypot(ahead, out)
-            _refuse_mirrored(track, across, np.isfinite(out), _MOST_ACROSS)
+        _refuse_each_across(track, body)
         return
     left, right = body["left"], body["right"]
     apart = left[..., 1] - right[..., 1]
@@ -163,11 +169,21 @@ def _exchange(track: Track, body: dict[str, Floats], counts: dict[str, int]) -> 
     order = np.sort(apart if own_base else apart[:, 1:], axis=1)
     order = order[:, order.shape[1] // 2]
     wrong = order < 0
+    if np.isfinite(order).sum() < _FRAMES_TO_JUDGE:
+        _refuse_each_across(track, body)
     _refuse_mirrored(track, wrong, np.isfinite(order), _MOST_EXCHANGED)
     if not own_base:
         wrong = _nearer_if_exchanged(left[:, -1], right[:, -1], wrong)
     counts["swapped"] = int(wrong.sum())
     left[wrong], right[wrong] = right[wrong], left[wrong].copy()
+
+
+def _refuse_each_across(track: Track, body: dict[str, Floats]) -> None:
+    """Judge each antenna alone, where there is no other one to compare it with."""
+    for side, values in body.items():
+        ahead, out = (values[:, -1] - values[:, 0]).T
+        across = (-out if side == "left" else out) > _CLEARLY * np.hypot(ahead, out)
+        _refuse_mirrored(track, across, np.isfinite(out), _MOST_ACROSS)
 
 
 def _refuse_mirrored(track: Track, wrong: Bools, known: Bools, most: float) -> None:

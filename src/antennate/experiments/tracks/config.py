@@ -178,7 +178,9 @@ class SyntheticParams(Params):
 class TracksConfig(Params):
     """Everything that decides the outcome of `antennate tracks`."""
 
-    files: tuple[str, ...] = number((), "1", "assumed: no files, the synthetic animal")
+    files: tuple[str, ...] = number(
+        (), "1", "assumed: no files, the synthetic animal", metavar="FILE"
+    )
     """Files to read: .csv, .h5, .slp or .npz."""
     rate: float | None = number(None, "Hz", "assumed: as the files say", gt=0, le=100000)
     """Frames a second at which was recorded."""

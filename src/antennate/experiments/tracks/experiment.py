@@ -8,10 +8,12 @@ from typing import Any
 from antennate.experiments.tracks import run as tracks
 from antennate.experiments.tracks.config import TracksConfig
 from antennate.experiments.tracks.measures import SHAPES
+from antennate.experiments.tracks.walls import MOST_BEYOND
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import NONE, Table, shown
 
 HANDLED = {
+    "unsorted": "rows after one of a later frame, sorted",
     "duplicated": "frames that stand twice, left out",
     "absent": "frames absent from the file",
     "still": "frames equal to the last in every point, kept",
@@ -80,7 +82,7 @@ def _free_air(result: Mapping[str, Any]) -> bool:
 def sentence(result: Mapping[str, Any]) -> str:
     """Which shapes antennae in contact have, and how much depends on the criteria."""
     if not result["trials_in_contact"]:
-        return "No antenna was seen in contact."
+        return f"No antenna was seen in contact{_nearest(result)}{_unseen(result)}"
     listed = ", ".join(
         f"{name} {100 * row['share']:.0f} %"
         + (f" ({shown(row['share_95'], '.0f', 100.0)})" if row["share_95"] else "")
@@ -100,7 +102,43 @@ def sentence(result: Mapping[str, Any]) -> str:
     return (
         f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
-        f"{100 * most['change']:.1f} points.{right}{single}"
+        f"{100 * most['change']:.1f} points.{right}{single}{_beyond(result)}{_unseen(result)}"
+    )
+
+
+def _nearest(result: Mapping[str, Any]) -> str:
+    """How near to a wall the antennae came."""
+    near = [wall["nearest"] for wall in result["wall"].values() if wall.get("nearest")]
+    if not near:
+        return "."
+    unit = "; is the wall given in the unit of the file?" if min(near) > 1 else "."
+    return f": the nearest point lay {min(near):.2g} lengths of an antenna from the wall{unit}"
+
+
+def _beyond(result: Mapping[str, Any]) -> str:
+    """Which walls many antennae reach beyond."""
+    far = {name: wall["beyond"] for name, wall in result["wall"].items() if wall.get("beyond")}
+    worst = max(far, key=lambda name: far[name], default="")
+    if not worst or far[worst] <= MOST_BEYOND:
+        return ""
+    return (
+        f" In {100 * far[worst]:.0f} % of the frames of {worst} an antenna reaches beyond the "
+        "wall: is it where the file has it?"
+    )
+
+
+def _unseen(result: Mapping[str, Any]) -> str:
+    """Which antennae were hardly ever seen."""
+    found = result.get("unseen")
+    if not found:
+        return ""
+    one = found[0]
+    empty = f", as {', '.join(one['empty'])} never has a value" if one["empty"] else ""
+    others = f"; {len(found) - 1} more in result.json" if len(found) > 1 else ""
+    of = f" of {one['animal']}" if one["animal"] else ""
+    return (
+        f" The {one['side']} antenna{of} in {one['file']} is known in {one['known']} of "
+        f"{one['frames']} frames{empty}{others}."
     )
 
 

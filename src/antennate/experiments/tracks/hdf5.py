@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import pickle
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ from antennate.experiments.tracks.track import (
     from_columns,
     refuse_labels,
     require_points,
+    require_room_for,
 )
 from antennate.files import read_limited
 from antennate.messages import extra
@@ -75,14 +77,17 @@ def _analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
     nodes, tracks = _texts(file["node_names"]), file["tracks"]
     require_points(path, names, nodes)
     where, shape = _axes(path, file, len(nodes)), tracks.shape
-    points = np.moveaxis(np.asarray(tracks[()], np.float64), where, (0, 3, 2, 1))
+    wanted = [nodes.index(name) for name in names]
+    _judge(path, tracks, len(wanted) / max(1, len(nodes)))
+    points = np.moveaxis(_taken(tracks, wanted, where[2]), where, (0, 3, 2, 1))
     scores = None
     if "point_scores" in file:
-        held = np.asarray(file["point_scores"][()], np.float64)
+        held = file["point_scores"]
         kept = [axis for axis in np.argsort(where) if axis != 1]  # those of tracks without xy
         order = [kept.index(axis) for axis in (0, 2, 3)]
         if held.shape == tuple(np.delete(shape, where[1])):
-            scores = np.moveaxis(held, order, (0, 2, 1))
+            _judge(path, held, len(wanted) / max(1, len(nodes)))
+            scores = np.moveaxis(_taken(held, wanted, order[1]), order, (0, 2, 1))
     titles = _texts(file["track_names"]) if "track_names" in file else []
     titles = titles if len(titles) == len(points) else [str(i) for i in range(len(points))]
     titles = titles if len(points) > 1 else [""]
@@ -92,12 +97,25 @@ def _analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
             title,
             np.arange(points.shape[1]),
             None,
-            {n: points[i, :, nodes.index(n)] for n in names},
-            {} if scores is None else {n: scores[i, :, nodes.index(n)] for n in names},
+            {n: points[i, :, k] for k, n in enumerate(names)},
+            {} if scores is None else {n: scores[i, :, k] for k, n in enumerate(names)},
             _SLEAP_CUTOFF,
         )
         for i, title in enumerate(titles)
     ]
+
+
+def _judge(path: Path, held: Any, share: float = 1.0) -> None:
+    """Refuse an array, before it is unpacked, of which a share, or a single chunk, is too large."""
+    size = max(8, held.dtype.itemsize)
+    require_room_for(path, round(share * held.size * size))
+    require_room_for(path, math.prod(held.chunks or (1,)) * size)
+
+
+def _taken(held: Any, places: Sequence[int], axis: int) -> Floats:
+    """Some places along an axis of an array of a file, in this order."""
+    before = (slice(None),) * axis
+    return np.stack([np.asarray(held[(*before, i)], np.float64) for i in places], axis)
 
 
 def _axes(path: Path, file: Any, nodes: int) -> tuple[int, ...]:
@@ -125,6 +143,8 @@ def _labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
     except (ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"{path}: expected a skeleton of SLEAP, found: {error}") from None
     require_points(path, names, nodes)
+    for key in ("frames", "instances", "points", "pred_points"):
+        _judge(path, file[key])
     frames, instances = file["frames"][()], file["instances"][()]
     if len(set(frames["video"].tolist())) > 1:
         raise BadInputError(f"{path}: expected one video, found several; save each on its own")
@@ -138,6 +158,7 @@ def _labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
             part = source[int(one["point_id_start"]) : int(one["point_id_end"])]
             number, at, seen = int(one["track"]), int(frame["frame_idx"]), part["visible"]
             if number not in tracks:
+                require_room_for(path, (len(tracks) + 1) * last * len(nodes) * 3 * 8)
                 tracks[number] = (
                     np.full((last, len(nodes), 2), np.nan),
                     np.zeros((last, len(nodes))),
@@ -179,11 +200,13 @@ def _deeplabcut(path: Path, group: Any, names: Sequence[str]) -> list[Track]:
     try:
         if "table" in group:
             table = group["table"]
+            _judge(path, table)
             blocks = [name for name in table.dtype.names if name.startswith("values_block_")]
             index, values = table["index"], np.hstack([table[name] for name in blocks])
             held = [table.attrs[f"{name}_kind"] for name in blocks]
             columns = [key for each in held for key in _Plain(io.BytesIO(_bytes(each))).load()]
         else:
+            _judge(path, group["block0_values"])
             count, index = int(group.attrs["axis0_nlevels"]), group["axis1"][()]
             values = np.asarray(group["block0_values"][()], np.float64)
             levels = [_texts(group[f"block0_items_level{i}"]) for i in range(count)]
@@ -194,6 +217,8 @@ def _deeplabcut(path: Path, group: Any, names: Sequence[str]) -> list[Track]:
                     strict=True,
                 )
             )
+    except BadInputError:
+        raise
     except (pickle.UnpicklingError, KeyError, ValueError, EOFError, AttributeError) as error:
         raise BadInputError(
             f"{path}: expected a table of DeepLabCut, found: {error}; save it as CSV"

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from antennate.csv_files import Row, csv_rows, number_of
+from antennate.csv_files import MISSING, Row, column, csv_rows, number_of
 from antennate.errors import BadInputError
 from antennate.experiments.tracks.config import ColumnsParams
 from antennate.experiments.tracks.track import (
@@ -21,6 +22,7 @@ from antennate.experiments.tracks.track import (
     numbered,
     refuse_labels,
     require_points,
+    require_room_for,
 )
 from antennate.files import read_limited
 from antennate.messages import nearest, shortened
@@ -68,33 +70,47 @@ def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track
 def _csv(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
     rows = csv_rows(path, read_limited(path, LARGEST), (), BadInputError, ended=True)
     _, header = next(rows)
+    if not header:
+        raise BadInputError(f"{path}: row 1: expected the names of the columns, found a blank line")
     if header[0] == "scorer":
         return _deeplabcut(path, header, rows, names)
     return _plain(path, header, rows, names, columns)
 
 
-def _numbers(path: Path, line: int, width: int, cells: list[str], places: Sequence[int]) -> Floats:
-    if len(cells) != width:
-        raise BadInputError(f"{path}: row {line}: expected {width} cells, found {len(cells)}")
-    values = np.empty(len(places))
-    for i, place in enumerate(places):
+def _numbers(
+    path: Path, line: int, header: Sequence[str], cells: list[str], places: Sequence[int]
+) -> list[float]:
+    """Numbers of a row, NaN for a cell that says of itself that it has none."""
+    if len(cells) != len(header):
+        raise BadInputError(f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}")
+    values: list[float] = []
+    for place in places:
         cell = cells[place].strip()
         try:
-            values[i] = number_of(cell)
+            value = number_of(cell)
         except ValueError as error:
             raise BadInputError(f"{path}: row {line}: expected {error}, found {cell!r}") from None
-        if math.isnan(values[i]) and cell.lower() not in ("", "nan"):
+        if math.isnan(value) and cell.lower() not in MISSING:
             raise BadInputError(
-                f"{path}: row {line}: expected a number or nothing, found {shortened(cell)}"
+                f"{path}: row {line}: expected a number or nothing in {header[place]}, found "
+                f"{shortened(cell)}"
             )
+        values.append(value)
     return values
 
 
-def _table(path: Path, rows: Iterator[Row], width: int, places: Sequence[int]) -> Floats:
-    found = [_numbers(path, line, width, cells, places) for line, cells in rows]
-    if not found:
+def _table(
+    path: Path, rows: Iterator[Row], header: Sequence[str], places: Sequence[int]
+) -> tuple[Floats, list[str]]:
+    """Numbers of some columns, a row for each frame, and the texts of the last place, if any."""
+    numbers, texts = array("d"), list[str]()
+    *places, text = places
+    for line, cells in rows:
+        numbers.extend(_numbers(path, line, header, cells, places))
+        texts.append(cells[text].strip() if text >= 0 else "")
+    if not texts:
         raise BadInputError(f"{path}: expected rows of frames, found none")
-    return np.array(found)
+    return np.array(numbers).reshape(len(texts), -1), texts
 
 
 def _deeplabcut(
@@ -119,10 +135,14 @@ def _deeplabcut(
         refuse_labels(path, "/".join(next(body, (0, [""]))[1][:begin]))
     animals = levels.get("individuals", [""] * len(first))
     columns = {
-        (animals[i], levels["bodyparts"][i], levels["coords"][i]): i for i in range(1, len(first))
+        (animals[i], levels["bodyparts"][i], levels["coords"][i]): i
+        for i in range(1, len(first))
+        if levels["bodyparts"][i] in names
     }
-    table = _table(path, body, len(first), range(len(first)))
-    return from_columns(path, table[:, 0], {key: table[:, i] for key, i in columns.items()}, names)
+    require_points(path, names, levels["bodyparts"][1:])
+    table, _ = _table(path, body, levels["bodyparts"], [0, *columns.values(), -1])
+    values = dict(zip(columns, table.T[1:], strict=True))
+    return from_columns(path, table[:, 0], values, names)
 
 
 def _without_images(path: Path, rows: Iterator[Row]) -> Iterator[Row]:
@@ -140,35 +160,56 @@ def _plain(
     columns: ColumnsParams,
 ) -> list[Track]:
     wanted = {(n, c): getattr(columns, c).format(n) for n in names for c in "xy"}
-    for (_, coordinate), column in wanted.items():
-        if column not in header:
+    scores = {n: columns.likelihood.format(n) for n in names}
+    touch = {side: columns.contact.format(side) for side in ("left", "right")}
+    extra = {columns.frame, columns.time, *scores.values(), *touch.values()}
+    places = {
+        name: place
+        for name in (*wanted.values(), *sorted(extra))
+        if (place := column(header, name)) is not None
+    }
+    for (_, coordinate), name in wanted.items():
+        if name not in places:
             raise BadInputError(
-                f"{path}: row 1: expected a column {column}{nearest(column, header)}, found "
+                f"{path}: row 1: expected a column {name}{nearest(name, header)}, found "
                 f"{shortened(', '.join(header))}; name points with --points.* and columns with "
                 f"--columns.{coordinate}"
             )
-    extra = {key: getattr(columns, key) for key in ("frame", "time")}
-    extra |= {name: columns.likelihood.format(name) for name in names}
-    touch = {side: columns.contact.format(side) for side in ("left", "right")}
-    extra |= {f"contact {side}": column for side, column in touch.items()}
-    used = [*wanted.values(), *(column for column in extra.values() if column in header)]
-    body = list(rows)
-    table = _table(path, iter(body), len(header), [header.index(column) for column in used])
-    values = dict(zip(used, table.T, strict=True))
-    split = header.index(columns.trial) if columns.trial in header else None
-    trials = np.array(["" if split is None else cells[split].strip() for _, cells in body])
+    split = column(header, columns.trial)
+    _require_named(path, header, columns, {**places, columns.trial: split}, (scores, touch))
+    table, trials = _table(path, rows, header, [*places.values(), -1 if split is None else split])
+    values = dict(zip(places, table.T, strict=True))
     tracks = []
-    for trial in dict.fromkeys(trials.tolist()):
-        at = trials == trial
-        part = {column: value[at] for column, value in values.items()}
-        frames = part.get(extra["frame"], np.arange(float(at.sum())))
-        numbers = numbered(path, frames)
+    order = {trial: number for number, trial in enumerate(dict.fromkeys(trials))}
+    number = np.array([order[trial] for trial in trials])
+    for trial, place in order.items():
+        at = number == place
+        part = {name: value[at] for name, value in values.items()}
+        numbers = numbered(path, part.get(columns.frame, np.arange(float(at.sum()))))
         points = {n: np.stack([part[wanted[n, c]] for c in "xy"], axis=1) for n in names}
-        scores = {n: part[extra[n]] for n in names if extra[n] in part}
-        rate = _rate(path, numbers, part[extra["time"]]) if extra["time"] in part else None
-        contact = {side: part[column] for side, column in touch.items() if column in part}
-        tracks.append(Track(str(path), trial, numbers, rate, points, scores, contact=contact))
+        likely = {n: part[name] for n, name in scores.items() if name in part}
+        rate = _rate(path, numbers, part[columns.time]) if columns.time in part else None
+        contact = {side: part[name] for side, name in touch.items() if name in part}
+        tracks.append(Track(str(path), trial, numbers, rate, points, likely, contact=contact))
     return tracks
+
+
+def _require_named(
+    path: Path,
+    header: list[str],
+    columns: ColumnsParams,
+    places: Mapping[str, int | None],
+    several: Sequence[Mapping[str, str]],
+) -> None:
+    """Refuse a column that was named and is not there; by their defaults columns may be absent."""
+    of = {"frame": [columns.frame], "time": [columns.time], "trial": [columns.trial]}
+    of |= {key: list(m.values()) for key, m in zip(("likelihood", "contact"), several, strict=True)}
+    for key, wanted in of.items():
+        if key in columns.model_fields_set and all(places.get(name) is None for name in wanted):
+            raise BadInputError(
+                f"{path}: row 1: expected a column {wanted[0]}{nearest(wanted[0], header)}, found "
+                f"{shortened(', '.join(header))}; is it the right --columns.{key}?"
+            )
 
 
 def _rate(path: Path, frames: Ints, t: Floats) -> float | None:
@@ -188,20 +229,25 @@ def _trex(path: Path, names: Sequence[str]) -> list[Track]:
     wanted = "an npz file of TRex with poseX0, poseY0 and so on"
     if not data.startswith(b"PK"):
         raise BadInputError(f"{path}: expected {wanted}, found {'none' if data else 'nothing'}")
+    wanted_keys = {"frame", "frame_rate", "missing", *(f"pose{c}{n}" for n in names for c in "XY")}
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            keys = list(file.files)
+            require_room_for(path, _unpacked(file.zip, wanted_keys))
             held: dict[str, Any] = {
                 key: np.asarray(file[key], np.float64).reshape(-1)
-                for key in file.files
-                if key in ("frame", "frame_rate", "time", "missing", "id") or key.startswith("pose")
+                for key in keys
+                if key in wanted_keys
             }
-            others = ", ".join(file.files) or "no array"
+    except BadInputError:
+        raise
     except _DAMAGES as error:
         found = "objects of Python" if "pickle" in str(error) else f"a damaged one: {error}"
         raise BadInputError(f"{path}: expected {wanted}, found {found}") from None
-    known = sorted(key.removeprefix("poseX") for key in held if key.startswith("poseX"))
+    known = sorted(key.removeprefix("poseX") for key in keys if key.startswith("poseX"))
     if not known:
-        raise BadInputError(f"{path}: expected {wanted}, found {shortened(others)}")
+        others = shortened(", ".join(keys) or "no array")
+        raise BadInputError(f"{path}: expected {wanted}, found {others}")
     require_points(path, names, known)
     if "frame" not in held:
         raise BadInputError(f"{path}: expected an array frame, found none")
@@ -220,3 +266,21 @@ def _trex(path: Path, names: Sequence[str]) -> list[Track]:
         points[name] = values
     rate = float(held["frame_rate"][0]) if len(held.get("frame_rate", ())) else None
     return [Track(str(path), "", frames, rate, points, {})]
+
+
+def _unpacked(packed: zipfile.ZipFile, keys: Collection[str]) -> int:
+    """What some arrays of an npz file take as numbers of 8 bytes, by their own headers [byte]."""
+    total = 0
+    for entry in packed.infolist():
+        if entry.filename.removesuffix(".npy") not in keys:
+            continue
+        with packed.open(entry) as file:
+            version = np.lib.format.read_magic(file)
+            read_header = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, _, kind = read_header(file)
+        total += math.prod(shape) * max(8, kind.itemsize)
+    return total

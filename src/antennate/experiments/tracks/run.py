@@ -20,7 +20,8 @@ from antennate.experiments.tracks.config import TracksConfig
 from antennate.experiments.tracks.measures import FREE, NAMES, SHAPES, UNKNOWN, Seen
 from antennate.experiments.tracks.readers import read
 from antennate.experiments.tracks.track import Track
-from antennate.experiments.tracks.walls import Wall, wall_of
+from antennate.experiments.tracks.walls import NEAR, Wall, require_inside, wall_of
+from antennate.messages import shortened
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers
 from antennate.types import Ints
@@ -30,10 +31,30 @@ _RATES_AGREE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
+class Unseen:
+    """An antenna that was known in hardly any frame.
+
+    Attributes:
+        file: Where.
+        animal: Whose, empty if the file has one alone.
+        side: `left` or `right`.
+        frames: Frames of the animal, `known` those in which the antenna was known.
+        empty: Points of the antenna and the body axis that never have a value.
+    """
+
+    file: str
+    animal: str
+    side: str
+    frames: int
+    known: int
+    empty: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class TrackRow:
     """One antenna of one animal, a row of trials.csv.
 
-    Shares are of the frames in contact, None without any. The counts from `duplicated` to `bridged`
+    Shares are of the frames in contact, None without any. The counts from `unsorted` to `bridged`
     are those of the animal and the same on both sides; docs/tracks.md says what they count.
     """
 
@@ -55,6 +76,7 @@ class TrackRow:
     angle_median_rad: float | None
     flex_median_rad: float | None
     correct: float | None
+    unsorted: int
     duplicated: int
     absent: int
     still: int
@@ -74,6 +96,7 @@ class TracksOutcome:
         rows: A row for each antenna.
         antennae: The antennae in the same order.
         skipped: Animals known in too few frames.
+        unseen: Antennae that were hardly seen, and animals that were left out.
     """
 
     config: TracksConfig
@@ -81,6 +104,7 @@ class TracksOutcome:
     antennae: Sequence[Seen]
     walls: dict[str, Wall]
     skipped: int
+    unseen: Sequence[Unseen]
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -95,9 +119,12 @@ class TracksOutcome:
             "source": "files" if config.files else "synthetic",
             "synthetic_shapes": None if config.files else config.synthetic.shapes,
             "classified_by": "bend" if config.points.count > 2 else "direction",
-            "wall": {name: asdict(wall) for name, wall in self.walls.items()},
+            "wall": {
+                name: {**asdict(wall), **self._at_wall(name)} for name, wall in self.walls.items()
+            },
             "animals": len(counted),
             "skipped": self.skipped,
+            "unseen": [asdict(one) for one in self.unseen],
             "trials_in_contact": len(table),
             "frames": {
                 name: sum(getattr(row, name) for row in self.rows)
@@ -110,6 +137,16 @@ class TracksOutcome:
             "curvature_rad": measures.curvatures(criteria, self.antennae),
             "correct": float(np.mean(correct)) if correct else None,
         }
+
+    def _at_wall(self, name: str) -> dict[str, float | None]:
+        """Least distance of a point to the wall of a file, and the share of frames beyond it."""
+        pairs = zip(self.rows, self.antennae, strict=True)
+        near = [one.distance[one.known] for row, one in pairs if row.file == name]
+        joined = np.concatenate([np.zeros(0), *near])
+        if self.walls[name].kind not in ("line", "circle") or not len(joined):
+            return {"nearest": None, "beyond": None}
+        beyond = (joined < -NEAR).mean()
+        return {"nearest": float(joined.min()), "beyond": float(beyond)}
 
     def frames_csv(self) -> str:
         """Every frame of every antenna: angles, curvature and shape."""
@@ -164,11 +201,15 @@ def run(
             on_row(row)
         on_step(number + 1, len(names))
     if not made.rows:
+        empty = {f"{p} has no value in {one.file}": 0 for one in made.unseen for p in one.empty}
+        why = shortened(", ".join(empty)) if empty else "are the points right"
         raise BadInputError(
             f"{', '.join(names)}: expected an animal known in {config.cleaning.least_frames} "
-            "frames, found none; are the points right, and --cleaning.likelihood not too high?"
+            f"frames, found none; {why}, and is --cleaning.likelihood not too high?"
         )
-    return TracksOutcome(made.config, made.rows, made.antennae, made.walls, made.skipped)
+    return TracksOutcome(
+        made.config, made.rows, made.antennae, made.walls, made.skipped, made.unseen
+    )
 
 
 @dataclass
@@ -180,6 +221,7 @@ class _Made:
     antennae: list[Seen] = field(default_factory=list[Seen])
     walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
     skipped: int = 0
+    unseen: list[Unseen] = field(default_factory=list["Unseen"])
     files: dict[bytes, str] = field(default_factory=dict[bytes, str])
     """The file of each animal, by a hash of its points."""
 
@@ -188,8 +230,7 @@ class _Made:
     ) -> Sequence[TrackRow]:
         """Measure the animals of one file; `truth` are the shapes of the left antenna."""
         config, before = self.config, len(self.rows)
-        found, few = _cleaned(config, tracks)
-        self.skipped += few
+        found = self._cleaned(tracks)
         self._refuse_again(name, [animal.track for animal in found])
         self.walls[name] = wall = _wall(config, found)
         trial = self.rows[-1].trial + 1 if self.rows else 0
@@ -199,6 +240,25 @@ class _Made:
                 self.rows.append(_row(config, animal, one, truth if side == "left" else None))
                 self.antennae.append(one)
         return self.rows[before:]
+
+    def _cleaned(self, tracks: Sequence[Track]) -> list[Antennae]:
+        """The antennae of the animals that are known in enough frames."""
+        config, found = self.config, list[Antennae]()
+        for track in tracks:
+            antennae = clean(config, track, frame_rate(config, track), config.y_down)
+            known = {side: antennae.known(side) for side in antennae.sides}
+            few = {s: n for s, n in known.items() if n < config.cleaning.least_frames}
+            for side, count in few.items():
+                parts = {part for name in config.points.of(side) for part in name.split("+")}
+                of = parts | {*config.points.tail.split("+"), *config.points.head.split("+")}
+                empty = tuple(name for name in antennae.empty if name in of)
+                frames = antennae.frames
+                self.unseen.append(Unseen(track.file, track.animal, side, frames, count, empty))
+            if len(few) == len(known):
+                self.skipped += 1
+            else:
+                found.append(antennae)
+        return found
 
     def _refuse_again(self, name: str, tracks: Sequence[Track]) -> None:
         """Refuse an animal that another file holds too: one recording would count as two."""
@@ -222,20 +282,7 @@ def _read(config: TracksConfig, path: Path) -> list[Track]:
     tracks = read(path, config.points.parts, config.columns)
     if not tracks:
         raise BadInputError(f"{path}: expected an animal with the named points, found none")
-    return tracks
-
-
-def _cleaned(config: TracksConfig, tracks: Sequence[Track]) -> tuple[list[Antennae], int]:
-    """The antennae of the animals that are known in enough frames, and how many are not."""
-    found, few = [], 0
-    for track in tracks:
-        antennae = clean(config, track, frame_rate(config, track), config.y_down)
-        known = [np.isfinite(points).all(axis=(1, 2)).sum() for points in antennae.sides.values()]
-        if max(known) < config.cleaning.least_frames:
-            few += 1
-        else:
-            found.append(antennae)
-    return found, few
+    return [track.in_order() for track in tracks]
 
 
 def _wall(config: TracksConfig, found: Sequence[Antennae]) -> Wall:
@@ -243,8 +290,11 @@ def _wall(config: TracksConfig, found: Sequence[Antennae]) -> Wall:
         return Wall("none")
     tips = [places[:, -1] for animal in found for places in animal.places.values()]
     lengths = [measures.length_of(points) for animal in found for points in animal.sides.values()]
-    usual = float(np.nanmedian(lengths))
-    return wall_of(config.wall, found[0].track.file, np.concatenate(tips), usual)
+    usual, file = float(np.nanmedian(lengths)), found[0].track.file
+    wall = wall_of(config.wall, file, np.concatenate(tips), usual)
+    bases = [places[:, 0] for animal in found for places in animal.places.values()]
+    require_inside(file, wall, np.concatenate(bases))
+    return wall
 
 
 def frame_rate(config: TracksConfig, track: Track) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from antennate.csv_files import LARGEST_WHOLE
 from antennate.errors import BadInputError
+from antennate.files import in_units
 from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
 
 LARGEST = 10**9
-"""No file is longer [bytes]."""
+"""No file is longer [bytes], nor what it unpacks to: a day at 30 Hz of 24 points."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Track:
         scores: Likelihood of each point, shape (n,); absent where the file has none.
         cutoff: Likelihood below which a point is usually left out in this format.
         contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file has it.
+        unsorted: Rows that stood after one of a later frame.
     """
 
     file: str
@@ -41,6 +43,38 @@ class Track:
     scores: Mapping[str, Floats]
     cutoff: float = 0.6
     contact: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+    unsorted: int = 0
+
+    def in_order(self) -> Track:
+        """The same with its frames in rising order.
+
+        Raises:
+            BadInputError: They do not rise, and some stand twice: then it may be several animals.
+        """
+        latest = np.maximum.accumulate(self.frames)
+        late = self.frames < latest
+        if not late.any():
+            return self
+        order = np.argsort(self.frames)
+        if (np.diff(self.frames[order]) == 0).any():
+            at = int(np.argmax(late))
+            raise BadInputError(
+                f"{self.file}: expected frames in rising order or each once, found "
+                f"{self.frames[at]} after {latest[at]}, and some twice; name the column of trials "
+                "with --columns.trial"
+            )
+
+        def sort(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+            return {name: values[order] for name, values in columns.items()}
+
+        return replace(
+            self,
+            frames=self.frames[order],
+            points=sort(self.points),
+            scores=sort(self.scores),
+            contact=sort(self.contact),
+            unsorted=int(late.sum()),
+        )
 
 
 def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> None:
@@ -56,6 +90,19 @@ def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> No
                 f"{path}: expected a point {name}{nearest(name, known)}, found {listed}; name the "
                 "points of the antennae and the body axis with --points.*"
             )
+
+
+def require_room_for(path: Path, size: int) -> None:
+    """Check, before anything is unpacked, how much a file unpacks to [byte].
+
+    Raises:
+        BadInputError: It is more than `LARGEST`.
+    """
+    if size > LARGEST:
+        raise BadInputError(
+            f"{path}: expected at most {in_units(LARGEST)} once unpacked, found {in_units(size)}; "
+            "split the recording, or name fewer points"
+        )
 
 
 def refuse_labels(path: Path, index: str) -> NoReturn:
@@ -89,7 +136,7 @@ def numbered(path: Path, frames: Floats) -> Ints:
     """Numbers of frames as whole numbers.
 
     Raises:
-        BadInputError: They are none, or do not rise.
+        BadInputError: They are none.
     """
     if not np.isfinite(frames).all() or (frames != np.round(frames)).any():
         raise BadInputError(f"{path}: expected whole numbers of frames, found others")
@@ -98,12 +145,4 @@ def numbered(path: Path, frames: Floats) -> Ints:
             f"{path}: expected numbers of frames up to {LARGEST_WHOLE:g}, found "
             f"{frames[abs(frames).argmax()]:g}"
         )
-    whole = frames.astype(np.int64)
-    falling = np.flatnonzero(np.diff(whole) < 0)
-    if len(falling):
-        at = int(falling[0])
-        raise BadInputError(
-            f"{path}: expected frames in rising order, found {whole[at + 1]} after {whole[at]}; "
-            "sort the rows, or name the column of trials with --columns.trial"
-        )
-    return whole
+    return frames.astype(np.int64)

@@ -14,10 +14,12 @@ from antennate.types import Floats
 
 _CANDIDATES, _JUDGES = 3000, 800
 """Walls through random tips that are tried, and tips that judge each."""
-_NEAR = 0.1
+NEAR = 0.1
 """A tip lies at a fitted wall if it is nearer, over the antenna's length."""
-_MOST_BEYOND = 0.05
+MOST_BEYOND = 0.05
 """No larger share of tips lies beyond a wall: errors of tracking."""
+_MOST_OUTSIDE = 0.5
+"""No larger share of the bases lies outside a circle around the animals."""
 _LEAST_TIPS = 50
 _SECTORS, _LEAST_SECTORS = 36, 12
 """A circle is fixed by tips in a third of the directions from its centre."""
@@ -68,7 +70,7 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
     given = params.line if params.kind == "line" else params.circle
     if params.kind in ("none", "file") or given is not None:
         return Wall(params.kind, tuple(given or ()))
-    known, near = tips[np.isfinite(tips).all(axis=1)], _NEAR * length
+    known, near = tips[np.isfinite(tips).all(axis=1)], NEAR * length
     numbers = _best(params.kind, known, near) if len(known) >= _LEAST_TIPS else None
     for _ in range(_ROUNDS):
         if numbers is not None:
@@ -85,6 +87,25 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
     return Wall(wall.kind, wall.numbers, True, rms)
 
 
+def require_inside(file: str, wall: Wall, bases: Floats) -> None:
+    """Check that bases (n, 2) of antennae lie in a circle; if not, it is in another unit.
+
+    Raises:
+        BadInputError: Most of them lie outside.
+    """
+    known = bases[np.isfinite(bases).all(axis=1)]
+    if wall.kind != "circle" or not len(known):
+        return
+    outside = float((wall.distance(known) < 0).mean())
+    if outside > _MOST_OUTSIDE:
+        low, high = known.min(axis=0), known.max(axis=0)
+        raise BadInputError(
+            f"{file}: expected the animals within the circle, found {100 * outside:.0f} % of the "
+            f"bases of their antennae outside: these lie at x {low[0]:.4g} to {high[0]:.4g} and y "
+            f"{low[1]:.4g} to {high[1]:.4g}; is --wall.circle in the unit of the file?"
+        )
+
+
 def _best(kind: str, tips: Floats, near: float) -> tuple[float, ...] | None:
     """Of walls through random tips the one at which most tips lie; None if there is none."""
     rng = np.random.default_rng(0)
@@ -98,7 +119,7 @@ def _best(kind: str, tips: Floats, near: float) -> tuple[float, ...] | None:
         beyond = (off < -near).mean()
         beyond = min(beyond, (off > near).mean()) if kind == "line" else beyond
         count = int((abs(off) < near).sum())
-        if count > found[0] and beyond <= _MOST_BEYOND:
+        if count > found[0] and beyond <= MOST_BEYOND:
             found = count, numbers
     return found[1]
 

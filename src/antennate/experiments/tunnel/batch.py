@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Union
@@ -26,6 +25,7 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial, require_room
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
+from antennate.telemetry.parts import log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.pace import Restart
 from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver
@@ -199,8 +199,7 @@ class _Rows:
 
     def log_of(self, trial: int) -> Path:
         """The log of a trial."""
-        name = re.sub(r"[^\w.-]", "_", self._name)
-        return (self._folder or Path()) / f"{name}-{trial}.mcap"
+        return (self._folder or Path()) / log_name(f"{self._name}-{trial}")
 
     def _log(self, row: int, phase: float, decisions: Decisions) -> None:
         """Begin the log of the trial that was put into a row."""

@@ -14,6 +14,7 @@ from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, successes
+from antennate.telemetry.parts import log_name
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -91,6 +92,7 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     failed=lambda result: bool(_none_valid(result)),
     logged=tunnel.run,
+    logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in tunnel.every(config)],
     trials=Trials(
         *("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult, tunnel.run_on_device)
     ),

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from statistics import median
 
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text
-from antennate.hardware.doctor.register_checks import FIX, OFF_AND_ON, register_findings
+from antennate.hardware.doctor.register_checks import FIX, register_findings
+from antennate.hardware.dynamixel.inquiry import CURE, FOUND, State
 from antennate.hardware.dynamixel.tables import TABLES, model_name
 from antennate.hardware.robot import DoctorConfig
 from antennate.robots.spec import RobotSpec
 
-_FOUND_AND_CURE = {
-    "collides": (
-        "doubled",
-        "two servos have this id: give one its own, alone on the bus, with the manufacturer's "
-        "program DYNAMIXEL Wizard 2.0",
-    ),
-    "broken": ("never whole from", "two servos of one id, or a bad cable or plug there"),
-    "mute": ("pings only from", f"status return level 0: {OFF_AND_ON}"),
+_FOUND: Mapping[State, str] = {
+    "collides": "doubled",
+    "broken": "never whole from",
+    "mute": "pings only from",
 }
 
 
@@ -100,11 +97,12 @@ def _ids(bus: BusSurvey, robot: RobotSpec) -> Finding:
 
 
 def _answers(bus: BusSurvey) -> Finding:
-    states = {
-        state: [i for i, s in bus.here.items() if s.state == state] for state in _FOUND_AND_CURE
-    }
-    parts = [f"{_FOUND_AND_CURE[state][0]} {ids_text(ids)}" for state, ids in states.items() if ids]
-    cures = [_FOUND_AND_CURE[state][1] for state, ids in states.items() if ids]
+    parts: list[str] = []
+    cures: list[str] = []
+    for state, found in _FOUND.items():
+        if ids := ids_text(i for i, seen in bus.here.items() if seen.state == state):
+            parts.append(f"{found} {ids}")
+            cures.append(f"{ids}: {FOUND[state]}; {CURE[state]}")
     grade: Grade = "bad" if parts else "ok"
     return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
-from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.inquiry import look, read_some
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
+from antennate.hardware.safety import torque
 from antennate.hardware.settings import Setting
 from antennate.robots.spec import RobotSpec
 
@@ -93,7 +93,7 @@ def apply(opener: Opener, change: Change, now: Callable[[], float]) -> None:
     register = XC430_W240[change.register]
     with master(opener, change.baud, now) as bus:
         _require_alone(bus, change)
-        if left := bringup.disable(bus, [change.servo]):
+        if left := torque.disable(bus, [change.servo]):
             raise BringUpError(f"expected torque off, servo {left[0]} did not confirm it; {_POWER}")
         if read_some(bus, [change.servo], register).get(change.servo) == change.after:
             return

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from antennate.control.readers import unread_by_all
 from antennate.control.registry import CONTROLLERS
 from antennate.hardware.robot import RobotConfig
+from antennate.hardware.safety import deadlines
 from antennate.params.base import number
 from antennate.params.dead_man import DeadManParams
 from antennate.params.endurance import DriftParams
@@ -46,7 +47,9 @@ class DriveConfig(RobotConfig):
     """Time that it stands with torque after a fault."""
     bus_return: float = number(30.0, "s", "assumed: long enough to put a plug back", ge=0, le=600)
     """Time that a lost servo bus is waited for, to take the torque off."""
-    stand: float = number(0.3, "s", "assumed: a step at half a hertz comes to rest", ge=0, le=60)
+    stand: float = number(
+        0.3, "s", "assumed: a step at half a hertz comes to rest", ge=0, le=deadlines.STAND
+    )
     """Time that the robot holds its command before the torque goes off."""
     swapped: float = number(
         1.5, "s", "assumed: half the wait for a greeting, and no servo speaks unasked", gt=0, le=60
@@ -57,6 +60,11 @@ class DriveConfig(RobotConfig):
     @classmethod
     def _known(cls, name: str) -> str:
         return CONTROLLERS.check(name)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> DriveConfig:
+        deadlines.require_order(self.limits, self.control.period)
+        return self
 
     @property
     def reader(self) -> str:

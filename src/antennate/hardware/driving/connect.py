@@ -26,6 +26,7 @@ from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
@@ -40,8 +41,6 @@ _QUIET = 0.1
 _UNASKED = 32
 """Bytes in that time from which on servos are not alone on the bus (assumed: a plug gives less)."""
 _PATIENCE = 0.05
-LATEST = 0.07
-"""Latest answer while servos have torque [s]: less than the 100 ms of their watchdogs (assumed)."""
 
 
 @contextlib.contextmanager
@@ -91,7 +90,7 @@ def prepare(
     require_sensor(board.hello, config.sensor_id)
     require_sensor(board.hello, config.sensor_id_right)
     require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
-    master = Bus(bus, Timing(config.robot.baud, latest=LATEST), clock=clock.now)
+    master = Bus(bus, Timing(config.robot.baud, latest=ANSWER), clock=clock.now)
     require_servos(master, config.robot)
     board.count_anew(clock.now())
     return Session(
@@ -175,11 +174,14 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
     try:
         bringup.require(bus, robot.models)
     except BringUpError as error:
+        check = (
+            f"check power, wiring, ids and baud {robot.baud}, or whether --esp32 and --bus are "
+            "swapped"
+        )
+        more = f"`{typed('doctor')}` tells more, slow adapters too"
         echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
-        raise BringUpError(
-            f"--bus: {error}{echo}; check power, wiring, ids and baud {robot.baud}, or whether "
-            f"--esp32 and --bus are swapped; `{typed('doctor')}` tells more, slow adapters too"
-        ) from None
+        cure = more if error.cure else f"{check}; {more}"
+        raise BringUpError(f"--bus: {error}{echo}", cure) from None
     rules = settings.settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()

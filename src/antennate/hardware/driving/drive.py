@@ -15,7 +15,6 @@ from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import State
 from antennate.types import AntennaFrame, JointCommand
 
@@ -130,8 +129,7 @@ def _off(session: Session, stand: float) -> list[int] | None:
     if not session.touched:
         return None
     try:
-        with contextlib.suppress(PortError):
-            session.stand(stand)
+        session.stand(stand)
     finally:
         left = session.release()
     return left

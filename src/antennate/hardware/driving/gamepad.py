@@ -17,7 +17,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, reason
 
 _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _FIRST = 0x01, 0x02, 0x80
@@ -54,7 +54,7 @@ class Gamepad:
         try:
             self._handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
-            raise BadInputError(f"--gamepad: cannot open {path}: {error.strerror}") from None
+            raise BadInputError(f"--gamepad: cannot open {path}: {reason(error)}") from None
         if not self._greeted():
             os.close(self._handle)
             raise BadInputError(

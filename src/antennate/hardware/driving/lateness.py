@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,6 +15,26 @@ SOME = 0.005
 late up to 0.3 % of ticks are (measured, docs/hardware.md)."""
 _FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
 """What a late computer may cause by itself."""
+
+
+MANY = 5
+"""Ticks missed within a second above which a live view is given up: half of what stops a robot, as
+servos wait 0.1 s (assumed)."""
+_SECOND = 1.0
+
+
+class Recent:
+    """Ticks that a loop missed within the last second."""
+
+    def __init__(self) -> None:
+        self._counts = deque[tuple[float, int]]()
+
+    def step(self, now: float, missed: int) -> int:
+        """Take how many it has missed by a time [s]; how many of them within the last second."""
+        self._counts.append((now, missed))
+        while self._counts[0][0] < now - _SECOND:
+            self._counts.popleft()
+        return missed - self._counts[0][1]
 
 
 def late_sentence(result: Mapping[str, Any]) -> list[str]:

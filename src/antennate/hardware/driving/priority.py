@@ -12,10 +12,12 @@ import gc
 import os
 from collections.abc import Iterator
 from enum import Enum
+from pathlib import Path
 
 LEVEL = 20
 """Real-time level of the loop: above ordinary programs, below the threads of interrupts at 50
 (sched(7)). The twin's is one higher."""
+_NICEST = 19
 _LINUX = hasattr(os, "sched_setscheduler")
 
 
@@ -55,6 +57,19 @@ def _give_back(policy: int, param: os.sched_param) -> None:
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, allowed, param)
             return
+
+
+def give_way() -> None:
+    """Let all threads of this process run only while nothing else wants a core, for good.
+
+    Linux has the class SCHED_IDLE for that; each thread has its own (sched(7)).
+    """
+    if not _LINUX:
+        os.nice(_NICEST)
+        return
+    for thread in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):  # it has ended
+            os.sched_setscheduler(int(thread.name), os.SCHED_IDLE, os.sched_param(0))
 
 
 def claim(level: int = LEVEL) -> Priority:

@@ -2,7 +2,8 @@
 
 Only what the supervisor allows is sent to the actuators. Every packet feeds their watchdogs. So
 with torque on, packets are sent only in a tick with a decision: the controller's, or to stand still
-(for the actuators, before torque goes off, or for one tick at half pace). Goals move at a limited
+(for the actuators, before torque goes off, or for one tick at half pace); the supervisor is asked
+about each. Goals move at a limited
 speed, so that neither the first command nor a broken controller makes a joint jump.
 
 Torque comes on with the joints where they are. They approach the first command slowly, all
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorError, Actuators
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.supervised_controller import SupervisedController
@@ -27,6 +29,7 @@ from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import CommandError
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import deadlines
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Supervisor
@@ -86,6 +89,7 @@ class Session:
         self.period, self.quality = period, quality
         self.control = SupervisedController(controller, actuators.robot, actuators.check, clock.now)
         self._limits = limits or SupervisorParams()
+        deadlines.require_order(self._limits, period)
         self.supervisor = Supervisor(self._limits)
         self.robot = HardwareRobot(board, actuators, clock)
         self.orders, self.tally = Orders(), Tally()
@@ -108,17 +112,22 @@ class Session:
         if self.timing is None:
             self.timing = LoopTiming(now, self.period)
         self.timing.begin(now)
-        before = sum(self.board.clock.states.values())
-        frame = self.robot.read()
-        self._refused = sum(self.board.clock.states.values()) - before - self.robot.used
-        control = self.control
-        self.quality.step(float(frame.t[0]), frame.counts[0].tolist(), control.decision.contact)
+        frame, control = self._feel(), self.control
         clear = self.outputs is not None and self.outputs.clear
         counts = self.quality.counts if clear else [math.nan, math.nan]
         self._mark("read")
         control.standing, control.rate = self.actuators.resting or self.approaching, self._rate()
         self.frame = AntennaFrame(t=control.time(frame.t), counts=np.array([counts]))
         return self.frame
+
+    def _feel(self) -> AntennaFrame:
+        """The newest reading as the board gave it, judged."""
+        before = sum(self.board.clock.states.values())
+        frame = self.robot.read()
+        self._refused = sum(self.board.clock.states.values()) - before - self.robot.used
+        contact = self.control.decision.contact
+        self.quality.step(float(frame.t[0]), frame.counts[0].tolist(), contact)
+        return frame
 
     def _rate(self) -> float:
         """How fast the controller's time goes, 1 as the clock: slower while the supply is low."""
@@ -129,10 +138,8 @@ class Session:
     def write(self, command: JointCommand) -> None:
         """Let the supervisor decide on this tick, carry that out, then read the actuators."""
         self._mark("decide")
-        now = self.clock.now()
-        self.outputs = out = self.supervisor.step(now, self._inputs(now))
         self.tally.ticks += 1
-        self._act(out, command)
+        self._decide(command)
         self._mark("bus")
         if self.timing is not None:
             self.timing.finish(self.clock.now())
@@ -140,6 +147,11 @@ class Session:
     def _mark(self, stage: str) -> None:
         if self.timing is not None:
             self.timing.mark(stage, self.clock.now())
+
+    def _decide(self, command: JointCommand) -> None:
+        now = self.clock.now()
+        self.outputs = self.supervisor.step(now, self._inputs(now))
+        self._act(self.outputs, command)
 
     def _act(self, out: Outputs, command: JointCommand) -> None:
         actuators = self.actuators
@@ -156,7 +168,7 @@ class Session:
             elif not actuators.enabled and actuators.left_on:
                 actuators.disable(again=True)
         except (PortError, CommandError, ActuatorError) as error:
-            actuators.state.bus_error = str(error)
+            actuators.state.bus_error = reason(error)
             self.lost |= not isinstance(error, CommandError)
             return
         if out.feed_watchdog or not out.torque:  # any packet would feed the watchdogs
@@ -184,13 +196,17 @@ class Session:
     def stand(self, time: float) -> None:
         """Hold the last goals for a time [s], so that the robot comes to rest before a release.
 
-        Raises:
-            PortError: The bus is gone.
+        At most `deadlines.STAND`. The supervisor is asked in every tick, as while it walks: the
+        decision is to stand still, and no key lets the robot walk any more.
         """
-        end = self.clock.now() + time
+        now, self.orders.arm, self.orders.released = self.clock.now(), False, True
+        due, end = now, now + min(time, deadlines.STAND)
         while self.actuators.enabled and not self.lost and self.clock.now() < end:
-            self.actuators.command(None)
-            self.clock.sleep_until(self.clock.now() + self.period)
+            due = max(due + self.period, self.clock.now())
+            self.clock.sleep_until(due)
+            self._feel()
+            self.control.hold()
+            self._decide(self.control.command)
 
     def _inputs(self, now: float) -> Inputs:
         clock, state, control = self.board.clock, self.actuators.state, self.control

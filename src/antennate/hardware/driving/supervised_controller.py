@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from antennate.errors import in_one_line
+from antennate.errors import in_one_line, reason
 from antennate.hardware.driving.decision import Decision, StepResult, decision_of, no_command
 from antennate.hardware.joints import CommandError
 from antennate.hardware.tracebacks import Tracebacks
@@ -67,11 +67,16 @@ class SupervisedController:
         self.command = self._step(frame)
         return self.command
 
+    def hold(self) -> None:
+        """Decide to stand still, without asking the controller."""
+        self.result = StepResult()
+        self.result.asked, self.result.decided_at = False, self.now()
+
     def _step(self, frame: AntennaFrame) -> JointCommand:
         due = self._due() or not self.sound
         result = self.result = StepResult()
         if self._sound_command is not None and (self.standing or not due):
-            result.asked, result.decided_at = False, self.now()
+            self.hold()
             return self._sound_command
         self.sound = False
         try:
@@ -88,7 +93,7 @@ class SupervisedController:
         try:
             command = self._sound_command = self._check(command)
         except CommandError as error:
-            result.bad_command = str(error)
+            result.bad_command = reason(error)
             self.refused += 1
         else:
             self.sound = self.decision.maneuver in set(Maneuver)

@@ -9,16 +9,13 @@ import numpy as np
 
 from antennate.errors import AntennateError
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.answers import MOTION_BUDGET
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import READ_ALL
 from antennate.types import Floats, JointCommand
-
-_GOAL = XC430_W240["goal_position"]
-"""At the same address in all models."""
 
 
 class DynamixelActuators:
@@ -74,12 +71,12 @@ class DynamixelActuators:
         bus, ids = self.bus, self.joints.ids
         self.turns.reset()
         bringup.require_models(bus, self.joints.models)
-        bringup.arm_watchdogs(bus, ids)
-        bringup.limit_speed(bus, self.joints.profiles)
-        bringup.allow_full_pwm(bus, ids)
-        stood = bringup.hold_here(bus, ids)
+        torque.arm_watchdogs(bus, ids)
+        torque.limit_speed(bus, self.joints.profiles)
+        torque.allow_full_pwm(bus, ids)
+        stood = torque.hold_here(bus, ids)
         self.joints.align(np.array([stood[servo] for servo in ids], float), command)
-        present = bringup.enable(bus, ids)
+        present = torque.enable(bus, ids)
         return np.array([present[servo] for servo in ids], float)
 
     def disable(self, again: bool = False) -> list[int]:
@@ -89,7 +86,7 @@ class DynamixelActuators:
             PortError: Only with `again`: the bus is gone.
         """
         if again:
-            self.left_on = bringup.disable(self.bus, self.left_on, 1, MOTION_BUDGET)
+            self.left_on = torque.disable(self.bus, self.left_on, 1, READ_ALL)
             return list(self.left_on)
         self._goals = None
         self.turns.reset()
@@ -97,7 +94,7 @@ class DynamixelActuators:
         self.left_on = []
         for group in self.joints.in_order_of_release:
             try:
-                self.left_on += bringup.disable(self.bus, group)
+                self.left_on += torque.disable(self.bus, group)
             except Exception as error:  # noqa: BLE001 the next group has its turn whatever happens
                 self.left_on += group
                 self.state.tracebacks.keep(self._now(), error)
@@ -120,7 +117,7 @@ class DynamixelActuators:
         if goals is None:
             return 0
         pairs = zip(self.joints.ids, np.rint(goals).astype(int).tolist(), strict=True)
-        self.bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in pairs})
+        torque.send_goals(self.bus, dict(pairs))
         if self._goals is not None:
             self._goals = goals
         return slow

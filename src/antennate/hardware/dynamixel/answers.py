@@ -49,8 +49,6 @@ MOTION = Span(126, 10, spare=12)
 defined, so that more may be read."""
 POSITION = Span(132, 4, spare=12)
 """The position of both models."""
-MOTION_BUDGET = 0.007
-"""Time for the positions of all servos [s]: what a tick of 10 ms leaves for reading (assumed)."""
 _GAP = 0.002
 """The 1 ms of a USB adapter and as much again [s] (assumed)."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,8 +17,26 @@ _READS = 6
 chance whole once in 2^16 (assumed)."""
 _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
 """What differs between two servos of one id: the tick and the position, in both models."""
+_SPARE = {"torque_enable": 1, "goal_position": 12, "present_position": 12}
 
 State = Literal["ok", "broken", "collides", "mute"]
+
+
+FOUND: Mapping[State, str] = {
+    "ok": "",
+    "broken": "no answer is whole: two servos with this id, or a bad cable or plug",
+    "collides": "two servos answer with this id",
+    "mute": "answers pings alone",
+}
+"""What each state means, in words."""
+_OWN_ID = "leave one of them alone on the bus and give it its own id with `antennate setup`"
+CURE: Mapping[State, str] = {
+    "ok": "",
+    "broken": f"look at its cable and plugs; if there are two, {_OWN_ID}",
+    "collides": _OWN_ID,
+    "mute": "switch its supply off and on",
+}
+"""What a person does about it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +88,17 @@ def read_some(
         if left:
             bus.settle()
     return values
+
+
+def read_once(bus: Bus, servo: int, register: Register, budget: float) -> int | None:
+    """One register of one servo by one request, within a budget [s]; None without an answer.
+
+    Torque, goal and present position have defined bytes after them, by which late answers are told
+    apart.
+    """
+    span = Span(register.address, register.size, _SPARE.get(register.name, 0))
+    reply = bus.read_all([servo], span, budget)[servo]
+    return register.decode(reply.data) if isinstance(reply, Value) else None
 
 
 def _tried(bus: Bus, ask: Callable[[], Answer], tries: int) -> tuple[bytes | None, bool]:

@@ -15,19 +15,18 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
-from antennate.hardware.dynamixel.answers import Span, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.bus import Bus
+from antennate.hardware.dynamixel.inquiry import read_once
 from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import READ_LEG
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.types import Floats
 
 _TORQUE = XC430_W240["torque_enable"]
-_GOAL = XC430_W240["goal_position"]
 _PRESENT = XC430_W240["present_position"]
-_SPARE = {_TORQUE.name: 1, _GOAL.name: 12, _PRESENT.name: 12}
-"""Defined bytes after each, by which late answers are told apart."""
 MOST_TURNS = 250.0
 """Turns from which on legs forget them: of the 256 of an XC430-W240 (datasheet) six are left, 12 s
 of walking."""
@@ -40,8 +39,6 @@ _PATIENCE = 100
 """Ticks to wait for that: 1 s (assumed)."""
 _TRIES = 20
 """Ticks that one step of a leg may take: twice as long as a late answer is waited for (assumed)."""
-_BUDGET = 0.005
-"""Time for one reading [s]: half a tick; one answer takes 1 ms at most at 1 Mbit/s (assumed)."""
 SLACK = 0.25
 """Turn of a leg without torque that is put up with [turns]: 245:1 gears hold, and half a turn could
 not be told (assumed)."""
@@ -131,7 +128,7 @@ class LegTurns:
     def _release(self, at: int, goals: Floats) -> bool:
         servo = self._joints.ids[at]
         place = self._read(servo, _PRESENT)
-        if place is None or not self._write(servo, _TORQUE, 0):
+        if place is None or not torque.loosen(self._bus, servo):
             return False
         self._place = place
         return True
@@ -157,16 +154,10 @@ class LegTurns:
         """The goal where the leg stands now, then torque."""
         servo = self._joints.ids[at]
         place = self._read(servo, _PRESENT)
-        if place is None or not self._write(servo, _GOAL, place):
+        if place is None:
             return False
         goals[at] = place
-        return self._write(servo, _TORQUE, 1)
-
-    def _write(self, servo: int, register: Register, value: int) -> bool:
-        self._bus.write_all(register.address, {servo: register.encode(value)})
-        return self._read(servo, register) == value
+        return torque.fasten(self._bus, servo, place)
 
     def _read(self, servo: int, register: Register) -> int | None:
-        span = Span(register.address, register.size, _SPARE[register.name])
-        reply = self._bus.read_all([servo], span, _BUDGET)[servo]
-        return register.decode(reply.data) if isinstance(reply, Value) else None
+        return read_once(self._bus, servo, register, READ_LEG)

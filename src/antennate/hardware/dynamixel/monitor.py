@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Iterable
 from itertools import cycle
 
+from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorState
-from antennate.hardware.dynamixel.answers import MOTION_BUDGET, POSITION, Answer, Span, Value
-from antennate.hardware.dynamixel.bringup import WATCHDOG_COUNTS
+from antennate.hardware.dynamixel.answers import POSITION, Answer, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety.deadlines import READ_ALL, READ_ONE, SUPPLY_AGE, WATCHDOG_COUNTS
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
@@ -19,13 +20,9 @@ _TORQUE = XC430_W240["torque_enable"]
 _VOLTAGE = XC430_W240["present_input_voltage"]
 _POSITION = XC430_W240["present_position"]
 _VOLT = 0.1
-_ALONE = 0.003
-"""Time for one servo asked alone [s]: the rest of the tick (assumed)."""
 _PATIENCE = 10
 """Ticks after which watchdog and supply are read even if time is short: a round of all 19 then
 takes 2 s at the slowest (assumed)."""
-SUPPLY_AGE = 4.0
-"""Age from which on the supply is not known [s]: two such rounds (assumed)."""
 
 
 class ServoMonitor(ActuatorState):
@@ -45,9 +42,16 @@ class ServoMonitor(ActuatorState):
         bus: Bus,
         ids: tuple[int, ...],
         clock: Callable[[], float],
-        budget: float = MOTION_BUDGET,
+        budget: float = READ_ALL,
     ) -> None:
-        super().__init__(missed=dict.fromkeys(ids, 0))
+        super().__init__(
+            missed=dict.fromkeys(ids, 0),
+            errors={},
+            watchdogs=(),
+            disarmed=(),
+            supply=math.nan,
+            bus_error="",
+        )
         self._bus, self._ids, self._clock, self._budget = bus, ids, clock, budget
         self._turn = cycle(range(len(ids)))
         self._waited = 0
@@ -70,7 +74,7 @@ class ServoMonitor(ActuatorState):
             self._look()
             self.bus_error = ""
         except PortError as error:
-            self.bus_error = str(error)
+            self.bus_error = reason(error)
             self.missed = {servo: count + 1 for servo, count in self.missed.items()}
         if self._clock() - self._measured > SUPPLY_AGE:
             self.supply = math.nan
@@ -82,7 +86,7 @@ class ServoMonitor(ActuatorState):
         for servo, reply in answers.items():
             self._note(servo, reply, dead)
         self._waited += 1
-        if self._clock() + _ALONE > end and self._waited < _PATIENCE:
+        if self._clock() + READ_ONE > end and self._waited < _PATIENCE:
             return
         self._waited = 0
         at = next(self._turn)
@@ -125,7 +129,7 @@ class ServoMonitor(ActuatorState):
             self.errors.pop(servo, None)
 
     def _one(self, servo: int, span: Span) -> bytes | None:
-        reply = self._bus.read_all([servo], span, _ALONE)[servo]
+        reply = self._bus.read_all([servo], span, READ_ONE)[servo]
         return reply.data if isinstance(reply, Value) else None
 
 

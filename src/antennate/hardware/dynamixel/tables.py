@@ -68,6 +68,9 @@ class Table:
 
     Attributes:
         model: Its number.
+        firmware: A version whose registers lie as in this table; ROBOTIS's driver has another table
+            for an XL330 before 52
+            (https://github.com/ROBOTIS-GIT/dynamixel_hardware_interface/pull/69).
         fast_read_firmware: First firmware that understands a fast sync read.
         modes: Operating modes that it has.
         registers: By name, in the order of their addresses.
@@ -76,6 +79,7 @@ class Table:
 
     model: int
     name: str
+    firmware: int
     fast_read_firmware: int
     modes: frozenset[int]
     registers: dict[str, Register]
@@ -194,7 +198,7 @@ def _indirect(first: int, address: int, data: int, count: int, last: int) -> lis
 def _table(
     model: int,
     name: str,
-    firmware: int,
+    firmware: tuple[int, int],
     modes: set[int],
     changes: dict[str, dict[str, object]],
     more: list[_Row],
@@ -208,19 +212,19 @@ def _table(
         for name, row in registers.items()
         if name.startswith("indirect_data")
     }
-    return Table(model, name, firmware, frozenset(modes), registers, data)
+    return Table(model, name, *firmware, frozenset(modes), registers, data)
 
 
 _FOUR_MODES = {VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE, PWM_MODE}
 _INDIRECT_56 = _indirect(1, 168, 224, 28, 661) + _indirect(29, 578, 634, 28, 661)
 _CURRENT: dict[str, object] = {"name": "present_current", "unit": "1 mA", "low": None, "high": None}
 
-XC430_W240 = _table(1080, "XC430-W240-T", 45, _FOUR_MODES, {}, _INDIRECT_56)
+XC430_W240 = _table(1080, "XC430-W240-T", (48, 45), _FOUR_MODES, {}, _INDIRECT_56)
 
 XL430_W250 = _table(
     1060,
     "XL430-W250-T",
-    45,
+    (48, 45),
     _FOUR_MODES,
     {
         "temperature_limit": {"default": 72},
@@ -237,7 +241,7 @@ XL430_W250 = _table(
 XL330_M288 = _table(
     1200,
     "XL330-M288-T",
-    46,
+    (52, 46),
     _FOUR_MODES | {CURRENT_MODE, CURRENT_POSITION_MODE},
     {
         "baud_rate": {"high": 6},

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from antennate.errors import reason
 from antennate.hardware.esp32.clock import DeviceClock, SampleState, Timed
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
@@ -95,7 +96,7 @@ class Board:
                 self.skipped += max(len(came) - KEPT, 0)
                 came = came[-KEPT:]
         except PortError as error:
-            self.trouble = str(error)
+            self.trouble = reason(error)
         return came
 
     def newest(self, now: float) -> Timed | None:

@@ -7,7 +7,7 @@ import re
 import stat
 from pathlib import Path
 
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, reason
 from antennate.files import open_regular
 
 KEY_SIZE = 32
@@ -44,7 +44,7 @@ def _private(path: Path) -> str:
             mode = os.fstat(file.fileno()).st_mode
             content = file.read(1024)
     except OSError as error:
-        raise BadInputError(f"--key: expected a file, found {path}: {error.strerror}") from None
+        raise BadInputError(f"--key: expected a file, found {path}: {reason(error)}") from None
     if mode & 0o077:
         raise BadInputError(
             f"--key: expected a file that only you can read (mode 0600), found {path} with mode "

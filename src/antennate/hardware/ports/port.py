@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import Protocol
 
-from antennate.errors import AntennateError
+from antennate.errors import AntennateError, reason
 
 
 class PortError(AntennateError):
@@ -46,4 +46,4 @@ def port_errors(what: str, *kinds: type[Exception]) -> Iterator[None]:
     try:
         yield
     except kinds as error:
-        raise PortError(f"could not {what}: {error}") from error
+        raise PortError(f"could not {what}: {reason(error)}") from error

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
+from antennate.errors import reason
 from antennate.hardware.ports.port import Line, Port, PortError
 
 RETRY = 0.2
@@ -75,7 +76,7 @@ class Reconnecting(Port):
         except PortError as error:
             self._old, self._line = line, None
             self._due = self._clock() + RETRY
-            self._why = str(error)
+            self._why = reason(error)
             raise
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ import socket
 import time
 from collections.abc import Callable
 
+from antennate.errors import reason
 from antennate.hardware.esp32.verifier import Bucket, Verifier
 from antennate.hardware.ports.port import Port, PortError
 from antennate.params.network import NetworkParams
@@ -54,7 +55,7 @@ class UdpPort(Port):
             self._socket.setblocking(False)
             self._socket.connect(address)  # the kernel drops datagrams of other senders
         except OSError as error:
-            raise PortError(f"could not open {self._where}: {error}") from error
+            raise PortError(f"could not open {self._where}: {reason(error)}") from error
 
     def write(self, data: bytes) -> None:
         """Ask the board anew; it listens to nothing else, so the bytes themselves are not sent."""
@@ -99,7 +100,7 @@ class UdpPort(Port):
         except OSError as error:
             if error.errno in _ABSENT:
                 return None
-            raise PortError(f"could not read from {self._where}: {error}") from error
+            raise PortError(f"could not read from {self._where}: {reason(error)}") from error
 
     def _send(self, data: bytes) -> None:
         try:
@@ -108,4 +109,4 @@ class UdpPort(Port):
             return
         except OSError as error:
             if error.errno not in _ABSENT:
-                raise PortError(f"could not write to {self._where}: {error}") from error
+                raise PortError(f"could not write to {self._where}: {reason(error)}") from error

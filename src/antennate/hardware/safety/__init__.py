@@ -1,1 +1,1 @@
-"""Checks of signals and servos in a drive, and the supervisor. Nothing writes to a servo."""
+"""What decides whether a robot may move: checks, supervisor, deadlines, and torque itself."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from antennate.hardware.safety.diagnosis import Finding
-from antennate.types import Contact, Maneuver
 
 
 class State(IntEnum):
@@ -90,9 +89,11 @@ CURED_BY_ARMING = frozenset({Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARM
 """Causes that do not prevent an arm event."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Inputs:
     """Inputs of the supervisor in one tick, after the controller's step.
+
+    None has a default: one that is forgotten is an error in the first tick, not health.
 
     Attributes:
         age: Age of the newest valid sample [s]; inf if there is none.
@@ -124,29 +125,29 @@ class Inputs:
 
     age: float
     valid: int
+    refused: int
     findings: tuple[Finding, Finding]
     noise: tuple[str, str]
     decided_at: float
+    maneuver: int
+    contact: tuple[int, int]
+    bad_command: str
+    failure: str
+    resets: int
+    reset_reason: str
+    board_error: str
+    missed: Mapping[int, int]
+    servo_errors: Mapping[int, str]
+    bus_error: str
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
     supply: float
-    maneuver: int = Maneuver.HOLD
-    contact: tuple[int, int] = (Contact.UNKNOWN, Contact.UNKNOWN)
-    bad_command: str = ""
-    failure: str = ""
-    refused: int = 0
-    resets: int = 0
-    reset_reason: str = ""
-    board_error: str = ""
-    missed: Mapping[int, int] = field(default_factory=dict[int, int])
-    servo_errors: Mapping[int, str] = field(default_factory=dict[int, str])
-    bus_error: str = ""
-    watchdogs: tuple[int, ...] = ()
-    disarmed: tuple[int, ...] = ()
-    drift: str = ""
-    objections: tuple[str, ...] = ()
-    unrecorded: bool = False
-    stop: bool = False
-    released: bool = False
-    arm: bool = False
+    drift: str
+    objections: tuple[str, ...]
+    unrecorded: bool
+    stop: bool
+    released: bool
+    arm: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from antennate.hardware import settings
-from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel import bringup, inquiry
 from antennate.hardware.dynamixel.answers import Answer, Refused, Span, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import (
@@ -23,14 +23,14 @@ from antennate.hardware.dynamixel.tables import (
     hardware_errors,
 )
 from antennate.hardware.ports.port import PortError
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS, WATCHDOG_UNIT
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import Joint
 from antennate.params.setup import JogParams
 from antennate.robots.servos import TICKS_A_TURN
 from antennate.robots.spec import RobotSpec
 
-WATCHDOG_COUNTS = 10
-"""Bus watchdog [20 ms]: the joint stops 0.2 s after the last packet (assumed)."""
 _LOST = 10
 """Readings in a row that may fail (assumed)."""
 
@@ -79,17 +79,22 @@ class Jog:
         """Torque on where it stands: slow, weak and watched. Call `end` even if this fails.
 
         Raises:
-            BringUpError: The servo is not fit; it gets no torque then.
-            SetupError: It is not set as the joint needs it, or refused a value; no torque either.
+            BringUpError: The servo is not fit, or did not take a value; it gets no torque then.
+            SetupError: It is not set as the joint needs it; no torque either.
         """
         servo, bus = self.joint.servo, self._bus
+        if (seen := inquiry.look(bus, servo)) and seen.state != "ok":
+            raise SetupError(
+                f"expected {self.joint} to answer, found: {inquiry.FOUND[seen.state]}; "
+                f"{inquiry.CURE[seen.state]}"
+            )
         bringup.require_models(bus, {servo: self.joint.model})
         self._require_settings()
         self._full = self._read("pwm_limit")
-        bringup.arm_watchdogs(bus, [servo], WATCHDOG_COUNTS)
-        bringup.limit_speed(bus, {servo: max(1, round(self._params.speed / VELOCITY_UNIT))})
-        self._write("goal_pwm", max(1, round(self._params.pwm * self._full)))
-        stands = bringup.enable(bus, [servo])[servo]
+        torque.arm_watchdogs(bus, [servo], JOG_WATCHDOG_COUNTS)
+        torque.limit_speed(bus, {servo: max(1, round(self._params.speed / VELOCITY_UNIT))})
+        torque.limit_pwm(bus, {servo: max(1, round(self._params.pwm * self._full))})
+        stands = torque.enable(bus, [servo])[servo]
         if math.isinf(self._limit):  # a leg counts its turns from where it stands
             self._zero += TICKS_A_TURN * round((stands - self._zero) / TICKS_A_TURN)
         angle = self._angle(stands)
@@ -120,7 +125,12 @@ class Jog:
         before = self._newest.goal
         wanted = before + steps * self._params.step
         goal = min(max(wanted, min(-self._limit, before)), max(self._limit, before))
-        self._write("goal_position", round(self._zero + self._sign * goal / POSITION_UNIT))
+        ticks = round(self._zero + self._sign * goal / POSITION_UNIT)
+        reply = torque.ask_goal(self._bus, self.joint.servo, ticks)
+        if not isinstance(reply, Value):
+            raise SetupError(
+                f"expected {self.joint} to take goal position {ticks}, found {self._reason(reply)}"
+            )
         self._newest = self._newest._replace(goal=goal)
 
     def look(self) -> JogState:
@@ -153,12 +163,12 @@ class Jog:
 
         A servo that may have torque stays slow and weak.
         """
-        left = bringup.disable(self._bus, [self.joint.servo])
+        left = torque.disable(self._bus, [self.joint.servo])
         if left or not self._full:
             return left
-        with contextlib.suppress(PortError, SetupError, bringup.BringUpError):
-            self._write("goal_pwm", self._full)
-            bringup.limit_speed(self._bus, {self.joint.servo: 0})
+        with contextlib.suppress(PortError, bringup.BringUpError):
+            torque.limit_pwm(self._bus, {self.joint.servo: self._full})
+            torque.limit_speed(self._bus, {self.joint.servo: 0})
         return left
 
     def _angle(self, ticks: float) -> float:
@@ -171,25 +181,11 @@ class Jog:
         servo = self.joint.servo
         return bringup.read_register(self._bus, [servo], self._register(name))[servo]
 
-    def _write(self, name: str, value: int) -> None:
-        """Write a register.
-
-        Raises:
-            SetupError: The servo refused it or did not answer.
-        """
-        register = self._register(name)
-        reply = self._bus.write(self.joint.servo, register.address, register.encode(value))
-        if not isinstance(reply, Value):
-            raise SetupError(
-                f"expected {self.joint} to take {name.replace('_', ' ')} {value}, found "
-                f"{self._reason(reply)}"
-            )
-
     def _reason(self, reply: Answer) -> str:
         """Why a servo did not take a value, in words."""
         if not isinstance(reply, Refused):
             return "no answer; check its cable and its supply"
         if self._read("bus_watchdog") < 0:
-            pause = 0.02 * WATCHDOG_COUNTS
+            pause = WATCHDOG_UNIT * JOG_WATCHDOG_COUNTS
             return f"that its watchdog stopped it: nothing came for {pause:g} s; start jog again"
         return f"that it refused ({reply.error.name.lower().replace('_', ' ')})"

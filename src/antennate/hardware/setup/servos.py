@@ -16,7 +16,7 @@ from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
 from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import Present, look, read_some
+from antennate.hardware.dynamixel.inquiry import FOUND, Present, look, read_some
 from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240, model_name
 from antennate.hardware.settings import Setting
 from antennate.hardware.setup.person import SetupError
@@ -26,11 +26,6 @@ FACTORY_BAUD = 57_600
 """Speed of a new servo [bit/s]: the manual's default of `baud_rate` in both models."""
 _FASTEST = 4_000_000
 """Fastest that a usual adapter does [bit/s]; the SDK takes no more either."""
-_STATES = {
-    "broken": "answers that are never whole: two servos with one id, or a bad cable",
-    "collides": "answers that collide: two servos with one id",
-    "mute": "a servo that answers pings alone; switch its supply off and on",
-}
 
 
 class Joint(NamedTuple):
@@ -116,7 +111,7 @@ class ServoSetup:
         """
         baud, servo = self.alone()
         if servo.state != "ok":
-            raise SetupError(f"expected one servo alone, found {_STATES[servo.state]}")
+            raise SetupError(f"expected one servo alone, found {FOUND[servo.state]}")
         if servo.model != joint.model:
             raise SetupError(
                 f"expected the servo of {joint}, found an {model_name(servo.model)} (id "
@@ -204,7 +199,7 @@ class ServoSetup:
         if servo is None:
             return "no answer"
         if servo.state != "ok":
-            return _STATES[servo.state]
+            return FOUND[servo.state]
         if servo.model != joint.model:
             return f"an {model_name(servo.model)}"
         there = self._read(bus, joint.servo)

@@ -11,12 +11,14 @@ import threading
 from collections.abc import Callable
 from importlib.util import find_spec
 
-from antennate.errors import BadInputError, MissingPackageError, WorkerError
+from antennate.errors import BadInputError, MissingPackageError, WorkerError, reason
 from antennate.messages import extra
 from antennate.telemetry.view.channel import END, FAILED, READY, Channel
 from antennate.telemetry.view.foxglove import require_foxglove
 
 HOST = "127.0.0.1"
+IDLE = "idle"
+"""Word that lets the process give way to all others."""
 _STARTING = 60.0
 """Longest wait for the process to serve [s]: its imports on a busy machine; assumed."""
 _ENDING = 2.0
@@ -32,6 +34,7 @@ class ViewProcess:
         foxglove: Port for Foxglove likewise, None without it.
         flag: The option that chooses the port of the page, for an error.
         on_lost: Called, in a thread of its own, with a line if it ends although nobody told it to.
+        idle: Whether it gets a core only while nothing else wants one, once it serves.
 
     Attributes:
         channel: To it.
@@ -49,6 +52,7 @@ class ViewProcess:
         foxglove: int | None = None,
         flag: str = "--view-port",
         on_lost: Callable[[str], None] = lambda line: None,
+        idle: bool = False,
     ) -> None:
         if port is not None:
             require_viser()
@@ -66,6 +70,7 @@ class ViewProcess:
             files = [theirs.fileno()] + ([] if port is None else [listener.fileno()])
             words = [*map(str, files), *(["-"] if port is None else [])]
             words.append("-" if foxglove is None else str(foxglove))
+            words += [IDLE] if idle else []
             self._process = subprocess.Popen(  # noqa: S603 our own words
                 [sys.executable, "-m", module, *words],
                 stdin=subprocess.DEVNULL,
@@ -73,7 +78,7 @@ class ViewProcess:
                 pass_fds=files,
                 process_group=0,  # Ctrl-C in the terminal is for the program alone
             )
-        self.channel, self._closing = Channel(ours), False
+        self.channel, self._closing, self._why = Channel(ours), False, ""
         try:
             self._wait()
         except BaseException:
@@ -94,11 +99,18 @@ class ViewProcess:
 
     def _watch(self, on_lost: Callable[[str], None]) -> None:
         self._process.wait()
-        if not self._closing:
+        if self._why:
+            on_lost(f"{self._name}: given up, as {self._why}")
+        elif not self._closing:
             on_lost(
                 f"{self._name}: expected its process to serve until the end, found that it "
                 f"{self._found()}; the run goes on without it"
             )
+
+    def give_up(self, why: str) -> None:
+        """End it at once, without waiting; `on_lost` is told why."""
+        self._why = why
+        self._process.kill()
 
     def lost(self) -> WorkerError:
         """What is raised when it ended although nobody told it to."""
@@ -156,7 +168,7 @@ def _listener(port: int, flag: str) -> socket.socket:
     except OSError as error:
         listener.close()
         raise BadInputError(
-            f"view: expected port {port} of {HOST} free, found: {error.strerror}; "
+            f"view: expected port {port} of {HOST} free, found: {reason(error)}; "
             f"choose another with {flag}, 0 takes any"
         ) from None
     return listener

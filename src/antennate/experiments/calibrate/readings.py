@@ -1,0 +1,195 @@
+"""Readings of a recording: ohms and volts as the counts that a robot's board would read of them.
+
+A robot reads counts. A resistance becomes a voltage by the divider and a voltage becomes counts by
+the converter, both of `antenna.sensor`: what the simulated antenna has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.antenna.curves import Samples
+from antennate.antenna.sensor import FULL_SCALE, divider, transfer_curve
+from antennate.errors import CalibrationError
+from antennate.params.base import meaning
+from antennate.robots.sensor import SensorParams
+from antennate.types import Bools, Floats, Ints
+
+READING_UNITS = {"counts": 1.0, "ohm": 1.0, "kohm": 1e3, "V": 1.0, "mV": 1e-3}
+_SAME = {"ω": "ohm", "ohms": "ohm", "kω": "kohm", "kohms": "kohm", "volt": "V", "volts": "V"}
+"""Other names of units, in small letters; the sign for ohm is a small omega in these."""
+_READ = {"ohm": ("divider_resistance", "supply", "reference"), "V": ("reference",)}
+_RAIL_SHARE = 0.2
+"""Share of voltages beyond what the converter tells apart that is too much."""
+_STEP = 3.3 / FULL_SCALE
+"""Volts of a count in sketches that compute them without the converter's curve [V]."""
+_ON_STEPS = 0.02
+"""Steps by which all volts may be off whole steps and still be such counts."""
+_WINDOW = 5
+"""Readings of whose median an outlier is off."""
+_FAR, _FAR_OVER_NOISE = 0.3, 8.0
+"""How far it is off at least: in spans of the readings, and in standard deviations of others."""
+_FEWEST_COUNTS = 200.0
+"""Numbers that are not whole and all below this are no counts."""
+_BINS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion:
+    """How readings became counts.
+
+    Attributes:
+        unit: Unit of the readings.
+        how: What they went through.
+        values: Each parameter used, its value, unit and source.
+    """
+
+    unit: str
+    how: str
+    values: Mapping[str, tuple[float, str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A reading far from the others around it [counts], in this row of the file."""
+
+    row: int
+    counts: float
+    usual: float
+
+
+def unit_named(name: str) -> str:
+    """A unit of READING_UNITS by any of its names, else the name itself."""
+    small = name.lower()
+    known = {unit.lower(): unit for unit in READING_UNITS} | {"mv": "mV", "v": "V"}
+    return _SAME.get(small) or known.get(small, name)
+
+
+def parameters_of(unit: str) -> tuple[str, ...]:
+    """Parameters of `antenna.sensor` that readings in this unit need."""
+    return _READ["ohm"] if unit in ("ohm", "kohm") else _READ["V"] if unit in ("V", "mV") else ()
+
+
+def impossible(unit: str, value: float) -> str:
+    """Why a reading in this unit cannot be one, empty if it can."""
+    if unit == "counts":
+        return "" if 0 <= value <= FULL_SCALE else f"0 to {FULL_SCALE} counts"
+    if unit in ("ohm", "kohm"):
+        return "" if value > 0 else f"a resistance above 0 {unit}"
+    return "" if value >= 0 else f"0 {unit} or more, as the board's converter reads no less"
+
+
+def to_counts(
+    path: Path, unit: str, values: Floats, rows: Ints, sensor: SensorParams
+) -> tuple[Floats, Conversion | None]:
+    """Readings in a unit as counts, and how they became counts; None if they are.
+
+    Raises:
+        CalibrationError: Most lie where the converter does not tell them apart.
+    """
+    if unit == "counts":
+        _require_counts(path, values, rows)
+        return values, None
+    si = READING_UNITS[unit] * values
+    corners, readings = transfer_curve(sensor)
+    used = {
+        name: (
+            float(getattr(sensor, name)),
+            str(_about(name, "unit")),
+            str(_about(name, "source"))
+            if getattr(sensor, name) == SensorParams.model_fields[name].default
+            else "given",
+        )
+        for name in parameters_of(unit)
+    }
+    volts = divider(sensor, si) if unit in ("ohm", "kohm") else si
+    steps = volts / _STEP
+    if unit == "V" and len(np.unique(volts)) > _WINDOW:
+        whole = np.abs(steps - np.round(steps)) < _ON_STEPS
+        if whole.all() and steps.max() <= FULL_SCALE + 0.5:
+            how = f"steps of 3.3 V / {FULL_SCALE}: they were counts and are taken as such"
+            return np.round(steps), Conversion(unit, how, {})
+    apart = (volts > corners[0]) & (volts < corners[-1])
+    if (~apart).mean() > _RAIL_SHARE:
+        low, high = values.min(), values.max()
+        cure = "does --antenna.sensor.divider-resistance fit?"
+        cure = cure if unit.endswith("ohm") else "does it need another gain?"
+        raise CalibrationError(
+            f"{path}: expected voltages of {corners[0]:.3g} to {corners[-1]:.3g} V at the "
+            f"converter, which it tells apart, found {volts.min():.3g} to {volts.max():.3g} V from "
+            f"{low:.4g} to {high:.4g} {unit}; is {unit} the right --columns.reading-unit, and "
+            f"{cure}"
+        )
+    how = "the divider and the board's converter" if len(used) > 1 else "the board's converter"
+    counts = np.clip(np.interp(volts, corners, readings), 0.0, FULL_SCALE)
+    return counts, Conversion(unit, how, used)
+
+
+def _about(name: str, what: str) -> object:
+    extra = SensorParams.model_fields[name].json_schema_extra
+    return extra[what] if isinstance(extra, dict) else ""
+
+
+def told(conversion: Mapping[str, Any]) -> str:
+    """How readings became counts, in a sentence; the conversion as result.json has it."""
+    if not conversion["values"]:
+        return f"Readings in {conversion['unit']} come in {conversion['how']}."
+    values = ", ".join(
+        f"{meaning(SensorParams, name, unit=False)} {value:g} {unit} ({source})"
+        for name, (value, unit, source) in conversion["values"].items()
+    )
+    return f"Readings in {conversion['unit']} became counts by {conversion['how']}: {values}."
+
+
+def _require_counts(path: Path, values: Floats, rows: Ints) -> None:
+    """Refuse numbers that are no counts: they are small and not whole."""
+    low, high = np.percentile(values, [1, 99])
+    if high < _FEWEST_COUNTS and (values != np.round(values)).mean() > 0.5:
+        raise CalibrationError(
+            f"{path}: row {rows[0]}: expected counts, whole numbers of 0 to {FULL_SCALE}, found "
+            f"{low:.4g} to {high:.4g}; are these volts or kilohms? --columns.reading-unit is one "
+            f"of {', '.join(READING_UNITS)}"
+        )
+
+
+def outliers(samples: Samples) -> Bools:
+    """Readings far from those around them in time and at the same bend, shape (n,).
+
+    A serial line that loses a digit makes 41 of 416. Such a reading is off the median of five in a
+    row of its trial, and off the median of those at its bend, by 0.3 spans and by eight standard
+    deviations of what the others are off.
+    """
+    counts = samples.counts
+    low, high = np.percentile(counts, [1, 99])
+    off = counts - _running_median(counts, samples.trial)
+    noise = 1.4826 * float(np.median(abs(off[off != 0]))) if (off != 0).any() else 0.0
+    far = abs(off) > max(_FAR * (high - low), _FAR_OVER_NOISE * noise)
+    return far & (abs(counts - usual(samples)) > _FAR * (high - low))
+
+
+def _running_median(counts: Floats, trial: Ints) -> Floats:
+    found = counts.copy()
+    for number in np.unique(trial):
+        rows = np.flatnonzero(trial == number)
+        if len(rows) < _WINDOW:
+            continue
+        windows = np.lib.stride_tricks.sliding_window_view(counts[rows], _WINDOW)
+        half = _WINDOW // 2
+        middle = np.median(windows, axis=1)
+        found[rows] = np.concatenate([np.repeat(middle[0], half), middle, [middle[-1]] * half])
+    return found
+
+
+def usual(samples: Samples) -> Floats:
+    """Median of the readings at nearly the same bend, for each reading, shape (n,)."""
+    edges = np.quantile(samples.level, np.linspace(0, 1, _BINS + 1)[1:-1])
+    place = np.digitize(samples.level, edges)
+    found = np.zeros_like(samples.counts)
+    for part in np.unique(place):
+        found[place == part] = np.median(samples.counts[place == part])
+    return found

@@ -1,0 +1,110 @@
+"""A live view beside a loop in real time: it gives way, and it is given up."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from view_rig import ANTENNATE
+
+from antennate.cli import view_server
+from antennate.hardware.driving.lateness import MANY, Recent
+from antennate.telemetry.view.channel import TICK
+from antennate.telemetry.view.process import ViewProcess
+
+LINUX = hasattr(os, "sched_setscheduler")
+
+
+def test_ticks_missed_within_a_second_are_counted_from_a_second_ago() -> None:
+    recent = Recent()
+    assert [recent.step(0.1 * i, 0) for i in range(10)] == [0] * 10
+    assert recent.step(1.0, 4) == 4
+    assert recent.step(1.9, 6) == 6
+    assert recent.step(2.5, 7) == 1, "the four and the two of 1.0 and 1.9 s were before 1.5 s"
+
+
+@pytest.fixture
+def page() -> Iterator[tuple[ViewProcess, list[str]]]:
+    """A page that gives way, and what is said of its end."""
+    pytest.importorskip("viser")
+    said: list[str] = []
+    with ViewProcess(0, view_server.__name__, on_lost=said.append, idle=True) as process:
+        yield process, said
+
+
+def test_a_view_is_given_up_at_once_and_one_line_says_why(
+    page: tuple[ViewProcess, list[str]],
+) -> None:
+    process, said = page
+    before = time.monotonic()
+    process.give_up("the loop missed 9 ticks within a second; the drive goes on")
+    assert time.monotonic() - before < 1.0, "a loop cannot wait for the end of another process"
+    end = time.monotonic() + 20.0
+    while not said and time.monotonic() < end:
+        process.channel.send(TICK, b"one more")
+        time.sleep(0.02)
+    assert said == ["view: given up, as the loop missed 9 ticks within a second; the drive goes on"]
+
+
+@pytest.mark.skipif(not LINUX, reason="only Linux has SCHED_IDLE")
+def test_every_thread_of_a_view_beside_a_drive_gives_way(
+    page: tuple[ViewProcess, list[str]],
+) -> None:
+    del page
+    (child,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    threads = [int(thread.name) for thread in Path(f"/proc/{child}/task").iterdir()]
+    assert len(threads) > 1
+    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_IDLE}
+
+
+@contextmanager
+def busy(count: int) -> Iterator[None]:
+    """So many programs that do nothing but compute."""
+    words = [sys.executable, "-c", "while True: pass"]
+    others = [subprocess.Popen(words) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not LINUX, reason="real-time priority is of Linux")
+def test_a_drive_with_a_view_beside_two_busy_programs_ends_in_no_fault(tmp_path: Path) -> None:
+    """The view may be given up; where the same drive without one fails, it says nothing."""
+    pytest.importorskip("viser")
+
+    def drive(name: str, *more: str) -> tuple[int, dict, str]:
+        with subprocess.Popen([*ANTENNATE, "twin"], stdout=-1, stderr=-3, cwd=tmp_path) as twin:
+            assert twin.stdout is not None
+            ports = json.loads(twin.stdout.readline())
+            words = ["drive", "--esp32", ports["esp32"], "--bus", ports["bus"], "--arm"]
+            words += ["--dry-run", "1", "--no-touch-check", "--duration", "10", "--out", name]
+            with busy(2):
+                done = subprocess.run(
+                    [*ANTENNATE, *words, *more], cwd=tmp_path, capture_output=True, text=True
+                )
+            twin.terminate()
+        return (
+            done.returncode,
+            json.loads((tmp_path / name / "result.json").read_text()),
+            done.stderr,
+        )
+
+    code, result, said = drive("seen", "--view", "--view-port", "0")
+    if code != 0 and drive("unseen")[0] != 0:
+        pytest.skip("this machine is too busy for a drive without a view, too")
+    assert code == 0, said
+    assert result["worst_state"] != "FAULT"
+    assert said.count("view: given up") <= 1
+    missed = result["walking"]["missed_share"]
+    sys.stdout.write(f"missed {missed:.1%}, given up: {'given up' in said}, at {MANY}\n")
