@@ -65,14 +65,9 @@ def test_S14_a_hum_is_named_with_size_and_frequency(
 
     Mains at half the rate give readings that alternate by amplitude times the sine of the phase.
     """
-    channel = told(
-        np.concatenate(
-            [
-                np.rint(np.full(50, FREE)) + np.arange(50) % 4,
-                hum(amplitude, frequency, 40, phase=np.pi / 2 if frequency % 50 == 0 else 1.0),
-            ]
-        )
-    )
+    before = hum(0.0, frequency, 50)
+    phase = np.pi / 2 if frequency % 50 == 0 else 1.0
+    channel = told(np.concatenate([before, hum(amplitude, frequency, 40, phase)]))
     assert channel.reading.finding is Finding.NOISE
     assert np.isnan(channel.reading.counts)
     assert words in channel.noise_text
