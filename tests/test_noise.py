@@ -75,6 +75,17 @@ def test_S14_a_hum_is_named_with_size_and_frequency(
     assert size == pytest.approx(amplitude, rel=0.1)
 
 
+def test_S14_skipped_readings_do_not_change_the_frequency() -> None:
+    """A busy host takes the newest reading alone: one of ten or so is never seen."""
+    readings = hum(400.0, 50.0, 300, np.pi / 2)
+    channel = ChannelDiagnosis(BAND)
+    for n in np.flatnonzero(np.arange(300) % 13 != 0).tolist():
+        channel.step(n * PERIOD, float(readings[n]))
+        if n > 30 and channel.reading.finding is Finding.NOISE:
+            assert channel.noise_text.endswith("at 50 Hz or an alias of it")
+    assert channel.counted[Finding.NOISE] > 240
+
+
 def test_S14_noise_of_no_frequency_is_no_open_wire() -> None:
     """Normal noise of 250 counts; a floating pin wanders over all 4096."""
     noise = np.random.default_rng(2).normal(0.0, 250.0, 300)
