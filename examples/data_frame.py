@@ -11,4 +11,4 @@ if __name__ == "__main__":
 
     series = antennate.simulate("closed", trial=0, time_limit=5.0)
     ticks = series.to_dataframe()
-    print(ticks.groupby("maneuver")[["level_0", "level_1"]].mean())
+    print(ticks.groupby("maneuver")[["level_left", "level_right"]].mean())

@@ -61,7 +61,10 @@ def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             f'[search]\n{GOOD}\n[evaluate.wall]\nminimize = ["force_mean_n"]\n',
             "expected one profile, found stiff, descending",
         ),
-        (f"[search]\n{GOOD}\n{WALL.replace('.wall]', '.wal]')}", "expected an experiment ("),
+        (
+            f"[search]\n{GOOD}\n{WALL.replace('.wall]', '.wal]')}",
+            "expected an experiment (did you mean",
+        ),
         (
             f"[search]\n{GOOD}\n[evaluate.'own.py:f']\nminimize = ['a']\n",
             "expected a label of letters",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -45,9 +46,18 @@ def test_a_measure_of_successes_leaves_jams_out() -> None:
     assert found["wall.flex_max_deg@success"]["value"] == pytest.approx(19.5)
     assert found["wall.flex_max_deg@success"]["trials"] == 2
     assert found["wall.flex_max_deg"]["value"] == pytest.approx(54.0)
-    half = 12.706 * 1.5  # printed quantile of Student's t, times the standard error of 18 and 21
-    ends = found["wall.flex_max_deg@success"]["value95"]
-    assert ends == pytest.approx((19.5 - half, 19.5 + half), abs=0.01)
+    assert found["wall.flex_max_deg@success"]["value95"] is None  # of two trials
+
+
+def test_the_interval_of_an_objective_is_that_of_student_within_its_bounds() -> None:
+    rows = walls(*["success"] * 5, flex=(1.0, 2.0, 3.0, 4.0, 20.0))
+    name, half = "wall.flex_max_deg", 2.776 * math.sqrt(62.5 / 5)  # the printed quantile
+    found = worth(rows, OBJECTIVES, 0.5)
+    assert found is not None
+    assert found[name]["value95"] == pytest.approx((6.0 - half, 6.0 + half), abs=0.01)
+    found = worth(rows, OBJECTIVES, 0.5, {name: (0.0, 10.0)})
+    assert found is not None
+    assert found[name]["value95"] == (0.0, 10.0)
 
 
 def test_without_success_there_is_no_value_and_the_design_stands() -> None:

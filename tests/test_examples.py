@@ -38,7 +38,7 @@ def test_trials_become_a_data_frame(tmp_path: Path) -> None:
     out = ran("data_frame", tmp_path)
     assert re.search(r"open +\d+\.\d+ +\d\.\d+", out)
     assert re.search(r"closed +\d+\.\d+ +\d\.\d+", out)
-    assert "level_0" in out
+    assert "level_left" in out
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)

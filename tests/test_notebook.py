@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import functools
+import html
 import json
 import math
 import pickle
+import re
+import struct
 import sys
 import tomllib
 from dataclasses import FrozenInstanceError
@@ -42,6 +46,29 @@ def test_rows_are_typed_and_frozen(tunnel: antennate.Result) -> None:
     assert tunnel.summary["controllers"]["open"]["trials"] == 2
     assert "open" in tunnel.sentence
     assert set(tunnel.figures()) == {"trajectories", "summary"}
+
+
+def test_a_result_is_one_line_and_shows_sentence_table_and_figure(
+    tunnel: antennate.Result,
+) -> None:
+    assert "\n" not in repr(tunnel)
+    assert len(repr(tunnel)) < 400
+    assert tunnel.sentence in repr(tunnel)
+    page = re.sub(' style="[^"]*"', "", tunnel._repr_html_())
+    assert html.escape(tunnel.sentence) in page
+    assert "<th>open</th><th>closed</th>" in page
+    assert "<td>trials</td><td>2</td><td>2</td>" in page
+    png = base64.b64decode(page.split("data:image/png;base64,")[1].split('"')[0])
+    width, height = struct.unpack(">II", png[16:24])
+    drawn = tunnel.figures()["trajectories"]  # the picture, by the order of the captions
+    assert width / height == pytest.approx(drawn.get_figwidth() / drawn.get_figheight(), rel=0.01)
+    assert not re.search("<(script|link|style)", page)
+
+
+def test_a_result_without_trials_shows_itself_too() -> None:
+    result = antennate.run("springs")
+    assert repr(result) == f"<Result of springs: {result.sentence}>"
+    assert "<img" in result._repr_html_()
 
 
 def test_a_data_frame_has_the_columns_of_the_table(tunnel: antennate.Result) -> None:
@@ -139,7 +166,7 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
-        ({"experiment": "tunel"}, "expected an experiment .*tunnel.* found tunel"),
+        ({"experiment": "tunel"}, r"expected an experiment \(did you mean tunnel\?\), one .*tunel"),
         ({"experiment": "tunnel", "trials": 0}, "trials: expected .*at least 1"),
         ({"experiment": "tunnel", "trails": 2}, "trails: .*trials"),
         (

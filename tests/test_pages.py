@@ -44,6 +44,11 @@ CONTRAST = """((selector) => {
     const [a, b] = [light(getComputedStyle(e).color), light(under)];
     return Math.max(a, b) / Math.min(a, b); })); })"""
 """The least contrast between the text of some elements and what is behind it."""
+ENLARGED, FILLED = 1.2, 0.85
+"""On a screen a figure is so much larger than drawn, and the page takes so much of the width."""
+SPREAD = """(boxes => [Math.min(...boxes.map(b => b.left)), Math.max(...boxes.map(b => b.right))])(
+  [...document.querySelectorAll('img, table, p')].map(e => e.getBoundingClientRect()))"""
+"""From the left end of figures, tables and texts to the right end."""
 FIGURES = """[...document.images].map(e => [e.clientWidth / parseFloat(e.getAttribute('width')),
   getComputedStyle(e).backgroundColor, getComputedStyle(e).filter])"""
 """Of each figure: its width as part of the drawn one, what is behind it, what changes it."""
@@ -85,10 +90,13 @@ def test_a_report_is_read_on_a_screen_and_on_a_phone(tmp_path: Path) -> None:
     with browser(tmp_path / "browser") as tab:
         for width, scheme in LOOKS:
             with looked_at(tab, address, width, scheme):
+                first, last = tab.run(SPREAD)
+                assert (last - first) / width >= FILLED, (width, scheme)
                 text = tab.run(f"{CONTRAST}('p, td, th, h1, h2, figcaption, dt, code')")
                 assert text >= READABLE, (width, scheme)
                 figures = tab.run(FIGURES)
                 assert len(figures) == len([*(tmp_path / "run" / "figures").glob("*.svg")]) > 1
+                assert width < 1000 or max(share for share, *_ in figures) > ENLARGED
                 for share, behind, change in figures:
                     assert share >= LEAST
                     assert change == "none"

@@ -133,7 +133,7 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
             [seen.command.yaw[0], seen.command.leg.ravel(), seen.command.antenna[0]]
         )
         assert [float(row[name]) for name in RobotSpec().joint_names] == angles.tolist()
-        counts = np.array([float(row["counts_l"]), float(row["counts_r"])])
+        counts = np.array([float(row["counts_left"]), float(row["counts_right"])])
         np.testing.assert_array_equal(counts, seen.frame.counts[0])
         assert int(row["maneuver"]) == int(row["replayed"]) == seen.maneuver
     assert rows[145]["state"] == "HOLD"

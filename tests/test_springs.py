@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from antennate.antenna import springs
@@ -46,6 +47,19 @@ def test_beam_theory_is_six_percent_stiffer() -> None:
     assert beam / springs.spring_stiffness(E, d, coil, coils) == pytest.approx(
         10.8 / 10.186, rel=1e-4
     )
+
+
+def test_many_springs_at_once_are_those_one_by_one() -> None:
+    """The taper of the paper, in an array, a list, and a grid of wires and coils."""
+    coils = [3, 6, 6, 9, 9, 9]
+    one = [springs.spring_stiffness(E, 0.5e-3, 3.77e-3, n) for n in coils]
+    assert springs.spring_stiffness(E, 0.5e-3, 3.77e-3, np.array(coils)) == pytest.approx(one)
+    assert springs.spring_stiffness(E, 0.5e-3, 3.77e-3, coils) == pytest.approx(one)
+    wires = np.array([[0.4e-3], [0.8e-3]])
+    grid = np.asarray(springs.spring_stiffness(E, wires, 4e-3, coils))
+    assert grid.shape == (2, 6)
+    assert grid[1] / grid[0] == pytest.approx([16.0] * 6)  # the fourth power of the wire
+    assert type(springs.spring_stiffness(E, 0.5e-3, 3.77e-3, 3)) is float
 
 
 def test_a_straight_wire_yields_at_its_surface() -> None:

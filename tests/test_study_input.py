@@ -102,7 +102,7 @@ def test_a_bad_range_is_named_as_it_stands_in_the_file(
         ('[vary]\ncontrollers = [["clsoed"]]\n', "vary: tunnel: controllers: expected one of open"),
         (
             'experiment = "tunel"\n[vary]\nx = [1]\n',
-            "experiment: expected an experiment (calibrate",
+            "experiment: expected an experiment (did you mean tunnel?), one of calibrate",
         ),
         (f"experiment = 3\n{GOOD}", "bad.toml: experiment: expected text, found 3"),
         (f'plan = "gird"\n{GOOD}', "bad.toml: plan: expected one of grid, list, random"),

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import json
 import pickle
+import re
 import tracemalloc
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import antennate
 from antennate import AntennateError, BadInputError, TimeSeries
 
 ARRAYS = [f.name for f in dataclasses.fields(TimeSeries) if f.name != "meta"]
+SIDES = ("left", "right")
 ODD = [np.nan, np.inf, -np.inf, -0.0, 5e-324, 0.1, 1 / 3, 1.7976931348623157e308]
 """Floats that a careless writer changes."""
 
@@ -167,5 +173,60 @@ def test_a_data_frame_holds_every_column() -> None:
     series = made()
     frame = series.to_dataframe()
     assert len(frame) == 8
-    assert list(frame)[:3] == ["t", "counts_0", "counts_1"]
-    assert (frame["leg_5_1"] == series.leg[:, 5, 1]).all()
+    assert (frame["leg_5_right"] == series.leg[:, 5, 1]).all()
+    assert (frame["head_y"] == series.head[:, 1]).all()
+
+
+def test_columns_are_named_by_side_and_axis_and_joints_are_numbered() -> None:
+    pairs = [f"{name}_{side}" for name in ("counts", "level", "contact") for side in SIDES]
+    legs = [f"leg_{link}_{side}" for link in range(4) for side in SIDES]
+    yaw, pitch = [f"yaw_{k}" for k in range(3)], [f"pitch_{k}" for k in range(3)]
+    ends = [f"antenna_{side}" for side in SIDES]
+    assert list(made(links=4, pitch=3).columns()) == [
+        *("t", *pairs, "maneuver", *yaw, *legs, *ends, *pitch, "head_x", "head_y")
+    ]
+
+
+@pytest.mark.parametrize(("links", "pitch"), [(6, 0), (4, 3)])
+def test_a_file_with_numbered_columns_is_read_as_before(
+    tmp_path: Path, links: int, pitch: int
+) -> None:
+    """The first format of CSV said `level_0`, `head_1`: here it is written by hand."""
+    series, path = made(links=links, pitch=pitch), tmp_path / "old.csv"
+    arrays = {name: getattr(series, name).reshape(8, -1) for name in ARRAYS}
+    shapes = {name: getattr(series, name).shape[1:] for name in ARRAYS}
+    header = ["_".join([n, *map(str, i)]) for n in ARRAYS for i in np.ndindex(shapes[n])]
+    rows = zip(*(column.tolist() for n in ARRAYS for column in arrays[n].T), strict=True)
+    head = json.dumps({"format": "antennate time series 1", "meta": dict(series.meta)})
+    path.write_text("\n".join([f"# {head}", ",".join(header), *map(listed, rows)]) + "\n")
+    found = TimeSeries.load(path)
+    for name in ARRAYS:
+        assert getattr(found, name).tobytes() == getattr(series, name).tobytes()
+    mixed = path.read_text().replace("level_1", "level_right")
+    path.write_text(mixed)
+    assert "columns in another order" in refusal(path)
+
+
+def listed(row: Iterable[float]) -> str:
+    return ",".join(map(repr, row))
+
+
+def test_a_series_is_one_line_and_shows_itself_in_a_notebook() -> None:
+    series = made(60)
+    assert len(repr(series)) < 200
+    assert "\n" not in repr(series)
+    assert "60 ticks, 0.59 s: controller closed, seed 3" in repr(series)
+    page = series._repr_html_()
+    forward = 100 * float((series.maneuver == antennate.Maneuver.FORWARD).mean())
+    assert f"<td>FORWARD</td><td>{forward:.1f}</td>" in re.sub(' style="[^"]*"', "", page)
+    png = base64.b64decode(page.split("data:image/png;base64,")[1].split('"')[0])
+    assert png.startswith(b"\x89PNG")
+    assert len(page) < 200_000
+
+
+def test_a_series_without_ticks_or_contact_shows_itself_too() -> None:
+    empty = made(0)
+    assert "0 ticks" in repr(empty)
+    assert "<img" not in empty._repr_html_()
+    blind = dataclasses.replace(made(), level=np.full((8, 2), np.nan))
+    assert "<td>all</td>" in re.sub(' style="[^"]*"', "", blind._repr_html_())

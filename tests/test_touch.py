@@ -187,8 +187,7 @@ def test_the_study_counts_what_it_ran(outcome):
         assert measured["traverses"] == len(mine)
         for key in ("contacts", "missed", "alarms", "false"):
             assert measured[key] == sum(getattr(row, key) for row in mine)
-        low, high = measured["f1_95"]
-        assert 0.0 <= low <= measured["f1"] <= high <= 1.0
+        assert measured["f1_95"] is None  # two trials decide nothing
         assert (
             measured["onset"]["n"] + measured["carried"] + measured["missed"]
             == (measured["contacts"])

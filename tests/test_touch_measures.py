@@ -73,14 +73,14 @@ def test_measures_by_hand():
 def test_the_area_agrees_with_mann_and_whitney_and_chance_is_a_half():
     rng = np.random.default_rng(5)
     group = []
-    for trial in range(4):
+    for trial in range(5):
         truth = rng.random(2000) < 0.3
         level = truth * 1.0 + rng.standard_normal(2000)
         none = match(truth, ~truth, 0)
         group.append(
             Comparison("flat", 0.1, "stiff", trial, 1.0, truth, ~truth, level, level, none)
         )
-    found = Pool(group, 4, 100.0).measure(group)
+    found = Pool(group, 5, 100.0).measure(group)
     truth, level = (np.concatenate([getattr(v, k) for v in group]) for k in ("truth", "level"))
     exact = stats.mannwhitneyu(level[truth], level[~truth]).statistic
     exact /= truth.sum() * (~truth).sum()
@@ -113,12 +113,13 @@ def test_intervals_over_trials_of_equal_length_are_those_of_student_for_the_mean
         ]
         return Pool(group, len(group), 100.0).measure(group)
 
-    found = recall([5, 6, 7])
-    half = 4.303 * 0.1 / math.sqrt(3)  # printed quantile, two degrees of freedom
+    found = recall([4, 5, 6, 7, 8])
+    half = 2.776 * math.sqrt(0.025 / 5)  # printed quantile, four degrees of freedom
     assert found["recall_95"] == pytest.approx((0.6 - half, 0.6 + half), abs=1e-4)
     assert found["precision_95"] is None  # without error in every trial
-    assert recall([9, 10])["recall_95"][1] == 1.0
-    alike = recall([5, 5, 5])
+    assert recall([4, 5, 7, 8])["recall_95"] is None  # so few decide nothing
+    assert recall([8, 9, 10, 10, 10])["recall_95"][1] == 1.0
+    alike = recall([5] * 5)
     assert (alike["recall"], alike["recall_95"], alike["f1_95"]) == (0.5, None, None)
 
 
@@ -161,12 +162,12 @@ def test_a_difference_of_two_profiles_is_paired_by_trial():
             for trial, hit in enumerate(hits)
         ]
 
-    first, second = group(4, 6, 9), group(3, 5, 8)
-    pool = Pool([*first, *second], 3, 100.0)
+    first, second = group(4, 6, 9, 5, 7), group(3, 5, 8, 4, 6)
+    pool = Pool([*first, *second], 5, 100.0)
     paired, (low, high) = pool.f1_difference(first, second).values(), pool.measure(first)["f1_95"]
     value, ends = paired
     # F1 = 2 hits / (hits + 10)
-    assert value == pytest.approx(38 / 49 - 32 / 46)
+    assert value == pytest.approx(62 / 81 - 52 / 76)
     assert ends[0] < value < ends[1]
     assert ends[1] - ends[0] < (high - low) / 4
     assert pool.f1_difference(first, first) == {"f1_difference": 0.0, "f1_difference_95": None}

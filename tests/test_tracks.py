@@ -245,10 +245,12 @@ def test_a_circle_is_found_from_the_tips_along_it(tmp_path: Path) -> None:
         classified(file, points=names, wall={"kind": "circle"})
 
 
-def test_one_trial_has_no_interval_and_says_so(tmp_path: Path) -> None:
+def test_few_trials_have_no_interval_and_say_so(tmp_path: Path) -> None:
     result, _ = classified(write(tmp_path / "a.csv", animal(dwelling(4, 300))))
     assert all(row["share_95"] is None for row in result.summary["shapes"].values())
-    assert result.sentence.endswith("One trial alone gives no interval.")
+    assert result.sentence.endswith(
+        "Fewer than 5 trials decide nothing; their means have no interval."
+    )
 
 
 def test_one_recording_is_never_two_animals(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from antennate import checks
 from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
 from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
 from antennate.colours import SERIES as SERIES
+from antennate.jackknife import ENOUGH as ENOUGH_TRIALS
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -52,8 +53,8 @@ SHAPE_COLOURS = {
 }
 """Shapes of an antenna that touches, and no contact."""
 
-ENOUGH_TRIALS = 5
-"""Fewest trials for which an interval is drawn: of fewer it is so wide that it dwarfs the rest."""
+_SMALL_DPI, _COLOURS = 120, 256
+"""Pixels an inch and colours of a thumbnail."""
 
 _RC: dict[Any, Any] = {
     "figure.dpi": 100,
@@ -183,6 +184,18 @@ def render(figure: Figure) -> dict[str, bytes]:
         figure.savefig(file, format=suffix, metadata=metadata, facecolor="white")
         files[suffix] = file.getvalue()
     return files
+
+
+@styled
+def thumbnail(figure: Figure) -> bytes:
+    """The figure as a small png of few colours, for a page that holds many."""
+    from PIL import Image
+
+    _settle(figure)
+    large, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(large, format="png", dpi=_SMALL_DPI, facecolor="white")
+    Image.open(large).convert("RGB").quantize(_COLOURS).save(small, "png", optimize=True)
+    return small.getvalue()
 
 
 def _settle(figure: Figure) -> None:

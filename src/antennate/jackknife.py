@@ -6,6 +6,9 @@ import numpy as np
 
 from antennate.types import Floats, Ints
 
+ENOUGH = 5
+"""Fewest trials of which an interval of a mean is told. By Student's t that of two is seven times
+as wide as that of five at the same spread: such an interval decides nothing."""
 MANY = 10
 """From so many groups on, the interval of a median is that of a share, taken as quantiles."""
 

@@ -11,17 +11,39 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
 
 from antennate import checks
+from antennate.errors import ConfigError
 from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringParams
+from antennate.types import Floats
+
+Numbers = float | Floats | Sequence[float]
+"""A number, or numbers in an array or a list."""
 
 
-def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
-    """Stiffness of a torsion spring [N·m/rad].
+@overload
+def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> float: ...
+
+
+@overload
+def spring_stiffness(
+    modulus: Numbers, wire: Numbers, coil: Numbers, coils: Numbers
+) -> float | Floats: ...
+
+
+def spring_stiffness(
+    modulus: Numbers, wire: Numbers, coil: Numbers, coils: Numbers
+) -> float | Floats:
+    """Stiffness of torsion springs [N·m/rad].
 
     E d^4 / (10.8 D N) per turn (Shigley, Mechanical Engineering Design, section 10-12), over 2 pi.
+
+    Each argument is a number or an array; arrays are broadcast against one another.
 
     Args:
         modulus: Young's modulus of the wire [Pa].
@@ -29,23 +51,50 @@ def spring_stiffness(modulus: float, wire: float, coil: float, coils: float) -> 
         coil: Mean coil diameter [m].
         coils: Number of active coils.
 
+    Returns:
+        A float of four numbers, else an array of the common shape.
+
     Raises:
-        ConfigError: One is no finite number above 0, or the stiffness is none.
+        ConfigError: One holds no finite numbers above 0, the shapes do not fit together, or a
+            stiffness is no such number.
     """
     given = (
-        checks.real("modulus", modulus, "Pa", above=0.0),
-        checks.real("wire", wire, "m", above=0.0),
-        checks.real("coil", coil, "m", above=0.0),
-        checks.real("coils", coils, above=0.0),
+        _positive("modulus", modulus, "Pa"),
+        _positive("wire", wire, "m"),
+        _positive("coil", coil, "m"),
+        _positive("coils", coils, ""),
     )
     try:
-        found = _stiffness(*given)
+        with np.errstate(all="ignore"):
+            found = _stiffness(*given)
     except ArithmeticError:  # a power that is too large, a product that is 0
         found = math.inf
-    return checks.real("stiffness of these", found, "N·m/rad", above=0.0)
+    except ValueError:
+        shapes = ", ".join(str(np.shape(value)) for value in given)
+        raise ConfigError(
+            f"spring_stiffness: expected shapes that broadcast, found {shapes}"
+        ) from None
+    return _positive("stiffness of these", found, "N·m/rad")
 
 
-def _stiffness(modulus: float, wire: float, coil: float, coils: float) -> float:
+def _positive(name: str, value: Any, unit: str) -> float | Floats:
+    """A finite number above 0, or an array of such.
+
+    Raises:
+        ConfigError: It is something else.
+    """
+    if not isinstance(value, list | tuple) and np.ndim(value) == 0:
+        return checks.real(name, value, unit, above=0.0)
+    found = checks.array(name, value, (), unit)
+    if (found <= 0.0).any():
+        raise ConfigError(
+            f"{name}: expected finite numbers above 0{f' [{unit}]' if unit else ''}, found "
+            f"{found[found <= 0.0][0]:g}"
+        )
+    return found
+
+
+def _stiffness(modulus: Any, wire: Any, coil: Any, coils: Any) -> Any:
     return modulus * wire**4 / (RATE_FACTOR * coil * coils) / (2.0 * math.pi)
 
 

@@ -13,6 +13,7 @@ solved side by side over a leading batch axis.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -32,6 +33,15 @@ PROFILES: tuple[Profile, ...] = get_args(Profile)
 the other way round, and `matched_uniform` equal springs with the tip compliance of `descending`.
 The last two are controls that the paper lacks.
 """
+
+ABOUT: dict[str, str] = {
+    "stiff": "its fewest coils in every spring",
+    "descending": "the antenna as it is, by default stiffest at its base",
+    "compliant": "its most coils in every spring",
+    "matched_uniform": "equal springs that give as much at the tip as the antenna; a control",
+    "ascending": "its springs the other way round, softest at the base; a control",
+}
+"""What each profile is, for who meets them for the first time."""
 
 _LOAD_STEPS = 24
 _ITERATIONS = 40
@@ -194,6 +204,11 @@ def shape(chain: Chain, angles: Floats) -> Floats:
     steps = chain.lengths[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     origin = np.zeros((len(angles), 1, 2))
     return np.concatenate([origin, np.cumsum(steps, axis=1)], axis=1)
+
+
+def about(profiles: Iterable[str]) -> str:
+    """What these profiles are, a line each."""
+    return "\n".join(f"{name.replace('_', ' ')}: {ABOUT[name]}" for name in profiles)
 
 
 def tip_compliance(chain: Chain) -> float:

@@ -156,6 +156,9 @@ def print_table(table: Table) -> None:
 
     drawn = drawn_table(table)
     console = Console(file=sys.stdout, highlight=False)
+    if table.preface:
+        console.print(Text(table.preface), soft_wrap=not console.is_terminal)
+        console.print()
     unlimited = console.options.update(max_width=sys.maxsize)
     if Measurement.get(console, unlimited, drawn).minimum <= console.width:
         console.print(drawn)

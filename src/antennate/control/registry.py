@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
 from antennate.control import controllers
@@ -24,8 +24,33 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "closed": controllers.closed_loop,
 }
 
+ABOUT = {
+    "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
+    "paper": "turns away from the side that touches, backs off where both do: the published table",
+    "closed": "walks on until its readings repeat, so that it is stuck; then backs off and turns",
+}
+"""What ours do, for who meets them for the first time."""
+RIVAL = "open"
+"""The controller that results are compared with, wherever it was run beside others."""
+
 CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
+
+
+def about(names: Iterable[str]) -> str:
+    """What the controllers of ours among these do, a line each."""
+    return "\n".join(f"{name}: {ABOUT[name]}" for name in names if name in ABOUT)
+
+
+def compared(names: Sequence[str]) -> tuple[str, str] | None:
+    """The two conditions that a headline compares: the last one named, and its rival.
+
+    The rival is `RIVAL`, or the first one where that is not among them; None of fewer than two.
+    """
+    if len(names) < 2:
+        return None
+    rival = RIVAL if RIVAL in names else names[0]
+    return [name for name in names if name != rival][-1], rival
 
 
 def make_controller(

@@ -12,7 +12,7 @@ import pkgutil
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError, in_one_line
-from antennate.messages import shortened
+from antennate.messages import nearest, shortened
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -69,7 +69,9 @@ def load(name: str) -> Experiment[Any, Any]:
 
 def unknown(name: str) -> str:
     """What is said of a name that no experiment has."""
-    return f"expected an experiment ({', '.join(summaries())}), found {shortened(name)}"
+    known = names()
+    hint = nearest(name, known)
+    return f"expected an experiment{hint}, one of {', '.join(known)}, found {shortened(name)}"
 
 
 @functools.cache

@@ -13,12 +13,14 @@ from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
 from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
-from antennate.messages import shown
+from antennate.messages import one_line, shown
+from antennate.notebook import html
 from antennate.params.base import Params
 from antennate.params.reading import from_values
 from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity
+from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
@@ -28,9 +30,9 @@ _PARTS = 100
 """Parts of the making of a film that are told."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
-    """What came out of an experiment.
+    """What came out of an experiment. In a notebook it shows its sentence, table and figure.
 
     Attributes:
         experiment: The experiment.
@@ -43,6 +45,18 @@ class Result:
     config: Params
     outcome: Outcome
     path: Path | None = None
+
+    def __repr__(self) -> str:
+        """It in one line: what was run, and what came out."""
+        trials = f", {len(self.rows)} trials" if self.rows else ""
+        return f"<Result of {self.experiment.name}{trials}: {one_line(self.sentence)}>"
+
+    def _repr_html_(self) -> str:
+        """A sentence, the first table and the first figure, for a notebook."""
+        tables, figures = self.experiment.tables(self.summary), self.figures()
+        table = tables[0] if tables else Table("", (), ())
+        first = next(iter(self.experiment.view.ordered(figures)), "")
+        return html(*(self.sentence, table.columns, table.rows, figures.get(first), table.preface))
 
     @property
     def rows(self) -> Sequence[Any]:

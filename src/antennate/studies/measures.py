@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+
+from antennate.jackknife import ENOUGH
 
 NONE = "-"
 """Shown where there is no number."""
@@ -27,6 +30,8 @@ class Measure:
         form: Its format.
         scale: Factor to the unit shown.
         join: Between two numbers, as the ends of an interval.
+        least: What it cannot lie below.
+        most: What it cannot exceed; text names the parameter that says so.
     """
 
     name: str
@@ -36,6 +41,8 @@ class Measure:
     form: str = ".2f"
     scale: float = 1.0
     join: str = " to "
+    least: float = -math.inf
+    most: float | str = math.inf
 
     @property
     def title(self) -> str:
@@ -114,9 +121,28 @@ def count(column: str, value: Any) -> Of:
 def successes(summaries: Mapping[str, Mapping[str, Any]]) -> str:
     """Successes of each condition by name, of its valid trials, with their interval."""
     return ", ".join(
-        f"{name} {row['successes']} of {row['trials'] - row['invalid']} ({shown(row['wilson95'])})"
+        f"{name} {share(row['successes'], row['trials'] - row['invalid'], row['wilson95'])}"
         for name, row in summaries.items()
     )
+
+
+def share(count: int, valid: int, interval: Sequence[float] | None = None, word: str = "") -> str:
+    """A count of valid trials in words, as `16 of 20 (0.58 to 0.92)`."""
+    if not valid:
+        return "without a valid trial"
+    return f"{count} of {valid}{word}" + (f" ({shown(interval)})" if interval else "")
+
+
+def few(trials: Iterable[int]) -> str:
+    """What is said where valid trials are too few for an interval of a mean; empty if they are not.
+
+    Args:
+        trials: Valid trials of each condition or point; those without any do not count.
+    """
+    some = [count for count in trials if count]
+    if not some or min(some) >= ENOUGH:
+        return ""
+    return f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
 
 
 class Interim:
@@ -153,6 +179,7 @@ class Table:
 
     Attributes:
         title: Above it.
+        preface: Before the title: what its columns are, a line each.
         columns: Names of the columns.
         rows: Name and cells of every row.
         note: Under it.
@@ -164,6 +191,7 @@ class Table:
     rows: Sequence[tuple[str, Sequence[str]]]
     note: str = ""
     leading: int = 0
+    preface: str = ""
 
     @classmethod
     def of(
@@ -172,7 +200,8 @@ class Table:
         columns: Mapping[str, Mapping[str, Any]],
         measures: Iterable[Measure],
         note: str = "",
+        preface: str = "",
     ) -> Table:
         """The measures that have a label, for a summary in each column."""
         rows = [(m.title, [m.cell(c) for c in columns.values()]) for m in measures if m.label]
-        return cls(title, list(columns), rows, note)
+        return cls(title, list(columns), rows, note, preface=preface)

@@ -16,8 +16,13 @@ _LEAST = 0.75
 """Letters of 9 points become no smaller than this share; a narrow screen scrolls instead."""
 _BROAD, _TIGHT = 440, 350
 """Pictures of a greater least width do not fit on a phone, or on most phones [px]."""
+_BESIDE, _GAP = 84, 3
+"""Letters of a line for which there is room beside a figure, and those of a gap between columns."""
+_LARGEST = 1.6
+"""Most that a picture is enlarged, so that its letters are not larger than those of a title."""
 _VAST = 1200
 """Drawn broader than that [px], they take the whole window and are never made smaller."""
+_TAKES_ALL = 'class="scroll vast"'
 _CODE = re.compile(r"`([^`]+)`")
 _STYLE = """
 :root { color-scheme: light dark; --ink: #222; --muted: #666; --line: #ddd; --page: #fff;
@@ -26,7 +31,8 @@ _STYLE = """
   --page: #161616; --shade: #fff5; --good: #4fc79b; --fair: #e5ae4a; --bad: #ff9460; }
   img { background: #fff; border-radius: .3rem; } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
-  max-width: 62rem; margin: 0 auto; padding: 1rem; }
+  max-width: 84rem; margin: 0 auto; padding: 1rem 1.5rem; }
+.headline { font-size: 1.15rem; }
 h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .3rem; }
 h1, h2, p, figcaption, li { overflow-wrap: anywhere; }
 p { margin: .3rem 0; } .muted, dt, caption, figcaption { color: var(--muted); }
@@ -42,9 +48,12 @@ table.numbers { font-variant-numeric: tabular-nums; white-space: nowrap; }
 table.numbers td:first-child { white-space: pre; position: sticky; left: 0;
   background: var(--page); }
 section { border-top: 1px solid var(--line); padding: 1rem 0; display: grid; gap: 0 1.5rem;
-  grid-template-columns: 1fr minmax(0, 26rem); break-inside: avoid; }
+  grid-template-columns: minmax(0, 1fr) minmax(0, 40rem); break-inside: avoid; }
 section > h2, section > .verdict { grid-column: 1 / -1; margin-top: 0; }
 figure { margin: .8rem 0; break-inside: avoid; }
+.beside { display: grid; gap: 0 2rem; grid-template-rows: min-content 1fr;
+  grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); }
+.beside th { white-space: normal; } .beside > .words { grid-column: 2; grid-row: 1 / span 2; }
 .pair { display: grid; gap: 0 1.5rem; grid-template-columns: repeat(2, minmax(0, 1fr)); }
 img, video { max-width: 100%; height: auto; display: block; }
 .scroll > img { max-width: none; width: 100%; }
@@ -54,7 +63,9 @@ code { font-size: .85rem; overflow-wrap: anywhere; } a { color: inherit; }
 summary { cursor: pointer; } dl { margin: .4rem 0; } dd { margin: 0 0 .4rem; }
 .good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
 .good, .fair, .bad { font-weight: 600; }
-@media (max-width: 44rem) { .pair, section { grid-template-columns: minmax(0, 1fr); }
+@media (max-width: 70rem) { .beside { display: block; } }
+@media (max-width: 44rem) { body { padding: 1rem; }
+  .pair, section { grid-template-columns: minmax(0, 1fr); }
   .wide { display: none; } }
 .vast { width: min(calc(100vw - 3rem), var(--drawn)); position: relative; left: 50%;
   transform: translateX(-50%); }
@@ -102,11 +113,36 @@ def grid(columns: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") 
 
 
 def numbers(table: Table) -> str:
-    """A table of measures, with its title and its note."""
+    """A table of measures, with its title and its note, behind what its columns are."""
     columns = ["", *(name.replace("_", " ") for name in table.columns)]
     rows = [[name, *cells] for name, cells in table.rows]
     note = paragraphs(table.note, "muted")
-    return f"<h2>{escape(table.title)}</h2>{grid(columns, rows, _kind(table))}{note}"
+    lines = (line.partition(":") for line in table.preface.splitlines())
+    preface = "".join(f"<p><strong>{escape(a)}</strong>{b}{escape(c)}</p>" for a, b, c in lines)
+    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, _kind(table))}{note}"
+
+
+def is_broad(table: Table) -> bool:
+    """Whether a table has no room beside a figure."""
+    heads = [max(map(len, name.replace("_", " ").split()), default=0) for name in table.columns]
+    lines = [[len(name), *map(len, cells)] for name, cells in table.rows]
+    widest = [max(sizes) for sizes in zip([0, *heads], *lines, strict=True)]
+    return sum(widest) + _GAP * len(widest) > _BESIDE
+
+
+def beside(figures: Sequence[str], words: str) -> str:
+    """Figures at the left of words where there is room; else the first above, others below.
+
+    Those that take the whole window stand above all.
+    """
+    above = [figure for figure in figures if _TAKES_ALL in figure]
+    first, *others = [figure for figure in figures if figure not in above] or [""]
+    if not first:
+        return "".join(above) + words
+    return (
+        f'{"".join(above)}<div class="beside"><div class="first">{first}</div>'
+        f'<div class="words">{words}</div><div class="others">{"".join(others)}</div></div>'
+    )
 
 
 def _kind(table: Table) -> str:
@@ -115,18 +151,18 @@ def _kind(table: Table) -> str:
 
 
 def picture(png: bytes, svg: bytes, described: str) -> str:
-    """A figure as the smaller of both, as large as it was drawn and never too small to read."""
+    """A figure as the smaller of both, as wide as there is room and never too small to read."""
     kind, data = ("svg+xml", svg) if len(svg) < len(png) else ("png", png)
     width, height = struct.unpack(">II", png[16:24])
     width, height = (round(size * _CSS_DPI / _DPI) for size in (width, height))
     vast = width > _VAST
     least = width if vast else round(_LEAST * width)
     narrow = " broad" if least > _BROAD else " tight" if least > _TIGHT else ""
-    broad = " vast" if vast else narrow
+    kind_of = _TAKES_ALL if vast else f'class="scroll{narrow}"'
     return (
-        f'<div class="scroll{broad}" style="--drawn: {width}px">'
+        f'<div {kind_of} style="--drawn: {width}px">'
         f'<img alt="{escape(described)}" width="{width}" height="{height}" '
-        f'style="min-width: {least}px; max-width: {width}px" '
+        f'style="min-width: {least}px; max-width: {round(_LARGEST * width)}px" '
         f'src="data:image/{kind};base64,{base64.b64encode(data).decode()}"></div>'
     )
 

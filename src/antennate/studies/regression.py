@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.jackknife import jackknife95
+from antennate.jackknife import ENOUGH, jackknife95
 from antennate.types import Floats, Ints
 
 
@@ -45,7 +45,7 @@ class Explained:
         n: Points predicted.
         r2: 1 - sum (y - prediction)^2 / sum (y - mean y)^2: share of variance explained; below 0
             the prediction is worse than the mean.
-        r2_95: Its 95 % interval over groups; NaN with fewer than two.
+        r2_95: Its 95 % interval over groups; NaN with fewer than `ENOUGH`.
         rmse: Root mean square error, in the unit of y.
         groups: How many groups the points are of.
     """
@@ -78,6 +78,8 @@ def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         share, left = _unexplained(whole), _unexplained(whole - sums)
         low, high = 1.0 - np.exp(jackknife95(np.log(share), np.log(left))[::-1])
+    if len(sums) < ENOUGH:
+        low = high = np.nan
     rmse = float(np.sqrt(parts[3].mean()))
     return Explained(len(truth), float(1.0 - share), (float(low), float(high)), rmse, len(sums))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -67,6 +67,14 @@ class View:
     body: Body | None = None
     captions: Mapping[str, str] = field(default_factory=dict)
 
+    def ordered(self, figures: Iterable[str]) -> list[str]:
+        """Names of figures in the order of the captions, others behind: the first is the picture.
+
+        A result begins with it, in a report and in a notebook.
+        """
+        known = list(self.captions)
+        return sorted(figures, key=lambda n: (known.index(n) if n in known else len(known), n))
+
     def caption(self, figure: str) -> str:
         """What a figure shows: the sentence of its command, else its name in words."""
         words = figure.replace("_", " ")
@@ -108,14 +116,14 @@ def report(run: RunDirectory, view: View) -> str:
     result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>antennate {page.escape(view.name)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
-    parts.append(page.paragraphs(_sentence(run, result, view)))
-    parts.append(page.paragraphs(_when(run, result), "muted"))
-    parts.append(page.block(_command(run, view), wrap=True))
+    parts.append(page.paragraphs(_sentence(run, result, view), "headline"))
     parts.append(page.block(run.text(BY_HAND), wrap=True))
     films = "".join(page.captioned(film, name) for name, film in _films(run).items())
     parts.append(f'<div class="pair">{films}</div>' if films else "")
     if result is not None:
         parts.append(_shown(run, result, view))
+    parts.append(f"<h2>How it was run</h2>{page.paragraphs(_when(run, result))}")
+    parts.append(page.block(_command(run, view), wrap=True))
     parts += [_logs(run), _failures(run), _settings(run, view), _versions(run)]
     return page.page(f"antennate {view.name}", "".join(parts))
 
@@ -139,14 +147,15 @@ def _when(run: RunDirectory, result: Result | None) -> str:
 
 
 def _images(run: RunDirectory, view: View) -> dict[str, str]:
-    """The figures by name."""
+    """The figures by name, the picture first."""
+    found = {path.stem: path for path in run.made(FIGURES, ".png")}
     return {
-        path.stem: page.picture(
-            read_limited(path, LARGEST),
-            read_limited(path.with_suffix(".svg"), LARGEST),
-            view.caption(path.stem),
+        name: page.picture(
+            read_limited(found[name], LARGEST),
+            read_limited(found[name].with_suffix(".svg"), LARGEST),
+            view.caption(name),
         )
-        for path in run.made(FIGURES, ".png")
+        for name in view.ordered(found)
     }
 
 
@@ -178,13 +187,15 @@ def _logs(run: RunDirectory) -> str:
 
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:
-    """Tables and figures, or what the command shows in their place."""
+    """Figures beside tables, or what the command shows in their place."""
     images = _images(run, view)
     if view.body is not None:
         return view.body(result, images)
-    tables = "".join(map(page.numbers, view.tables(result)))
-    figures = "".join(page.captioned(i, view.caption(n)) for n, i in images.items())
-    return tables + terms.explained(result) + ("<h2>Figures</h2>" + figures if figures else "")
+    tables = view.tables(result)
+    words = "".join(page.numbers(table) for table in tables if not page.is_broad(table))
+    figures = [page.captioned(image, view.caption(name)) for name, image in images.items()]
+    broad = "".join(page.numbers(table) for table in tables if page.is_broad(table))
+    return page.beside(figures, words + terms.explained(result)) + broad
 
 
 def _failures(run: RunDirectory) -> str:
@@ -312,7 +323,13 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
             for name, found in ((name, cells[name].get(line, {})) for name in here)
         ]
         notes = dict.fromkeys(table.note for table in here.values())
-        joined.append(Table(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))))
+        prefaces = (line for table in here.values() for line in table.preface.splitlines())
+        joined.append(
+            Table(
+                *(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))),
+                preface="\n".join(dict.fromkeys(prefaces)),
+            )
+        )
     return joined
 
 

@@ -103,6 +103,7 @@ def simulate(
             "seed": config.seed,
             "trial": trial,
             "period_s": control.period,
+            "threshold": control.rule.threshold,
             "outcome": walk.outcome,
         }
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.jackknife import student95
+from antennate.jackknife import ENOUGH, student95
 from antennate.types import Bools, Floats
 
 _Z95 = 1.959963984540054
@@ -32,18 +32,30 @@ def wilson95(successes: int, trials: int) -> tuple[float, float]:
     return low, 1.0 if successes == trials else center + half
 
 
-def mean95(values: Floats) -> tuple[float, float, float]:
-    """Mean of values (n,) and the ends of its 95 % interval, by Student's t.
+Ends = tuple[float, float]
+"""Lower and upper end of an interval."""
 
-    One value has no interval, none has no mean either: NaN. The interval is not cut where values
-    end: that of a share may reach below 0 or beyond 1.
+
+def mean95(
+    values: Floats, least: float = -math.inf, most: float = math.inf
+) -> tuple[float, Ends | None]:
+    """Mean of values and its 95 % interval, by Student's t.
+
+    Args:
+        values: The values, shape (n,).
+        least: What no value can lie below, as 0 for a time or a share. The mean of them cannot
+            either, so the interval is cut there: it loses nothing that could be true.
+        most: What no value can exceed, likewise, as the time limit of a restricted time.
+
+    Returns:
+        The mean, NaN of no values, and the ends; None of fewer than `ENOUGH` values.
     """
     count = len(values)
     mean = float(values.mean()) if count else float("nan")
-    if count < 2:
-        return mean, float("nan"), float("nan")
+    if count < ENOUGH:
+        return mean, None
     half = student95(count - 1) * float(values.std(ddof=1)) / math.sqrt(count)
-    return mean, mean - half, mean + half
+    return mean, (max(least, mean - half), min(most, mean + half))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +113,10 @@ class PairedTest:
     Attributes:
         only_first: Seeds on which only the first succeeded; `only_second` likewise.
         mcnemar_p: Exact two-sided McNemar test on those.
-        time_difference_s: Mean of restricted time, first minus second [s], with its 95 % interval.
-        wilcoxon_p: Two-sided signed-rank test on restricted times, see `signed_rank`. One seed
-            has neither that nor the interval.
+        time_difference_s: Mean of restricted time, first minus second [s].
+        time_difference_95: Its 95 % interval, see `mean95`.
+        wilcoxon_p: Two-sided signed-rank test on restricted times, see `signed_rank`; None of one
+            seed.
         both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
             second on those [s], None without any.
     """
@@ -112,23 +125,35 @@ class PairedTest:
     only_second: int
     mcnemar_p: float
     time_difference_s: float
-    time_difference_95: tuple[float, float] | None
+    time_difference_95: Ends | None
     wilcoxon_p: float | None
     both: int
     both_time_s: tuple[float, float] | None
 
 
-def compare(first_ok: Bools, second_ok: Bools, first_t: Floats, second_t: Floats) -> PairedTest:
-    """Compare two conditions by trial; arrays of shape (n,), times restricted to the limit [s]."""
+def compare(
+    first_ok: Bools,
+    second_ok: Bools,
+    first_t: Floats,
+    second_t: Floats,
+    limit: float = math.inf,
+) -> PairedTest:
+    """Compare two conditions by trial.
+
+    Args:
+        first_ok: Whether the first succeeded, shape (n,).
+        second_ok: The same of the second.
+        first_t: Times of the first, restricted to the limit [s], shape (n,).
+        second_t: The same of the second.
+        limit: The limit [s]: no difference is larger, in either direction.
+    """
     success = mcnemar(np.stack([first_ok, second_ok], axis=1))
     difference = first_t - second_t
-    mean, low, high = mean95(difference)
-    rank = signed_rank(difference)
-    several = len(difference) > 1
+    mean, ends = mean95(difference, -limit, limit)
+    rank = signed_rank(difference) if len(difference) > 1 else None
     both = first_ok & second_ok
     times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
     return PairedTest(
         *(success.only_first, success.only_second, success.mcnemar_p),
-        *(mean, (low, high) if several else None, rank if several else None),
-        *(int(both.sum()), times),
+        *(mean, ends, rank, int(both.sum()), times),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, islice
@@ -56,7 +57,7 @@ class Course:
         recorded: `Maneuver` decided then, shape (n,).
         replayed: `Maneuver` decided now, shape (n,); None without a replay.
         state: The supervisor's, n of them; empty text without one.
-        threshold: Level from which on there is contact.
+        threshold: Level from which on there is contact; NaN if it is not known.
     """
 
     t: Floats
@@ -91,7 +92,24 @@ class Course:
         )
 
 
-def _drawable(values: Sequence[float] | Sequence[Pair]) -> Floats:
+def of_arrays(
+    t: Floats, reading: Floats, level: Floats, contact: Ints, maneuver: Ints, threshold: float
+) -> Figure:
+    """The figure of one tick or more; arrays as in `Course`, of a long series some ticks."""
+    kept = slice(None, None, -(-len(t) // _MOST_DRAWN))
+    return replay(
+        Course(
+            *(_drawable(values[kept]) for values in (t, reading, level)),
+            contact=contact[kept],
+            recorded=maneuver[kept],
+            replayed=None,
+            state=[""] * len(t[kept]),
+            threshold=threshold,
+        )
+    )
+
+
+def _drawable(values: Floats | Sequence[float] | Sequence[Pair]) -> Floats:
     """Numbers as they are, NaN for those that no axis can show."""
     found = np.array(values)
     return np.where(np.abs(found) <= _LARGEST, found, np.nan)
@@ -142,8 +160,10 @@ def _draw_readings(panel: Axes, course: Course) -> None:
 def _draw_levels(panel: Axes, course: Course) -> None:
     for side, colour in enumerate(style.series(2)):
         panel.plot(course.t, course.level[:, side], color=colour, linewidth=1)
-    panel.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
-    panel.annotate("θ", (1.005, course.threshold), xycoords=("axes fraction", "data"), va="center")
+    if math.isfinite(course.threshold):
+        at = (1.005, course.threshold)
+        panel.axhline(course.threshold, color=style.INK, linestyle=":", linewidth=1)
+        panel.annotate("θ", at, xycoords=("axes fraction", "data"), va="center")
     panel.set(ylabel="b", ylim=(-0.05, 1.05), title="Bending level")
 
 

@@ -226,7 +226,7 @@ def fields(robot: RobotSpec) -> tuple[str, ...]:
     """Names of the numbers of a tick that are in its `values`."""
     parts: dict[str, tuple[str, ...]] = {"angles": robot.joint_names}
     pairs = [field.name for field in TICK.fields if field.number == 2]
-    parts |= {name: (f"{name}_l", f"{name}_r") for name in pairs}
+    parts |= {name: (f"{name}_left", f"{name}_right") for name in pairs}
     return tuple(field for name in _NUMBERS for field in parts.get(name, (name,)))
 
 

@@ -11,7 +11,7 @@ import io
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,13 @@ from antennate import checks
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited, write_whole
-from antennate.messages import shown
-from antennate.types import AntennaFrame, Floats, Ints, JointCommand
+from antennate.messages import shortened, shown
+from antennate.notebook import html
+from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
 FORMAT = "antennate time series 1"
+NAMED = "antennate time series 2"
+"""The format of a CSV file whose columns are named by side and axis, not numbered as in 1."""
 _LARGEST_FILE = 1 << 30
 _ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
     "t": ((), np.float64),
@@ -40,6 +43,11 @@ _ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
     "head": ((2,), np.float64),
 }
 """Axes after the first, which is time, and type of each array."""
+_ENDS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("counts", "level", "contact", "leg", "antenna"), ("left", "right")),
+    "head": ("x", "y"),
+}
+"""What the columns of the last axis are called; those of others are numbered, head first."""
 _MAY_BE_EMPTY = ("yaw", "antenna", "pitch")
 _UNUSABLE = (
     *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
@@ -47,9 +55,13 @@ _UNUSABLE = (
 )
 """What damaged files make the standard library and NumPy raise."""
 _MOST_COLUMNS = 1000
+_INDEX = {"left": "0", "right": "1", "x": "0", "y": "1"}
+_SHOWN_COLUMNS = (
+    *("ticks [%]", "level left", "level right", "contact left [%]", "contact right [%]"),
+)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class TimeSeries:
     """One robot over n control ticks.
 
@@ -103,13 +115,62 @@ class TimeSeries:
         """Number of ticks."""
         return len(self.t)
 
+    def __repr__(self) -> str:
+        """It in one line."""
+        return f"<{self._sentence}>"
+
+    def _repr_html_(self) -> str:
+        """A sentence, a table and a figure, for a notebook."""
+        from antennate.telemetry.figure import of_arrays  # slow to import
+
+        theta = self.meta.get("threshold")
+        theta = theta if isinstance(theta, float) else np.nan
+        known = (self.t, self.counts, self.level, self.contact, self.maneuver)
+        figure = of_arrays(*known, theta) if len(self) else None
+        return html(self._sentence, _SHOWN_COLUMNS, self._by_maneuver(), figure)
+
+    @property
+    def _sentence(self) -> str:
+        told = ", ".join(
+            f"{name} {shortened(str(value))}"
+            for name, value in self.meta.items()
+            if value is not None
+        )
+        span = self.t[-1] - self.t[0] if len(self) else 0.0
+        return f"TimeSeries of {len(self)} ticks, {span:.2f} s{told and f': {told}'}"
+
+    def _by_maneuver(self) -> Iterator[tuple[str, list[str]]]:
+        """Of each maneuver, and of all: its share of the ticks, mean levels, shares of contact."""
+        parts = {m.name: self.maneuver == m for m in Maneuver} | {
+            "all": self.maneuver == self.maneuver
+        }
+        for name, ticks in parts.items():
+            if not ticks.any():
+                continue
+            known = (self.level[ticks, side] for side in (0, 1))
+            levels = [float(np.nanmean(b)) if np.isfinite(b).any() else np.nan for b in known]
+            touched = 100.0 * (self.contact[ticks] == Contact.CONTACT).mean(axis=0)
+            cells = [f"{100.0 * ticks.mean():.1f}", *(f"{level:.2f}" for level in levels)]
+            yield name, [*cells, *(f"{share:.1f}" for share in touched)]
+
     def columns(self) -> dict[str, Floats | Ints]:
-        """Every number of a tick as a column of shape (n,): `t`, `counts_0`, …, `leg_5_1`, …."""
+        """Every number of a tick as a column of shape (n,).
+
+        The names are `t`, `counts_left`, `counts_right`, …, `head_x`, `head_y`; joints along the
+        body are numbered, head first: `yaw_0`, `leg_5_right`.
+        """
+        return self._columns(_ENDS)
+
+    def _columns(self, ends: Mapping[str, tuple[str, ...]]) -> dict[str, Floats | Ints]:
+        """The columns, with names for the last index of some arrays."""
         found: dict[str, Floats | Ints] = {}
         for name in _ARRAYS:
             values = getattr(self, name)
             for index in np.ndindex(values.shape[1:]):
-                found["_".join([name, *map(str, index)])] = values[(slice(None), *index)]
+                words = [name, *map(str, index)]
+                if index and index[-1] < len(ends.get(name, ())):
+                    words[-1] = ends[name][index[-1]]
+                found["_".join(words)] = values[(slice(None), *index)]
         return found
 
     def to_dataframe(self) -> Any:
@@ -148,18 +209,18 @@ class TimeSeries:
             why = " ".join(str(error).split())
             raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
 
-    def _head(self) -> str:
-        return json.dumps({"format": FORMAT, "meta": dict(self.meta)})
+    def _head(self, form: str) -> str:
+        return json.dumps({"format": form, "meta": dict(self.meta)})
 
     def _npz(self) -> bytes:
         file = io.BytesIO()
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        np.savez_compressed(file, allow_pickle=False, header=np.array(self._head()), **arrays)
+        np.savez_compressed(file, allow_pickle=False, header=np.array(self._head(FORMAT)), **arrays)
         return file.getvalue()
 
     def _csv(self) -> str:
         file = io.StringIO()
-        file.write(f"# {self._head()}\n")
+        file.write(f"# {self._head(NAMED)}\n")
         writer = csv.writer(file, lineterminator="\n")
         columns = self.columns()
         writer.writerow(columns)
@@ -215,7 +276,7 @@ def _ending(path: Path) -> str:
 
 def _meta(text: str) -> dict[str, Any]:
     head = json.loads(text)
-    if not isinstance(head, dict) or head.get("format") != FORMAT:
+    if not isinstance(head, dict) or head.get("format") not in (FORMAT, NAMED):
         raise ValueError("another format")
     meta = head.get("meta")
     if not isinstance(meta, dict):
@@ -258,10 +319,10 @@ def _from_csv(data: bytes) -> TimeSeries:
     for name, places in held.items():
         if not places and name not in _MAY_BE_EMPTY:
             raise ValueError(f"no {name}")
-        last = header[places[-1]].split("_")[1:] if places else [-1]
-        shape = (len(rows), *(1 + int(index) for index in last))
+        last = header[places[-1]].split("_")[1:] if places else ["-1"]
+        shape = (len(rows), *(1 + int(_INDEX.get(index, index)) for index in last))
         arrays[name] = cells[:, places].astype(_ARRAYS[name][1]).reshape(shape)
     series = TimeSeries(**arrays, meta=meta)
-    if list(series.columns()) != header:
+    if header not in (list(series.columns()), list(series._columns({}))):
         raise ValueError("columns in another order")
     return series

@@ -101,8 +101,8 @@ class TwinRobot:
         self._stream = bytearray()
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
-        self.converter = Converter(boot_id, mains)
         self._held_in_reset = self._off = False
+        self.converter = Converter(boot_id, mains)
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch or TouchStimulus((), robot.antenna)
         self.on_return: Callable[[], None] = lambda: None

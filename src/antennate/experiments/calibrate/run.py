@@ -148,8 +148,8 @@ class CalibrateOutcome(Outcome):
             "source": "rig" if self.config.recording is None else "recording",
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
-            "plateau": None if (found := self._plateau()) is None else asdict(found),
             "recording": None if self.raw.handled is None else asdict(self.raw.handled),
+            "plateau": None if (found := self._plateau()) is None else asdict(found),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }

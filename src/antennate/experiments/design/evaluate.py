@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.design.config import OF_SUCCESSES, Axis, DesignConfig, Evaluation
+from antennate.experiments.study import labels
 from antennate.experiments.study.measures import SUCCESS
 from antennate.experiments.study.run import holds, with_status
 from antennate.experiments.study.subject import (
@@ -158,6 +159,16 @@ class Evaluator:
             elif self.label != self.name:
                 where += f"evaluate.{self.label}: "
             raise ConfigError(f"{where}{error}") from None
+
+    def bounds(self, point: Point) -> dict[str, tuple[float, float]]:
+        """Between which values those of each objective lie, by its name."""
+        values = dict(self.configured(point))
+        return {
+            objective.name: labels.bounds(
+                labels.measure_of(self.name, objective.column), self.name, values
+            )
+            for objective in self._asked.objectives(self.label)
+        }
 
     def check(self, point: Point) -> None:
         """Find what cannot be run.

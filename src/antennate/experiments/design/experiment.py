@@ -9,7 +9,7 @@ from antennate.experiments.design import run as design
 from antennate.experiments.design.config import DesignConfig
 from antennate.experiments.study import labels
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Table, shown
+from antennate.studies.measures import NONE, Table, few, shown
 
 _MOST = 40
 """Most lines of a table."""
@@ -41,6 +41,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         "* is on the front: no other design is as good in all of these and better in one.\nMeans "
         "with 95 % intervals. The front was chosen by these values, so they are optimistic."
     )
+    if so_few := _few(judged, "objectives"):
+        note += f" {so_few}"
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
     found = [Table("The front and the references", [*heads, *names], rows, note)]
@@ -63,6 +65,11 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             )
         )
     return [table for table in found if table.rows]
+
+
+def _few(designs: Sequence[Each], part: str) -> str:
+    """What is said where a design has few trials."""
+    return few(value["trials"] for each in designs for value in (each[part] or {}).values())
 
 
 def _title(objective: Each) -> str:
@@ -99,6 +106,8 @@ def sentence(result: Mapping[str, Any]) -> str:
         best = [_best(known, part, objective, first) for objective in result["objectives"]]
         seeds = "fresh seeds" if again else "the seeds of the search, which flatter"
         text += f". Best of each objective on {seeds} (95 % interval): {'; '.join(best)}"
+    if so_few := _few(known, part):
+        text += f". {so_few.removesuffix('.')}"
     text += labels.silent(result["statuses"])
     lost = sum(each["state"] in ("failed", "refused") for each in designs)
     return text + (f". Designs that could not be judged: {lost}." if lost else ".")

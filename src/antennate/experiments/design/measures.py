@@ -19,7 +19,7 @@ from antennate.studies.measures import Measure
 from antennate.types import Bools, Floats
 
 Value = Mapping[str, Any]
-"""`value` of an objective, its interval `value95` (None of one trial), its number of `trials`. The
+"""`value` of an objective, its interval `value95` (None of few trials), its number of `trials`. The
 value is None if it is that of successes and there are none."""
 
 
@@ -31,7 +31,10 @@ def measure_of(objective: Objective, experiment: str) -> Measure:
 
 
 def worth(
-    rows: Sequence[Mapping[str, Any]], objectives: Sequence[Objective], least_ok: float
+    rows: Sequence[Mapping[str, Any]],
+    objectives: Sequence[Objective],
+    least_ok: float,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> dict[str, Value] | None:
     """The value of each objective, by name; None if too few trials are ok.
 
@@ -39,6 +42,7 @@ def worth(
         rows: Rows of all trials of a design, each with its `evaluation`.
         objectives: What is told.
         least_ok: Least share of the trials of each evaluation that must be ok.
+        bounds: Between which values those of an objective lie, by its name; any if not given.
     """
     found: dict[str, Value] = {}
     for objective in objectives:
@@ -51,7 +55,8 @@ def worth(
         if objective.of_successes:
             known = [r for r in known if r[OUTCOME] == "success" and r.get(column) is not None]
         values = [row[column] for row in known]
-        found[objective.name] = _share(values) if column == OUTCOME else _mean(values)
+        between = (bounds or {}).get(objective.name, (-math.inf, math.inf))
+        found[objective.name] = _share(values) if column == OUTCOME else _mean(values, between)
     return found
 
 
@@ -61,11 +66,10 @@ def _share(outcomes: Sequence[str]) -> Value:
     return {"value": won / len(outcomes), "value95": interval, "trials": len(outcomes)}
 
 
-def _mean(values: Sequence[float]) -> Value:
+def _mean(values: Sequence[float], bounds: tuple[float, float]) -> Value:
     if not values:
         return {"value": None, "value95": None, "trials": 0}
-    mean, low, high = statistics.mean95(np.array(values, float))
-    interval = (low, high) if len(values) > 1 else None
+    mean, interval = statistics.mean95(np.array(values, float), *bounds)
     return {"value": mean, "value95": interval, "trials": len(values)}
 
 

@@ -198,7 +198,12 @@ class Search:
         if design.state == "refused":
             return
         mine = [r for r in self.rows if r["design"] == design.design and r["phase"] == phase]
-        worth = measures.worth(mine, self.objectives, self.config.least_ok)
+        bounds = {
+            name: ends
+            for evaluator in self.evaluators
+            for name, ends in evaluator.bounds(design.values).items()
+        }
+        worth = measures.worth(mine, self.objectives, self.config.least_ok, bounds)
         if phase == VALIDATION:
             design.fresh = worth
         else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.statics import about
 from antennate.experiments.force import run as force
 from antennate.experiments.force.loads import ForceConfig
 from antennate.studies.experiment import Experiment
@@ -40,6 +41,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"Intervals: over loads at rest and over {tested(result)} traverses, which served no fit, "
         "as if their overlaps\nwere drawn at random along the antenna. They are spread evenly: "
         "another seed moves R2 far less.",
+        about(result["profiles"]),
     )
     return (shares,)
 

@@ -62,9 +62,11 @@ def share_of(row: Mapping[str, Any], key: str = "successes") -> tuple[float, tup
 
 def counted(row: Mapping[str, Any], word: str = "", key: str = "successes") -> str:
     """The count in words with the interval of its share, as "16 of 20 jam (58 to 92 %)"."""
+    valid = row["trials"] - row["invalid"]
+    if not valid:
+        return "no valid trial"
     low, high = share_of(row, key)[1]
-    count = f"{row[key]} of {row['trials'] - row['invalid']}"
-    return f"{count}{' ' if word else ''}{word} ({low:.0f} to {high:.0f} %)"
+    return f"{row[key]} of {valid}{' ' if word else ''}{word} ({low:.0f} to {high:.0f} %)"
 
 
 @dataclass(frozen=True, slots=True)

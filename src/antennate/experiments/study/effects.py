@@ -145,10 +145,10 @@ def _spread(found: Floats, noise: float | None) -> dict[str, Any]:
     if not len(known):
         empty = ("mu_star", "mu_star95", "noise", "above_noise", "mu", "sigma")
         return {**dict.fromkeys(empty), "noise": noise}
-    size, low, high = statistics.mean95(np.abs(known))
+    size, ends = statistics.mean95(np.abs(known), least=0.0)
     return {
         "mu_star": size,
-        "mu_star95": (low, high) if len(known) > 1 else None,
+        "mu_star95": ends,
         "noise": noise,
         "above_noise": None if noise is None else size > noise * (1.0 + _ROUNDING),
         "mu": float(known.mean()),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from typing import Any
 
+from antennate.control.registry import compared
 from antennate.experiments.study import labels, measures
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import size
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Table, shown
+from antennate.studies.measures import NONE, Table, few, share
 
 _MOST = 60
 """Most lines of a table."""
@@ -63,7 +65,9 @@ def _points(result: Mapping[str, Any]) -> Table:
         )
         for number, of in by_point.items()
     ]
-    note = f"Mean of each point with its 95 % interval, {_ended(result)} in all."
+    so_few = _few(result)
+    interval = "" if so_few else " with its 95 % interval"
+    note = f"Mean of each point{interval}, {_ended(result)} in all. {so_few}".strip()
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
     if not shown_axes:
@@ -81,11 +85,11 @@ def _ended(result: Mapping[str, Any]) -> str:
 
 
 def _effects(result: Mapping[str, Any]) -> Table:
-    targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
+    targets, headline = _targets(result)
     by_name: dict[str, dict[str, Mapping[str, Any]]] = {}
     for effect in result["effects"]:
         by_name.setdefault(effect["parameter"], {})[effect["of"]] = effect
-    ranked = sorted(by_name.items(), key=lambda item: -abs(size(item[1][targets[-1]])[0] or 0.0))
+    ranked = sorted(by_name.items(), key=lambda item: -abs(size(item[1][headline])[0] or 0.0))
     measure = labels.measure(result)
     rows = [
         (name, [*(labels.cell(measure, *size(of[t])) for t in targets), _above(of)])
@@ -104,6 +108,19 @@ def _effects(result: Mapping[str, Any]) -> Table:
     )
 
 
+def _targets(result: Mapping[str, Any]) -> tuple[list[str], str]:
+    """What the effects are of, and the one that a headline tells of: against the rival, if any."""
+    targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
+    pair = compared([target for target in targets if " minus " not in target])
+    names = [f"{first} minus {second}" for first, second in permutations(pair or (), 2)]
+    return targets, next((target for target in targets if target in names), targets[-1])
+
+
+def _few(result: Mapping[str, Any]) -> str:
+    """What is said where a point has few trials."""
+    return few(cell["trials"] - cell["invalid"] for cell in result["points"])
+
+
 def _above(of: Mapping[str, Mapping[str, Any]]) -> str:
     found = [target or "yes" for target, effect in of.items() if effect.get("above_noise")]
     return ", ".join(found) or NONE
@@ -116,19 +133,21 @@ def sentence(result: Mapping[str, Any]) -> str:
     told = {n: c for n, c in result["conditions"].items() if c.get(measures.SUCCESS) is not None}
     if told:
         rates = (
-            f"{f'{name} ' if name else ''}{c['successes']} of {c['trials'] - c['invalid']} "
-            f"({shown(c['wilson95'])})"
+            (f"{name} " if name else "")
+            + share(c["successes"], c["trials"] - c["invalid"], c["wilson95"])
             for name, c in told.items()
         )
         text += f"; successes over all of them (95 % interval): {', '.join(rates)}"
     if result["effects"]:
         text += f". {_depends(result)}"
+    elif so_few := _few(result):
+        text += f". {so_few.removesuffix('.')}"
     return f"{text}{labels.silent(result['statuses'])}."
 
 
 def _depends(result: Mapping[str, Any]) -> str:
     """What the response depends on, of the last target: the parameters above the noise."""
-    last = result["effects"][-1]["of"]
+    _, last = _targets(result)
     found = [e for e in result["effects"] if e["of"] == last and size(e)[0] is not None]
     found.sort(key=lambda effect: -abs(size(effect)[0] or 0.0))
     what = "the " + " of ".join(filter(None, [labels.measure(result).label, last]))

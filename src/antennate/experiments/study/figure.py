@@ -126,6 +126,8 @@ def maps(result: Result) -> Figure:
     known = [c["response"] for c in cells if c["response"] is not None]
     shares = result["response"] == "success_share" or not known
     ends = (0.0, 1.0) if shares else (float(np.nanmin(known)), float(np.nanmax(known)))
+    if ends[0] == ends[1]:  # one colour for one value in all maps
+        ends = (ends[0] - 0.5, ends[1] + 0.5)
     image: Any = None
     for panel, (name, rest) in zip(panels, drawn, strict=True):
         of = [c for c in cells if (c["condition"], _rest(told, c, others)) == (name, rest)]
@@ -135,7 +137,8 @@ def maps(result: Result) -> Figure:
     panels[-1].set_xlabel(told[x])
     title = measure.title
     if full:
-        title += "\nwith its 95 % interval and how many trials it is of"
+        interval = any(cell["response95"] for cell in cells)
+        title += f"\nwith {'its 95 % interval and ' * interval}how many trials it is of"
     if len(drawn) < len(every):
         title += f"\nthe first {len(drawn)} of {len(every)} maps"
     bar = figure.colorbar(image, ax=panels, label=title, **style.above(figure))
@@ -175,14 +178,16 @@ def _map(
 
 
 def _told(cell: Result, measure: Measure) -> str:
-    """Value, interval and counts of a cell, a line each."""
+    """Value, interval if there is one, and counts of a cell, a line each."""
     valid = cell["trials"] - cell["invalid"]
-    counts = f"{cell['successes']} of {valid}" if "successes" in cell else f"n {valid}"
+    counts = f"{cell['successes']} of {valid}" if "successes" in cell and valid else f"n {valid}"
     if cell["response"] is None:
         return f"{NONE}\n{counts}"
-    ends = cell["response95"]
-    of = shown(ends, measure.form, measure.scale).replace(" to ", "–") if ends else NONE
-    return f"{shown(cell['response'], measure.form, measure.scale)}\n{of}\n{counts}"
+    value = shown(cell["response"], measure.form, measure.scale)
+    if not (ends := cell["response95"]):
+        return f"{value}\n{counts}"
+    of = shown(ends, measure.form, measure.scale).replace(" to ", "–")
+    return f"{value}\n{of}\n{counts}"
 
 
 @style.styled

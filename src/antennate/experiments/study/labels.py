@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,6 +44,21 @@ def measure_of(experiment: str, column: str) -> Measure:
     end = next((e for e in sorted(_UNITS, key=len)[::-1] if column.endswith(f"_{e}")), "")
     words = column.removesuffix(f"_{end}").replace("_", " ")
     return Measure(column, words, _UNITS.get(end, ""), form=".3g")
+
+
+def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float]:
+    """What no value of a measure lies below, and what none exceeds.
+
+    Args:
+        of: The measure.
+        experiment: Name of its experiment.
+        values: Parameters that are not at their defaults, by name.
+    """
+    if not isinstance(of.most, str):
+        return of.least, of.most
+    known = _experiment(experiment)
+    default = known.config.model_fields[of.most].default if known else math.inf
+    return of.least, float(values.get(of.most, default))
 
 
 def cell(of: Measure, number: Any, interval: Any = None) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.experiments.study import labels
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import SUCCESS, effects, value
 from antennate.studies import statistics
@@ -32,7 +33,7 @@ def summary(
     for row in rows:
         by_cell.setdefault((row["point"], str(row[condition]) if condition else ""), []).append(row)
     cells = [
-        _cell(number, values, name, by_cell.get((number, name), []), response)
+        _cell(number, values, name, by_cell.get((number, name), []), response, config)
         for number, values in enumerate(points)
         for name in names
     ]
@@ -74,16 +75,22 @@ def _whole(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def _cell(
-    number: int, values: Point, condition: str, rows: Sequence[Row], response: str | None
+    number: int,
+    values: Point,
+    condition: str,
+    rows: Sequence[Row],
+    response: str | None,
+    config: StudyConfig,
 ) -> dict[str, Any]:
     """One point under one condition."""
     counts = _whole(rows)
     mean, interval = counts.get(SUCCESS), counts.get("wilson95")
-    if response not in (None, SUCCESS):
+    if response is not None and response != SUCCESS:
         found = np.array([value(row, response) for row in rows])
         known = found[np.isfinite(found)]
-        mean, low, high = statistics.mean95(known)
-        interval = (low, high) if len(known) > 1 else None
+        of = labels.measure_of(config.experiment, response)
+        bounds = labels.bounds(of, config.experiment, {**config.settings, **values})
+        mean, interval = statistics.mean95(known, *bounds)
     return {
         "point": number,
         "values": dict(values),

@@ -155,18 +155,19 @@ def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
 
     Returns:
         `n`, `untold`, mean absolute percentage error `mape_percent`, root mean square
-        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals (Student).
+        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals (Student),
+        which begin at 0 at the least; None of few estimates.
     """
     told = np.isfinite(guess)
     share = 100.0 * (guess[told] / truth[told] - 1.0)
-    mean, low, high = mean95(abs(share))
-    square = mean95(share**2)
+    mean, ends = mean95(abs(share), least=0.0)
+    square, square_ends = mean95(share**2, least=0.0)
     return {
         "n": int(told.sum()),
         "untold": int((~told).sum()),
         "mape_percent": mean,
-        "mape_95": (low, high),
-        "rmse_percent": math.sqrt(square[0]) if told.any() else float("nan"),
-        "rmse_95": tuple(math.sqrt(max(end, 0.0)) for end in square[1:]),
+        "mape_95": ends,
+        "rmse_percent": math.sqrt(square) if told.any() else float("nan"),
+        "rmse_95": square_ends and tuple(map(math.sqrt, square_ends)),
         "bias_percent": float(share.mean()) if told.any() else float("nan"),
     }

@@ -54,11 +54,11 @@ def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
 def _error(found: Mapping[str, Any], cue: str) -> str:
     if cue not in found:
         return shown(None)
-    return _with_interval(found[cue]["mape_percent"], *found[cue]["mape_95"])
+    return _with_interval(found[cue]["mape_percent"], *(found[cue]["mape_95"] or (None, None)))
 
 
 def _with_interval(mean: float | None, low: float | None, high: float | None) -> str:
-    return f"{shown(mean)} ({shown(low)}–{shown(high)})"
+    return shown(mean) if low is None else f"{shown(mean)} ({shown(low)}–{shown(high)})"
 
 
 def sentence(result: Mapping[str, Any]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal
@@ -99,7 +99,7 @@ class SweepOutcome:
         return {
             "cells": len(rows),
             "invalid": len(rows) - len(valid),
-            "share": {name: mean95(np.array([getattr(r, name) for r in valid])) for name in names},
+            "share": {name: _spread([getattr(r, name) for r in valid]) for name in names},
             "map": [
                 {
                     "distance": row.distance_m / self.config.antenna.length,
@@ -110,6 +110,13 @@ class SweepOutcome:
                 for row in valid
             ],
         }
+
+
+def _spread(shares: Sequence[float]) -> tuple[float, float | None, float | None]:
+    """Mean of shares over the cells of the map, and how far it spreads."""
+    mean, ends = mean95(np.array(shares), 0.0, 1.0)
+    low, high = ends or (None, None)
+    return mean, low, high
 
 
 def _row(config: SweepConfig, trial: Trial) -> SweepRow:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.statics import about
 from antennate.experiments.touch import run as touch
 from antennate.experiments.touch.config import TouchConfig
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import Measure, Table, shown
+from antennate.studies.measures import Measure, Table, few, shown
 
 _95 = "  95 %"
 F1 = Measure("f1", "F1")
@@ -64,6 +65,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             f"{result['trials']} trials of every wall and speed, {result['invalid']} traverses "
             "invalid. Intervals are 95 %: of counts per\nmetre those of chance counts, of all else "
             "over trials. Latencies are medians.",
+            about(profiles),
         ),
         _grid("F1 by speed [m/s]", result["by_speed"], "speed_m_s", "g", profiles),
         _grid("F1 by wall", result["by_wall"], "wall", "", profiles),
@@ -93,13 +95,11 @@ def _grid(
 def sentence(result: Mapping[str, Any]) -> str:
     """How well contact is sensed by each profile."""
     found = ", ".join(
-        f"{name} {shown(row['f1'])} ({shown(row['f1_95'])})"
+        f"{name} {shown(row['f1'])}" + (f" ({shown(row['f1_95'])})" if row["f1_95"] else "")
         for name, row in result["profiles"].items()
     )
-    return (
-        f"Contact is sensed with an F1 of {found}, 1 being without error; 95 % intervals over "
-        f"{result['trials']} trials."
-    )
+    over = few([result["trials"]]) or f"Intervals are 95 %, over {result['trials']} trials."
+    return f"Contact is sensed with an F1 of {found}, 1 being without error. {over}"
 
 
 CAPTIONS = {

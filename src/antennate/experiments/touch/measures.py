@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.touch.sensing import Comparison
-from antennate.jackknife import jackknife95, median95
+from antennate.jackknife import ENOUGH, jackknife95, median95
 from antennate.studies import statistics
 from antennate.types import Floats, Ints
 
@@ -131,7 +131,9 @@ class Pool:
         return {
             "n": len(values),
             "median_ms": float(np.median(values)) * self._tick_ms,
-            "median_95_ms": _within(median95(np.float64(self._tick_ms) * values, trials)),
+            "median_95_ms": _within(median95(np.float64(self._tick_ms) * values, trials), least=0.0)
+            if len(np.unique(trials)) >= ENOUGH
+            else None,
             "p90_ms": float(np.percentile(values, 90)) * self._tick_ms,
             "median_mm": float(np.median(way)),
         }
@@ -168,10 +170,11 @@ def _interval(value: float, left: Floats, least: float, most: float) -> tuple[fl
         most: Where it ends above.
 
     Returns:
-        None with fewer than two trials, or when it does not matter which one is left out: that
+        None with fewer than `ENOUGH` trials, or when it does not matter which one is left out: that
         tells nothing of the next.
     """
-    return _within(jackknife95(value, left[np.isfinite(left)]), least, most)
+    left = left[np.isfinite(left)]
+    return _within(jackknife95(value, left), least, most) if len(left) >= ENOUGH else None
 
 
 def _within(

@@ -10,7 +10,7 @@ from antennate.experiments.tracks.config import TracksConfig
 from antennate.experiments.tracks.measures import SHAPES
 from antennate.experiments.tracks.walls import MOST_BEYOND
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Table, shown
+from antennate.studies.measures import NONE, Table, few, shown
 
 HANDLED = {
     "unsorted": "rows after one of a later frame, sorted",
@@ -69,7 +69,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             *((f"frames {name}", [str(found[name])]) for name in ("contact", "free", "unknown")),
             ("animals", [str(result["animals"])]),
             ("animals known in too few frames, left out", [str(result["skipped"])]),
-            *((text, [str(result["handled"][name])]) for name, text in HANDLED.items()),
+            *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
         ],
     )
     return shapes, varied, counts
@@ -97,12 +97,13 @@ def sentence(result: Mapping[str, Any]) -> str:
         if correct is None
         else f" Of frames with {drawn} shapes {100 * correct:.1f} % are classified correctly."
     )
-    single = " One trial alone gives no interval." * (result["trials_in_contact"] == 1)
+    so_few = few([result["trials_in_contact"]])
     where = "With no wall given" if _free_air(result) else "In contact"
     return (
         f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
-        f"{100 * most['change']:.1f} points.{right}{single}{_beyond(result)}{_unseen(result)}"
+        f"{100 * most['change']:.1f} points.{right}{_beyond(result)}{_unseen(result)}"
+        f"{so_few and f' {so_few}'}"
     )
 
 

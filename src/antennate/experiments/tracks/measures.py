@@ -117,14 +117,15 @@ def by_trial(criteria: CriteriaParams, antennae: Sequence[Seen]) -> Floats:
 def over_trials(criteria: CriteriaParams, antennae: Sequence[Seen]) -> dict[str, Any]:
     """Mean share of each shape over trials, with its 95 % interval (Student's t).
 
-    It may reach below 0 or beyond 1. It is None with fewer than two trials, as one says nothing
-    about the next. With two points along the antenna straight cannot be seen: its share is None.
+    A share lies between 0 and 1, and so does its interval. It is None with fewer than `ENOUGH`
+    trials, as so few say little about the next. With two points along the antenna straight cannot
+    be seen: its share is None.
     """
     table = by_trial(criteria, antennae)
     found = {}
     for name, column in zip(SHAPES, table.T, strict=True):
-        mean, low, high = mean95(column)
-        found[name] = {"share": mean, "share_95": (low, high) if len(table) > 1 else None}
+        mean, ends = mean95(column, 0.0, 1.0)
+        found[name] = {"share": mean, "share_95": ends}
     if antennae and antennae[0].points.shape[1] == 2:
         found[Shape.STRAIGHT.name.lower()] = {"share": None, "share_95": None}
     return found

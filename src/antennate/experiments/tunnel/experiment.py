@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
+from antennate.control.registry import about, compared
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.experiments.tunnel.batch import BATCH
@@ -13,8 +14,10 @@ from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
-from antennate.studies.measures import Table, successes
+from antennate.studies.measures import Table, few, shown, successes
 from antennate.telemetry.parts import log_name
+
+_STUDENT = "Intervals of means are Student's, cut at 0 and the limit."
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -30,7 +33,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         measures.CONTROLLER,
         f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s.\nInvalid trials do not count in the rows below "
-        "`invalid`. Intervals of means are Student's.",
+        f"`invalid`. {few(_valid(result)) or _STUDENT}",
+        about(controllers),
     )
     two_by_two = Table.of(
         "Pairs, trial by trial",
@@ -52,18 +56,43 @@ def sentence(result: Mapping[str, Any]) -> str:
     found = successes(
         {short[n]: row for n, row in result["controllers"].items() if n not in none_valid}
     )
-    test = ""
-    for first, second in combinations(result["controllers"], 2):
-        if pair := result["paired"].get(f"{first}-{second}"):
-            test = f"; {short[first]} against {short[second]}: McNemar p {pair['mcnemar_p']:.2g}"
+    so_few = few(_valid(result))
+    test = "" if so_few else _against_rival(result, short)
     invalid = sum(row["invalid"] for row in result["controllers"].values())
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
     scene = result["scene"]
     what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
     text = f"{what} (95 % interval): {found}{test}." if found else ""
+    text += f" {so_few}" if found and so_few else ""
     for name, reason in none_valid.items():
         text += f" No trial of {name} is valid: {reason}."
     return f"{text}{why}".strip()
+
+
+def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:
+    """The last controller against its rival, on the trials that are valid in both."""
+    names = compared(list(result["controllers"]))
+    if names is None:
+        return ""
+    first, rival = names
+    for key in (f"{rival}-{first}", f"{first}-{rival}"):
+        pair = result["paired"].get(key)
+        if pair is None or pair["time_difference_95"] is None:
+            continue
+        later = pair["time_difference_s"]  # the first of the pair less the second
+        ends = sorted(end if later > 0 else -end for end in pair["time_difference_95"])
+        less = (later > 0) == key.startswith(f"{rival}-")
+        return (
+            f"; {short[first]} against {short[rival]}: McNemar p {pair['mcnemar_p']:.2g}, "
+            f"restricted mean time {abs(later):.1f} s {'less' if less else 'more'} "
+            f"({shown(ends, '.1f')})"
+        )
+    return ""
+
+
+def _valid(result: Mapping[str, Any]) -> list[int]:
+    """Valid trials of each controller."""
+    return [row["trials"] - row["invalid"] for row in result["controllers"].values()]
 
 
 def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:

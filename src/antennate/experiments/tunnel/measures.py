@@ -23,7 +23,7 @@ SHARES = {
 
 
 def _share(label: str, name: str) -> Measure:
-    return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0)
+    return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0, least=0.0, most=1.0)
 
 
 CONTROLLER = (
@@ -38,13 +38,16 @@ CONTROLLER = (
     Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),
     Measure("restricted_mean_time_s", "restricted mean time", "s", form=".1f"),
     Measure("restricted_mean_time_95", "  95 %", "s", form=".1f"),
-    Measure("stuck", "stuck episodes", of=total, form="d"),
-    Measure("recovered", "  recovered", of=total, form="d"),
+    Measure("stuck", "stuck episodes", of=total, form="d", least=0.0),
+    Measure("recovered", "  recovered", of=total, form="d", least=0.0),
     *(_share(label, name) for name, label in SHARES.items()),
-    Measure("force_mean_n", "contact force, mean", "N", of=mean),
-    Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f"),
+    Measure("force_mean_n", "contact force, mean", "N", of=mean, least=0.0),
+    Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
 )
-COLUMNS = (*CONTROLLER, Measure("time_s", "time, a failure as the limit", "s", form=".1f"))
+TIME = Measure(
+    *("time_s", "time, a failure as the limit", "s"), form=".1f", least=0.0, most="time_limit"
+)
+COLUMNS = (*CONTROLLER, TIME)
 PAIR = (
     Measure("trials", "valid in both", form="d"),
     Measure("only_first", "only the first", form="d"),
@@ -58,12 +61,15 @@ PAIR = (
 )
 
 
-def summary(rows: Sequence[TrialResult]) -> dict[str, Any]:
-    """One controller in numbers; invalid trials are counted and left out of all others."""
+def summary(rows: Sequence[TrialResult], limit: float) -> dict[str, Any]:
+    """One controller in numbers; invalid trials are counted and left out of all others.
+
+    The restricted mean time lies between 0 and the time limit [s], and so does its interval.
+    """
     valid = [row for row in rows if row.outcome != "invalid"]
     won = [row for row in valid if row.outcome == "success"]
     times = np.array([row.time_s for row in valid])
-    restricted, low, high = statistics.mean95(times)
+    restricted, ends = statistics.mean95(times, 0.0, limit)
     progress = sum(row.progress_m for row in valid)
     return {
         "trials": len(rows),
@@ -71,17 +77,17 @@ def summary(rows: Sequence[TrialResult]) -> dict[str, Any]:
         "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
         **summarise(CONTROLLER, valid),
         "success_share": len(won) / len(valid) if valid else None,
-        "wilson95": statistics.wilson95(len(won), len(valid)),
+        "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
         "speed_m_s": float(np.mean([r.progress_m / r.time_s for r in won])) if won else None,
         "time_over_successes_s": mean("time_s", won),
         "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
         "restricted_mean_time_s": restricted if valid else None,
-        "restricted_mean_time_95": (low, high) if len(valid) > 1 else None,
+        "restricted_mean_time_95": ends,
     }
 
 
-def paired(by_controller: Mapping[str, Sequence[TrialResult]]) -> dict[str, Any]:
-    """Every two controllers on the trials that are valid in both."""
+def paired(by_controller: Mapping[str, Sequence[TrialResult]], limit: float) -> dict[str, Any]:
+    """Every two controllers on the trials that are valid in both, with the time limit [s]."""
     tests = {}
     for first, second in combinations(by_controller, 2):
         ours, theirs = (
@@ -95,6 +101,7 @@ def paired(by_controller: Mapping[str, Sequence[TrialResult]]) -> dict[str, Any]
                 np.array([theirs[k].outcome == "success" for k in both]),
                 np.array([ours[k].time_s for k in both]),
                 np.array([theirs[k].time_s for k in both]),
+                limit,
             )
             tests[f"{first}-{second}"] = {"trials": len(both), **asdict(test)}
     return tests

@@ -51,8 +51,10 @@ class TunnelOutcome:
             "time_limit_s": config.time_limit,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
-            "controllers": {n: measures.summary(rows) for n, rows in by_name.items()},
-            "paired": measures.paired(by_name),
+            "controllers": {
+                name: measures.summary(rows, config.time_limit) for name, rows in by_name.items()
+            },
+            "paired": measures.paired(by_name, config.time_limit),
         }
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.statics import about
 from antennate.experiments.wall import measures
 from antennate.experiments.wall import run as wall
 from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.outcome import WallTrial
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment, Trials
-from antennate.studies.measures import Table, successes
+from antennate.studies.measures import Table, few, successes
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -23,6 +24,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"Seed {result['seed']}, gravity {result['gravity']}. `after` leaves out the first "
         f"{1e3 * result['start_m']:g} mm of travel.\nMedians over trials; invalid trials are left "
         "out of them.",
+        about(result["profiles"]),
     )
     pairs = Table.of(
         f"{wall.REFERENCE} (first) against each, trial by trial",
@@ -35,7 +37,10 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """Which profiles passed, how sure it is, and what it depends on."""
-    return f"Walls passed (95 % interval): {successes(result['profiles'])}. {_border(result)}"
+    profiles = result["profiles"]
+    so_few = few(row["trials"] - row["invalid"] for row in profiles.values())
+    text = f"Walls passed (95 % interval): {successes(profiles)}. {_border(result)}"
+    return f"{text} {so_few}".strip()
 
 
 def _border(result: Mapping[str, Any]) -> str:

@@ -59,9 +59,9 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
             panel.bar(places, shares, 0.6, floor, color=colour, label=outcome)
         floor += shares
     for place, profile in zip(places, profiles.values(), strict=True):
-        low, high = profile["wilson95"]
-        if profile["trials"] >= style.ENOUGH_TRIALS:
-            panel.plot([place, place], [low, high], color=style.INK, linewidth=1.4)
+        ends = profile["wilson95"]
+        if ends and profile["trials"] >= style.ENOUGH_TRIALS:
+            panel.plot([place, place], ends, color=style.INK, linewidth=1.4)
     labels = [
         f"{name.replace('_', chr(10))}\nn = {profile['trials']}"
         for name, profile in profiles.items()

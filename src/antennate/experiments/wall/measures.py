@@ -60,7 +60,7 @@ def summary(rows: Sequence[WallTrial]) -> dict[str, Any]:
 def _counts(outcomes: Sequence[str]) -> dict[str, Any]:
     counts = {name: outcomes.count(outcome) for name, outcome in _COUNTS.items()}
     valid = len(outcomes) - counts["invalid"]
-    wilson = statistics.wilson95(counts["successes"], valid)
+    wilson = statistics.wilson95(counts["successes"], valid) if valid else None
     return {"trials": len(outcomes), **counts, "wilson95": wilson}
 
 

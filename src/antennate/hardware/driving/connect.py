@@ -179,8 +179,8 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
             "swapped"
         )
         more = f"`{typed('doctor')}` tells more, slow adapters too"
-        echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
         cure = more if error.cure else f"{check}; {more}"
+        echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
         raise BringUpError(f"--bus: {error}{echo}", cure) from None
     rules = settings.settings(robot)
     known = {

@@ -26,7 +26,7 @@ _LARGEST = 1 << 30
 """Bytes of a recording that is read: four days at 100 Hz."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Esp32Recording:
     """Samples of both antennae in the order in which each boot of the board took them.
 
@@ -53,6 +53,14 @@ class Esp32Recording:
     counters: Counters
     unknown_boot: int
     unordered: int
+
+    def __repr__(self) -> str:
+        """It in one line."""
+        boots, seconds = len(self.hellos), float(self.t.max())
+        return (
+            f"<Esp32Recording of {len(self.t)} samples, {seconds:.2f} s, boots: {boots}, "
+            f"lost: {self.lost}>"
+        )
 
     @property
     def lost(self) -> int:

@@ -1,0 +1,216 @@
+"""What who runs this for the first time sees: what was compared, with whom, and how sure it is."""
+
+from __future__ import annotations
+
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from antennate import experiments
+from antennate.cli import main
+from antennate.control.registry import BUILT_IN, RIVAL, compared
+from antennate.experiments.study import measures as study_measures
+from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.experiments.wall.config import WallConfig
+from antennate.experiments.wall.outcome import WallTrial
+from antennate.experiments.wall.run import WallOutcome
+
+TUNNEL, WALL = experiments.load("tunnel"), experiments.load("wall")
+FEW = "Fewer than 5 trials decide nothing; their means have no interval."
+T_4 = 2.776  # Student's 97.5 % quantile of four degrees of freedom, as printed
+
+
+def row(controller: str, trial: int, time: float | None, outcome: str = "success") -> TrialResult:
+    ended = outcome if time is not None else "timeout"
+    return TrialResult(0, trial, controller, ended, time or 100.0, 1.0, *[0] * 9)  # pyright: ignore[reportArgumentType]
+
+
+def result(**times: list[float | None]) -> dict[str, Any]:
+    """The result of a run in which controllers took so long; None is out of time at 100 s."""
+    rows = [row(name, k, t) for name, every in times.items() for k, t in enumerate(every)]
+    most = max(map(len, times.values()))
+    config = TunnelConfig(controllers=tuple(times), trials=max(1, most))
+    return TunnelOutcome(config, rows, {}, interrupted=False).result()
+
+
+def test_the_headline_compares_with_the_rival_alone() -> None:
+    """Five pairs that differ by 30, 40, 50, 60, 70 s: 50 s, and the interval of their mean."""
+    found = result(
+        open=[40.0, 50.0, 60.0, 70.0, 80.0], paper=[30.0] * 5, closed=[10.0, 10.0, 10.0, 10.0, 10.0]
+    )
+    half = T_4 * math.sqrt(250 / 5)
+    text = TUNNEL.sentence(found)
+    ends = f"{50 - half:.1f} to {50 + half:.1f}"
+    assert text.endswith(
+        f"; closed against open: McNemar p 1, restricted mean time 50.0 s less ({ends})."
+    )
+    assert text.count("against") == 1
+    turned = TUNNEL.sentence(result(closed=[10.0] * 5, open=[40.0, 50.0, 60.0, 70.0, 80.0]))
+    assert turned.endswith(f"restricted mean time 50.0 s less ({ends}).")
+    slower = TUNNEL.sentence(result(open=[10.0] * 5, closed=[40.0, 50.0, 60.0, 70.0, 80.0]))
+    assert slower.endswith(f"restricted mean time 50.0 s more ({ends}).")
+
+
+def test_the_rival_is_one_named_controller() -> None:
+    assert RIVAL in BUILT_IN
+    assert compared(["paper", RIVAL, "closed", "mine.py:Mine"]) == ("mine.py:Mine", RIVAL)
+    assert compared(["closed", RIVAL]) == ("closed", RIVAL)
+    assert compared(["paper", "closed"]) == ("closed", "paper")
+    assert compared(["closed"]) is None
+
+
+@pytest.mark.parametrize("trials", [1, 2, 3, 4])
+def test_few_trials_have_no_interval_of_a_mean_and_one_sentence(trials: int) -> None:
+    """Student's of two trials of 28 and 60 s would reach from -159 to 247 s."""
+    times: list[float | None] = [28.0, 60.0, 35.0, None]
+    found = result(open=times[:trials], closed=times[:trials][::-1])
+    assert found["controllers"]["open"]["restricted_mean_time_95"] is None
+    assert found["paired"]["open-closed"]["time_difference_95"] is None
+    text = TUNNEL.sentence(found)
+    assert text.endswith(f". {FEW}")
+    assert text.count("decide nothing") == 1
+    assert "McNemar" not in text
+    table = TUNNEL.tables(found)[0]
+    assert FEW in table.note
+    cells = dict(table.rows)
+    assert cells["  95 % [s]"] == ["-", "-"]
+
+
+def test_intervals_keep_to_the_time_that_there_is() -> None:
+    found = result(open=[None, None, None, None, 5.0], closed=[1.0, 1.0, 1.0, 1.0, 90.0])
+    low, high = found["controllers"]["open"]["restricted_mean_time_95"]
+    assert (0.0 < low < 81.0, high) == (True, 100.0)
+    low, high = found["controllers"]["closed"]["restricted_mean_time_95"]
+    assert (low, 18.8 < high < 100.0) == (0.0, True)
+    low, high = found["paired"]["open-closed"]["time_difference_95"]
+    assert -100.0 <= low < 62.2 < high == 100.0
+
+
+def test_a_study_knows_the_bounds_of_what_it_compares() -> None:
+    """The same times, 81 s on average and up to 100 s: at their limit the interval ends."""
+    for config, point in (
+        (StudyConfig(settings={"time_limit": 100.0}), {"tunnel.strewn": 0}),
+        (StudyConfig(), {"time_limit": 100.0}),
+    ):
+        config = config.model_copy(update={"response": "time_s"})
+        rows = [
+            {"point": 0, "controller": "open", "trial": k, "status": "ok", "time_s": time}
+            for k, time in enumerate([100.0, 100.0, 100.0, 100.0, 5.0])
+        ]
+        found = study_measures.summary(config, [point], {}, "controller", rows)
+        low, high = found["points"][0]["response95"]
+        assert pytest.approx((low, high), abs=0.02) == (81.0 - T_4 * 19.0, 100.0)
+        few = study_measures.summary(config, [point], {}, "controller", rows[:4])
+        assert few["points"][0]["response95"] is None
+
+
+def test_nothing_of_nothing_is_never_said() -> None:
+    rows = [row("closed", 0, 20.0)]
+    config = TunnelConfig(controllers=("open", "closed"), trials=3)
+    found = TunnelOutcome(config, rows, {}, interrupted=True).result()
+    texts = [TUNNEL.sentence(found), repr(TUNNEL.tables(found))]
+    lost = [row("open", k, 1.0, "invalid") for k in range(3)]
+    found = TunnelOutcome(config, [*lost, *rows], {}, interrupted=False).result()
+    texts += [TUNNEL.sentence(found), repr(TUNNEL.tables(found))]
+    wall = WallTrial(0, 0, "stiff", "invalid", "invalid", *[0.0] * 8, "time stood still")
+    walls = WallOutcome(WallConfig(profiles=("stiff",), trials=1), [wall], {}).result()
+    texts += [WALL.sentence(walls), repr(WALL.tables(walls))]
+    for text in texts:
+        assert "0 of 0" not in text
+        assert "0 to 100" not in text
+    assert "open without a valid trial" in texts[0]
+
+
+ABOUT = [
+    "open: walks forward whatever its antennae feel",
+    "paper: turns away from the side that touches",
+    "closed: walks on until its readings repeat",
+]
+
+
+class Order(HTMLParser):
+    """The order of pictures, tables and texts of a page."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.seen: list[str] = []
+        self.text = ""
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("img", "table", "h2"):
+            self.seen.append(tag)
+            self.text += f"<{tag}>"
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_three_lines_say_what_the_controllers_are_and_the_report_begins_with_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the terminal above the table, in the report above it and behind the picture."""
+    monkeypatch.chdir(tmp_path)
+    words = ["--trials", "1", "--time-limit", "0.5", "--scene", "flat", "--workers", "1"]
+    assert main(["tunnel", *words, "--out", "one"]) == 0
+    printed = capsys.readouterr().out
+    page = Order(Path("one/report.html"))
+    assert page.seen[0] == "img"
+    for text in (printed, page.text):
+        places = [text.index(line) for line in ABOUT]
+        assert places == sorted(places)
+        assert places[-1] < text.index("Controllers")
+        assert FEW in text
+    assert page.text.index("<img>") < page.text.index(ABOUT[0]) < page.text.index("<table>")
+    alts = re.findall('<img alt="([^"]*)"', Path("one/report.html").read_text())
+    assert alts == list(TUNNEL.captions.values())
+    assert main(["report", "--compare", "one", "one"]) == 0
+    both = Order(Path("comparison.html")).text
+    assert all(both.count(line) == 1 for line in ABOUT)
+    assert both.index(ABOUT[2]) < both.index("Controllers")
+
+
+def test_a_study_of_controllers_tells_what_moves_the_last_against_the_rival() -> None:
+    """Of three controllers the effects on `closed minus open` are the headline, not the last."""
+    study = experiments.load("study")
+    names = ["open", "paper", "closed", "paper minus open", "closed minus open"]
+    effects = [
+        {
+            "of": of,
+            "parameter": name,
+            "mu_star": size,
+            "mu_star95": None,
+            "noise": 0.1,
+            "above_noise": size > 0.1,
+            "mu": size,
+            "sigma": None,
+        }
+        for of in [*names, "closed minus paper"]
+        for name, size in (
+            ("width", 0.9 if of == "closed minus open" else 0.0),
+            ("length", 0.5 if of == "closed minus paper" else 0.0),
+        )
+    ]
+    point = {"point": 0, "condition": "open", "trials": 9, "invalid": 0, "response": 0.5}
+    found = {
+        "experiment": "tunnel",
+        "plan": "morris",
+        "response": "success_share",
+        "axes": ["width", "length"],
+        "points": [point],
+        "trials": 9,
+        "ended": 9,
+        "interrupted": False,
+        "statuses": {"ok": 9},
+        "conditions": {},
+        "effects": effects,
+    }
+    assert "closed minus open depends on width" in study.sentence(found)
+    assert [line for line, _ in study.tables(found)[0].rows][1:] == ["width", "length"]
