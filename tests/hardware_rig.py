@@ -136,6 +136,7 @@ class Rig:
                         "age": age,
                         "valid": fresh,
                         "findings": tuple(film.reading.finding for film in self.films),
+                        "noise": tuple(film.noise_text for film in self.films),
                         "failure": failure,
                     }
                     | known

@@ -65,19 +65,25 @@ def test_S14_a_hum_is_named_with_size_and_frequency(
 
     Mains at half the rate give readings that alternate by amplitude times the sine of the phase.
     """
-    channel = told(
-        np.concatenate(
-            [
-                np.rint(np.full(50, FREE)) + np.arange(50) % 4,
-                hum(amplitude, frequency, 40, phase=np.pi / 2 if frequency % 50 == 0 else 1.0),
-            ]
-        )
-    )
+    before = hum(0.0, frequency, 50)
+    phase = np.pi / 2 if frequency % 50 == 0 else 1.0
+    channel = told(np.concatenate([before, hum(amplitude, frequency, 40, phase)]))
     assert channel.reading.finding is Finding.NOISE
     assert np.isnan(channel.reading.counts)
     assert words in channel.noise_text
     size = float(channel.noise_text.split()[0].removeprefix("±"))
     assert size == pytest.approx(amplitude, rel=0.1)
+
+
+def test_S14_skipped_readings_do_not_change_the_frequency() -> None:
+    """A busy host takes the newest reading alone: one of ten or so is never seen."""
+    readings = hum(400.0, 50.0, 300, np.pi / 2)
+    channel = ChannelDiagnosis(BAND)
+    for n in np.flatnonzero(np.arange(300) % 13 != 0).tolist():
+        channel.step(n * PERIOD, float(readings[n]))
+        if n > 30 and channel.reading.finding is Finding.NOISE:
+            assert channel.noise_text.endswith("at 50 Hz or an alias of it")
+    assert channel.counted[Finding.NOISE] > 240
 
 
 def test_S14_noise_of_no_frequency_is_no_open_wire() -> None:

@@ -141,8 +141,10 @@ def _antenna(
     for reading, value in zip(board.readings, counts, strict=True):
         seen.append(channel.step(1e-6 * reading.elapsed_us, value).finding)
         noise = channel.noise_text or noise
-    shown = _usual(seen)
-    middle = float(np.median(counts))
+    shown, middle = _usual(seen), float(np.median(counts))
+    low, high = _limits(_curve(config, name))
+    if shown is diagnosis.Finding.OUT_OF_CAL and low <= middle <= high:
+        shown = diagnosis.Finding.OK  # noise reaches beyond, which has a row of its own
     told = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
     signal = Finding(
         f"{told} ({middle:.0f} counts)",
@@ -176,7 +178,8 @@ def _noise(
 ) -> tuple[Finding, str, str]:
     """How noisy the readings are, also beside those of the calibration."""
     good = config.doctor
-    before = good.calibrated_noise if name == "left" else good.calibrated_noise_right
+    before, right = good.calibrated_noise, good.calibrated_noise_right
+    before = right if name == "right" and right is not None else before
     noise, usual = float(np.std(counts)), usual_noise(counts)
     usually = max(before or 0.0, 1.0)
     louder = noise > good.noise_ratio * usually
@@ -200,9 +203,14 @@ def _curve(config: DoctorConfig, name: str) -> CurveParams:
     return right if right is not None and name == "right" else both
 
 
+def _limits(curve: CurveParams) -> tuple[float, float]:
+    """Readings that are within the calibrated range [counts]."""
+    return curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
+
+
 def _at_rest(config: DoctorConfig, name: str, counts: float) -> tuple[Finding, str, str]:
     curve, threshold = _curve(config, name), config.control.rule.threshold
-    low, high = curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
+    low, high = _limits(curve)
     level = float(bending_level(curve, np.array(counts)))
     finding = Finding(
         f"{counts:.0f} counts, b = {level:.2f}",

@@ -15,6 +15,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
+from statistics import median
 
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
@@ -227,7 +229,8 @@ class ChannelDiagnosis:
         """Size and frequency of the noise of a channel that is NOISE, empty for others."""
         if self.reading.finding is not Finding.NOISE:
             return ""
-        return self.noise.text((WINDOW - 1) / (self._times[-1] - self._times[0]))
+        usual = median(after - before for before, after in pairwise(self._times))
+        return self.noise.text(1.0 / usual)  # though some readings were skipped
 
     def _count_near(self, counts: float) -> None:
         """Count readings in a row that lie within two counts."""

@@ -18,8 +18,9 @@ _REST = 0.01
 """Share of the energy that a hum leaves; white noise leaves less once in 30,000 (computed)."""
 _SLOWEST = 0.25
 """Slowest hum [samples^-1]: 25 Hz at 100 Hz. Antennae ring at 2.4 Hz and bend fully in 30 ms."""
-_SAME = 0.01
-"""Frequencies nearer than this to half the rate are written as one [samples^-1]."""
+_SAME = 0.025
+"""Frequencies nearer than this to half the rate are written as one [samples^-1]; ten readings, some
+from before the hum, tell no finer."""
 _WINDOW = 10
 """Readings of a window."""
 
