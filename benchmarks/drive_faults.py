@@ -208,6 +208,18 @@ def without_log(found: dict[str, Any]) -> bool:
     return walks_on(found | {"code": 0}) and (found["code"], found["log_cut"]) == (2, True)
 
 
+def holds(*words: str) -> Check:
+    """It holds to the end of its time, torque off confirmed, and the cause is told so."""
+    return lambda f: (
+        walks_on(f) and f["worst_state"] == "HOLD" and all(word in f["why"] for word in words)
+    )
+
+
+def echoes(found: dict[str, Any]) -> bool:
+    """It walks on, and says that requests came back."""
+    return walks_on(found) and found["echoes"] > 0
+
+
 TIME = "the end of its time"
 WALKS_OR_FAULT = "walks on, or FAULT, torque off confirmed or servos named"
 ALL = tuple(range(1, 20))
@@ -242,6 +254,10 @@ CASES: dict[str, tuple[Act, Check, str]] = {
     "BER 1e-3": (fault("wire=ber:1e-3"), told, WALKS_OR_FAULT),
     "BER 1e-2": (fault("wire=ber:1e-2"), told, WALKS_OR_FAULT),
     "supply sags 1 V/s": (fault("bus=discharge:1"), faults, "OFF or FAULT, torque off confirmed"),
+    "hum 400": (fault("esp32=hum:400"), holds("NOISE", "50 Hz or an alias"), "HOLD, NOISE, 50 Hz"),
+    "stuck +-1": (fault("esp32=stuck_left"), holds("STUCK", "left"), "HOLD, STUCK, left"),
+    "sticky codes": (fault("esp32=sticky"), walks_on, "walks on"),
+    "echo": (fault("bus=echo"), echoes, "walks on, the echo is named"),
     "SIGINT": (send("SIGINT"), ends, "torque off confirmed"),
     "SIGTERM": (send("SIGTERM"), ends, "torque off confirmed"),
     "SIGQUIT": (send("SIGQUIT"), ends, "torque off confirmed"),

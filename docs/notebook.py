@@ -4,11 +4,9 @@ It needs packages of its own: `uv run --with nbclient --with ipykernel python do
 What tells of the machine or of the time is left out.
 """
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-import nbformat
-from nbclient import NotebookClient
 
 NOTEBOOK = Path(__file__).parents[1] / "examples" / "first_look.ipynb"
 METADATA = {
@@ -19,8 +17,10 @@ METADATA = {
 
 def main() -> None:
     """Run it in an empty place, and write it back."""
+    nbformat: Any = import_module("nbformat")
+    nbclient: Any = import_module("nbclient")
     notebook: Any = nbformat.read(NOTEBOOK, as_version=4)
-    NotebookClient(notebook, timeout=600, record_timing=False).execute()
+    nbclient.NotebookClient(notebook, timeout=600, record_timing=False).execute()
     notebook.metadata = METADATA
     for number, cell in enumerate(notebook.cells):
         cell.metadata, cell.id = {}, f"cell-{number}"

@@ -18,6 +18,7 @@ import test_esp32_clock as test_clock
 import test_esp32_decoder as test_decoder
 import test_esp32_frame as test_frame
 import test_maneuver
+import test_noise
 import test_touch_check
 from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
@@ -183,9 +184,20 @@ FILMS = [
     ),
     Guard(
         "stuck reading",
-        put(diagnosis, "STUCK", 10**6),
+        together(put(diagnosis, "STUCK", 10**6), put(diagnosis, "NEARLY_STUCK", 10**6)),
         test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
         by=(ValueError,),
+    ),
+    Guard(
+        "reading stuck but for its last bit",
+        put(diagnosis, "NEARLY_STUCK", 10**6),
+        test_noise.test_S4_a_converter_whose_last_bit_toggles_is_stuck_after_150,
+        by=(ValueError,),
+    ),
+    Guard(
+        "hum",
+        put(diagnosis, "HIDDEN", 10.0),
+        partial(test_noise.test_S14_a_hum_is_named_with_size_and_frequency, 120.0, 50.0, "50 Hz"),
     ),
     Guard(
         "isolated spikes",

@@ -30,6 +30,7 @@ def healthy(now: float, **changes: Any) -> Inputs:
         "valid": 1,
         "refused": 0,
         "findings": (Finding.OK, Finding.OK),
+        "noise": ("", ""),
         "decided_at": now,
         "maneuver": Maneuver.FORWARD,
         "contact": (Contact.FREE, Contact.FREE),
@@ -135,6 +136,7 @@ class Rig:
                         "age": age,
                         "valid": fresh,
                         "findings": tuple(film.reading.finding for film in self.films),
+                        "noise": tuple(film.noise_text for film in self.films),
                         "failure": failure,
                     }
                     | known

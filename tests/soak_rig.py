@@ -188,6 +188,7 @@ class Soak:
                 valid=self._body.used,
                 refused=refused,
                 findings=(self._films[0].reading.finding, self._films[1].reading.finding),
+                noise=(self._films[0].noise_text, self._films[1].noise_text),
                 contact=(contact[0], contact[1]),
                 resets=clock.resets,
                 missed={7: self._missed} if self._missed else {},

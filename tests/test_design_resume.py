@@ -15,6 +15,7 @@ from design_plans import HERE, design, plan, refusal, result, same, table, words
 
 from antennate import experiments
 from antennate.cli import main
+from antennate.studies.run_files import add_to_list
 from antennate.studies.store import STORE
 
 
@@ -42,6 +43,7 @@ def test_a_search_cut_anywhere_goes_on_to_the_same_bytes(
     for cut in (1, 5, 20, 41, len(lines) - 1):
         shutil.rmtree("run", ignore_errors=True)
         Path("run").mkdir()
+        add_to_list(Path("run"), [STORE])
         Path("run", STORE).write_bytes(b"".join(lines[:cut]) + lines[cut][:30])
         notes = tmp_path / f"notes{cut}"
         with monkeypatch.context() as patch:

@@ -107,14 +107,14 @@ def test_S7_only_what_is_free_and_fit_counts() -> None:
     quality = SignalQuality(ConditioningParams())
     drifted = BAND.high - 0.2 * SPAN
     for n in range(5000):
-        spiky = 4000.0 if n % 10 in (0, 3, 6) else drifted
+        spiky = 4000.0 if n % 10 in (0, 3, 5) else drifted
         seen = (Contact.CONTACT, Contact.FREE)
-        quality.step(PERIOD * n, (drifted + n % 2, spiky + n % 2), seen)
+        quality.step(PERIOD * n, (drifted + n % 5 - 2, spiky + n % 5 - 2), seen)
     assert quality.findings == (Finding.OK, Finding.SPIKY)
     assert [abs(drift.share) < 0.02 for drift in quality.drifts] == [True, True]
     for n in range(5000, 15000):
         free = (Contact.FREE, Contact.FREE)
-        quality.step(PERIOD * n, (drifted + n % 2, BAND.high + n % 2), free)
+        quality.step(PERIOD * n, (drifted + n % 5 - 2, BAND.high + n % 5 - 2), free)
     assert quality.drifted.startswith("left by +2")
     assert "drift=+20,+0%" in quality.status or "drift=+20,-0%" in quality.status
 

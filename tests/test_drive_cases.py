@@ -91,6 +91,17 @@ def test_L1_wrong_bits_on_both_wires(cases: Any, case: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("case", ["hum 400", "stuck +-1", "sticky codes"])
+def test_S4_S14_noise_and_stuck_readings_hold_and_are_named(cases: Any, case: str) -> None:
+    as_documented(cases, case)
+
+
+@pytest.mark.slow
+def test_B25_the_echo_of_an_adapter_is_dropped_and_named(cases: Any) -> None:
+    as_documented(cases, "echo")
+
+
+@pytest.mark.slow
 def test_B13_a_supply_that_sags(cases: Any) -> None:
     as_documented(cases, "supply sags 1 V/s")
 

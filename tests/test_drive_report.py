@@ -257,7 +257,7 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
     last = [line for line in said.err.splitlines() if " maneuver=" in line][-1]
     assert f"OFF (NOT_ARMED: not armed yet; HOLD {cause}: " in last
     side = fault.split("_")[1]
-    asked = f"touch=(mend wire, plug or sensor of the {side} antenna, it is {cause}: "
+    asked = f" | mend wire, plug or sensor of the {side} antenna, it is {cause}: "
     assert (asked in last) == (not skip)
     assert len(re.findall(rf"HOLD \(?{cause}: ", out)) == 1
     assert "--no-touch-check" not in out  # it would not help

@@ -119,7 +119,7 @@ def test_nothing_of_nothing_is_never_said() -> None:
     lost = [row("open", k, 1.0, "invalid") for k in range(3)]
     found = TunnelOutcome(config, [*lost, *rows], {}, interrupted=False).result()
     texts += [TUNNEL.sentence(found), repr(TUNNEL.tables(found))]
-    wall = WallTrial(0, 0, "stiff", "invalid", "invalid", *[0.0] * 8, "time stood still")
+    wall = WallTrial(0, 0, "stiff", "invalid", "invalid", *[0.0] * 8, reason="time stood still")
     walls = WallOutcome(WallConfig(profiles=("stiff",), trials=1), [wall], {}).result()
     texts += [WALL.sentence(walls), repr(WALL.tables(walls))]
     for text in texts:

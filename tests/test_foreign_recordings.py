@@ -166,6 +166,16 @@ def test_speeds_in_another_unit_are_converted_or_asked_about(
     assert "row 1: expected speed_mm_s in m/s as declared, found mm/s" in error
 
 
+def test_measured_speeds_are_those_of_their_pushes(tmp_path: Path) -> None:
+    """A speed of its own for each reading made a row of the table for each."""
+    counts, bend, t = ramps()
+    trial = np.repeat(np.arange(4.0), 120)
+    speed = 0.05 + 0.02 * trial + np.random.default_rng(0).normal(0, 0.001, len(t))
+    columns = {"trial": trial, "time": t, "counts": counts, "bend": bend, "speed_m_s": speed}
+    found = read(Path(written(tmp_path / "a.csv", **columns)), RecordingParams())
+    assert np.unique(found.samples.speed) == pytest.approx([0.05, 0.07, 0.09, 0.11], abs=0.001)
+
+
 @pytest.mark.parametrize(("bits", "unit", "scale"), [
     (32, "us", 1e6), (30, "us", 1e6), (32, "ms", 1e3), (30, "ms", 1e3), (32, "s", 1.0),
 ])  # fmt: skip

@@ -100,8 +100,8 @@ def unlike_pushes(rng: np.random.Generator, pushes: int) -> tuple[Samples, Float
 @pytest.mark.parametrize(
     ("pushes", "sets", "least"),
     [
-        (3, 20, 34),
-        (5, 20, 34),
+        (3, 12, 20),
+        (5, 12, 20),
         pytest.param(3, 100, 182, marks=pytest.mark.slow),
         pytest.param(4, 100, 182, marks=pytest.mark.slow),
     ],

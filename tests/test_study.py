@@ -31,6 +31,7 @@ from antennate.experiments.study.run import StudyOutcome
 from antennate.studies.identity import identity
 from antennate.studies.plan import Range
 from antennate.studies.pool import Workers, gather
+from antennate.studies.run_files import add_to_list
 from antennate.studies.store import STORE, Store, line, read_store
 
 HERE = Path(__file__).parent
@@ -212,6 +213,7 @@ def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
         "Store(Path(sys.argv[1])); print('ready', flush=True); time.sleep(60)"
     )
     Path("run").mkdir()
+    add_to_list(Path("run"), [STORE])
     words = [sys.executable, "-c", code, f"run/{STORE}"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None

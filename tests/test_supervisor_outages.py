@@ -183,7 +183,10 @@ def test_L16_the_mean_covers_the_same_time_at_any_rate(rate: int) -> None:
         come = (n - begin + 1) * rate // 100 - taken
         taken += come
         rig.step(
-            [(n * PERIOD - k / rate, 1600.0 + k % 2, FREE + k % 2) for k in reversed(range(come))]
+            [
+                (n * PERIOD - k / rate, 1600.0 + 3 * (k % 2), FREE + 3 * (k % 2))
+                for k in reversed(range(come))
+            ]
         )
         settled.append(rig.control.level[0, 0])
     reached = next(n for n, b in enumerate(settled) if abs(b - settled[-1]) < 0.01)

@@ -59,4 +59,4 @@ def test_drive_asks_for_the_antennae_and_walks_once_they_were_touched(
         finally:
             twin.kill()
     for side in ("left", "right"):
-        assert f"Bend the {side} antenna towards the tail." in terminal.rows
+        assert f"Bend the {side} antenna towards the tail." in " ".join(terminal.rows)

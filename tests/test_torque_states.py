@@ -264,6 +264,6 @@ class LongRobot(Robot):
 
 
 Robot.TestCase.settings = settings(max_examples=10, stateful_step_count=8, deadline=None)
-LongRobot.TestCase.settings = settings(max_examples=200, stateful_step_count=40, deadline=None)
+LongRobot.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
 test_no_torque_without_arming_and_no_goal_without_a_decision = Robot.TestCase
-test_no_torque_without_arming_200_times = pytest.mark.slow(LongRobot.TestCase)
+test_no_torque_without_arming_60_times = pytest.mark.slow(LongRobot.TestCase)

@@ -83,7 +83,7 @@ def test_a_drive_with_a_view_beside_two_busy_programs_ends_in_no_fault(tmp_path:
     """The view may be given up; where the same drive without one fails, it says nothing."""
     pytest.importorskip("viser")
 
-    def drive(name: str, *more: str) -> tuple[int, dict, str]:
+    def drive(name: str, *more: str) -> tuple[int, str]:
         with subprocess.Popen([*ANTENNATE, "twin"], stdout=-1, stderr=-3, cwd=tmp_path) as twin:
             assert twin.stdout is not None
             ports = json.loads(twin.stdout.readline())
@@ -94,16 +94,13 @@ def test_a_drive_with_a_view_beside_two_busy_programs_ends_in_no_fault(tmp_path:
                     [*ANTENNATE, *words, *more], cwd=tmp_path, capture_output=True, text=True
                 )
             twin.terminate()
-        return (
-            done.returncode,
-            json.loads((tmp_path / name / "result.json").read_text()),
-            done.stderr,
-        )
+        return done.returncode, done.stderr
 
-    code, result, said = drive("seen", "--view", "--view-port", "0")
-    if code != 0 and drive("unseen")[0] != 0:
+    code, said = drive("seen", "--view", "--view-port", "0")
+    if "too busy" in said or (code != 0 and drive("unseen")[0] != 0):
         pytest.skip("this machine is too busy for a drive without a view, too")
     assert code == 0, said
+    result = json.loads((tmp_path / "seen" / "result.json").read_text())
     assert result["worst_state"] != "FAULT"
     assert said.count("view: given up") <= 1
     missed = result["walking"]["missed_share"]

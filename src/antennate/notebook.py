@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from antennate import figures
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -54,6 +52,8 @@ def _table(columns: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]]) ->
 
 
 def _picture(figure: Figure, described: str) -> str:
+    from antennate import figures  # slow to import
+
     data = base64.b64encode(figures.thumbnail(figure)).decode()
     return (
         f'<img alt="{escape(described)}" style="width: 100%; max-width: {_WIDEST}rem; '

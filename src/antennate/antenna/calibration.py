@@ -69,6 +69,8 @@ class Calibration(Strict):
             fewer than three pushes on unseen tenths of the recording.
         reach: How far beyond the bent end of this range readings are still those of the sensor
             [spans].
+        noise_counts: Standard deviation of single readings in the recording [counts]; None if it is
+            not known.
         better_than_sigmoid: Models that were better on these readings beyond noise: the 95 %
             interval over pushes left out lies above 0. Empty with a single push.
 
@@ -101,6 +103,7 @@ class Calibration(Strict):
     cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
     reach: float = Field(default=REACH, ge=0, le=200)
+    noise_counts: float | None = Field(default=None, ge=0, le=4095)
 
     @model_validator(mode="after")
     def _possible(self) -> Calibration:

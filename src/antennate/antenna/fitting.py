@@ -23,6 +23,7 @@ from antennate.antenna.curves import (
     polarity,
     predict,
 )
+from antennate.antenna.plateau import SHARE, plateau_of
 from antennate.antenna.rivals import MOST_GROUPS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
@@ -40,8 +41,6 @@ _FARTHEST = 10.0
 """Largest level, which is 0 to 1 but for errors."""
 _RAILS = (0.0, 4090.0)
 """Readings at or beyond these say nothing about the level [counts]."""
-_RAIL_SHARE = 0.2
-"""Share of such readings that is too much."""
 
 
 def check(samples: Samples) -> None:
@@ -57,12 +56,21 @@ def check(samples: Samples) -> None:
             f"found {len(counts)}; record longer"
         )
     railed = (counts <= _RAILS[0]) | (counts >= _RAILS[1])
-    if railed.mean() > _RAIL_SHARE:
+    if railed.mean() > SHARE:
         first = int(np.argmax(railed))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings between the rails, found "
             f"{counts[first]:g} counts and {100 * railed.mean():.0f} % of all like it (saturated); "
             "choose another divider resistor"
+        )
+    plateau = plateau_of(counts, level)
+    if plateau is not None and plateau.share > SHARE:
+        first = int(np.argmax(counts))
+        raise CalibrationError(
+            f"row {samples.row[first]}: expected readings that change with the bend, found "
+            f"{plateau.counts:g} counts and {100 * plateau.share:.0f} % of all like it, the "
+            "highest (saturated below the rail); set the attenuation of the converter, or choose "
+            "another divider resistor"
         )
     if np.ptp(level) < 0.1:
         raise CalibrationError(
@@ -104,6 +112,7 @@ def fit(
     threshold: float = 0.5,
     full_scale: bool = False,
     least_r2: float = 0.5,
+    noise_counts: float | None = None,
 ) -> Calibration:
     """Calibrate recorded samples.
 
@@ -114,6 +123,7 @@ def fit(
         threshold: Flex level that counts as contact.
         full_scale: Normalise readings by 0 to 4095 and not by the recording's extremes.
         least_r2: A fit that explains a smaller share of the variance is refused.
+        noise_counts: Noise of the readings as they came [counts], None if it is not known.
 
     Raises:
         CalibrationError: The data cannot be calibrated, or the sigmoid does not fit them.
@@ -156,6 +166,7 @@ def fit(
         cross_validated_rmse=rmse,  # pyright: ignore[reportArgumentType]
         better_than_sigmoid=_better(samples, full_scale),
         reach=_reach(low, high, sign),
+        noise_counts=noise_counts,
     )
 
 

@@ -299,6 +299,10 @@ def _note(result: Mapping[str, Any]) -> str:
     lines: list[str] = []
     if result["priority"] == Priority.ORDINARY.value:
         lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
+    if result.get("echoes"):  # results of older versions have none
+        lines.append(
+            "The adapter of the servo bus sends back what it gets (an echo); that was dropped."
+        )
     if not result["log_complete"] and result["logs"]:
         files = f"Its files: {', '.join(result['logs'])}."
         lines.append(f"The log is not complete: {_why(result)}. {files}")

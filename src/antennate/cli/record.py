@@ -6,13 +6,16 @@ import os
 import select
 import sys
 import termios
+from array import array
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import fmean, pstdev
 
+import numpy as np
 from pydantic.dataclasses import dataclass
 
+from antennate.antenna.plateau import plateau_of
 from antennate.cli.addresses import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
@@ -73,6 +76,7 @@ def command(argv: Sequence[str]) -> int:
                 where = f"are in {orders.out}" if recorder.rows else "came, so there is no file"
                 status.close()
                 sys.stderr.write(f"{recorder.rows} readings {where}, {lost} were lost{then}\n")
+                sys.stderr.writelines(status.saturated())
     return OK
 
 
@@ -119,11 +123,17 @@ class Status:
         self._waiting = False
         self._board, self._params, self._now = board, params, now
         self._shown: deque[Timed] = deque(maxlen=_SHOWN)
+        both = params.speed is None and not params.marks
+        self._codes: dict[str, array[int]] = {
+            side: array("H") for side in ("left", "right") if both or side == params.side
+        }
         self._status = StatusLine()
 
     def __call__(self, reading: Timed) -> None:
         """Take a reading; show the line if it is time."""
         self._shown.append(reading)
+        for side, codes in self._codes.items():
+            codes.append(getattr(reading.sample, side))
         if self._status.due(self._now()):
             self._status.show(self.line())
 
@@ -142,6 +152,11 @@ class Status:
     def close(self) -> None:
         """End the line."""
         self._status.close()
+
+    def saturated(self) -> list[str]:
+        """A line for each antenna whose readings stand at their highest."""
+        found = {side: plateau_of(np.array(codes, float)) for side, codes in self._codes.items()}
+        return [f"{one.text(f'the {side} readings')}\n" for side, one in found.items() if one]
 
     def line(self) -> str:
         """The line."""

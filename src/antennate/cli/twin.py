@@ -78,8 +78,9 @@ the marks of `antennate record`; fault servo:7=silent.
 Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,
 encoder, shock, overload, reboot, frozen or jump:TICKS (Present Position), or REGISTER:VALUE;
-esp32=silent, reset, open_left, short_left (or right), left:COUNTS, right:COUNTS or ber:SHARE;
-bus=silent, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
+esp32=silent, reset, open_left, short_left, stuck_left (or right), left:COUNTS, right:COUNTS,
+hum:COUNTS, drift:COUNTS_A_SECOND, plateau:COUNTS, sticky, radio_noise:COUNTS or ber:SHARE;
+bus=silent, echo, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
 wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
 
 

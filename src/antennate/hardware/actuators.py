@@ -24,12 +24,14 @@ class Tally:
         misses: Requests to one of them without a right answer.
         stale: Answers that were right but came too late, and were thrown away.
         drained: Bytes thrown away before a request.
+        echoes: Requests that the adapter gave back.
     """
 
     misses: int = 0
     stale: int = 0
     bad_crc: int = 0
     drained: int = 0
+    echoes: int = 0
 
 
 @dataclass(slots=True)

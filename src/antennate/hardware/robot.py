@@ -134,3 +134,15 @@ class DoctorConfig(RobotConfig):
         "control.conditioning.averaging_time",
     )
     doctor: DoctorParams = DoctorParams()
+
+    def calibrated(self) -> Self:
+        """The same with curve, flex sensor and noise of the calibration file, as of a robot."""
+        names = {"calibrated_noise": self.calibration}
+        names["calibrated_noise_right"] = self.calibration_right or self.calibration
+        done = super().calibrated()
+        known = {
+            name: Calibration.load(Path(file)).noise_counts
+            for name, file in names.items()
+            if file is not None and getattr(self.doctor, name) is None
+        }
+        return done.model_copy(update={"doctor": self.doctor.model_copy(update=known)})

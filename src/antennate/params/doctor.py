@@ -26,3 +26,15 @@ class DoctorParams(Params):
     """Distance from a servo's own limit at which its temperature is warned of."""
     noise: float = number(10.0, "counts", "assumed: four times a resting sensor's", gt=0, le=1000)
     """Highest standard deviation of the readings at rest."""
+    noise_ratio: float = number(
+        3.0, "1", "assumed: far beyond what chance and another day do", ge=1, le=1000
+    )
+    """Highest noise in units of that when it was calibrated."""
+    calibrated_noise: float | None = number(
+        None, "counts", "assumed: that of the calibration file", ge=0, le=4095
+    )
+    """Noise of the left antenna when it was calibrated, of both without another calibration."""
+    calibrated_noise_right: float | None = number(
+        None, "counts", "assumed: that of its calibration file", ge=0, le=4095
+    )
+    """The same of the right antenna."""

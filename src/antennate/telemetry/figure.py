@@ -17,7 +17,6 @@ from matplotlib.patches import Patch
 from antennate import figures as style
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Pair
-from antennate.telemetry.time_series import TimeSeries
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 _MOST_DRAWN = 5000
@@ -93,20 +92,19 @@ class Course:
         )
 
 
-def of_series(series: TimeSeries) -> Figure:
-    """The figure of a time series of at least one tick."""
-    kept = slice(None, None, -(-len(series) // _MOST_DRAWN))
-    threshold = series.meta.get("threshold")
+def of_arrays(
+    t: Floats, reading: Floats, level: Floats, contact: Ints, maneuver: Ints, threshold: float
+) -> Figure:
+    """The figure of one tick or more; arrays as in `Course`, of a long series some ticks."""
+    kept = slice(None, None, -(-len(t) // _MOST_DRAWN))
     return replay(
         Course(
-            t=_drawable(series.t[kept]),
-            reading=_drawable(series.counts[kept]),
-            level=_drawable(series.level[kept]),
-            contact=series.contact[kept],
-            recorded=series.maneuver[kept],
+            *(_drawable(values[kept]) for values in (t, reading, level)),
+            contact=contact[kept],
+            recorded=maneuver[kept],
             replayed=None,
-            state=[""] * len(series.t[kept]),
-            threshold=threshold if isinstance(threshold, float) else math.nan,
+            state=[""] * len(t[kept]),
+            threshold=threshold,
         )
     )
 

@@ -121,9 +121,12 @@ class TimeSeries:
 
     def _repr_html_(self) -> str:
         """A sentence, a table and a figure, for a notebook."""
-        from antennate.telemetry.figure import of_series  # slow to import
+        from antennate.telemetry.figure import of_arrays  # slow to import
 
-        figure = of_series(self) if len(self) else None
+        theta = self.meta.get("threshold")
+        theta = theta if isinstance(theta, float) else np.nan
+        known = (self.t, self.counts, self.level, self.contact, self.maneuver)
+        figure = of_arrays(*known, theta) if len(self) else None
         return html(self._sentence, _SHOWN_COLUMNS, self._by_maneuver(), figure)
 
     @property

@@ -44,6 +44,7 @@ class ServoBus:
     Attributes:
         trouble: Faults of servos, by the id that each had when the bus was made.
         latency: Time by which the adapter delivers answers late [s].
+        echo: The adapter hears what it sends, and gives it to the master.
         noise: What the wire does to bytes, both ways.
         master_baud: Bits per second of the master; servos set to another baud understand nothing.
             None while that is not known: then all do.
@@ -62,6 +63,7 @@ class ServoBus:
         self._first_ids = {id(servo): servo.get("id") for servo in self.servos}
         self.loss = loss
         self.latency = 0.0
+        self.echo = False
         self.noise = Noise(seed=1)
         self.master_baud: int | None = None
         self.on_goals: Callable[[], None] = lambda: None
@@ -82,6 +84,8 @@ class ServoBus:
         if t - self._last > _GIVE_UP:
             self._parser.reset()
         self._last = max(self._last, t) + self._byte_time * len(data)
+        if self.echo:
+            self._out.append((self._last + self.latency, data))
         for packet in self._parser.feed(self.noise(data)):
             if packet.instruction != Instruction.STATUS:
                 self._handle(self._last, packet)

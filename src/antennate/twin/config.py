@@ -58,6 +58,10 @@ class TwinConfig(TrialConfig):
     """Touches of the standing robot: left@2s or left:20mm@2s, from the beginning of each client."""
     push: tuple[str, ...] = number((), "1", "assumed: no touch unless wanted")
     """Joints without torque that are turned, such as yaw1=20deg@3s, from the first packet on."""
+    mains: float = number(
+        50.02, "Hz", "assumed: mains of 50 Hz wander by some hundredths", gt=0, le=1000
+    )
+    """Frequency of the hum on the readings, a fault."""
     factory: bool = number(False, "1", "assumed: they are set up")
     """Servos as delivered: all id 1 at 57600 bit/s."""
     plugged: tuple[str, ...] = number((), "1", "assumed: all")
@@ -96,6 +100,7 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
         battery=config.battery,
         servos=factory_new(config.robot) if config.factory else None,
         pushes=config.push,
+        mains=config.mains,
     )
     robot.on_return = passage.reset
     robot.plugging.begin(config.plugged)

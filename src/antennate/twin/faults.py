@@ -13,6 +13,7 @@ from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.robots.servos import MOST_TICKS
 from antennate.twin.bus import ServoBus
+from antennate.twin.converter import SIDES
 from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox
@@ -29,14 +30,22 @@ NONE = "none"
 """Takes back what was wrong; a latched hardware error stays until a reboot."""
 _FROZEN, _JUMP = "frozen", "jump"
 """Present Position keeps its value, or is wrong by some ticks; the servo moves as before."""
-_SIDES = ("left", "right")
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
-_BOARD = ("silent", "reset", *(f"{kind}_{side}" for kind in ("open", "short") for side in _SIDES))
+_BOARD = ("silent", "reset")
+_READINGS = (
+    *(f"{kind}_{side}" for kind in ("open", "short", "stuck") for side in SIDES),
+    *SIDES,
+    "hum",
+    "drift",
+    "plateau",
+    "sticky",
+    "radio_noise",
+)
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot", _FROZEN, _JUMP, NONE),
-    "esp32": (*_BOARD, *_SIDES, "ber"),
-    "bus": ("loss", "silent", "latency", "discharge", "ber"),
+    "esp32": (*_BOARD, *_READINGS, "ber"),
+    "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
 }
 _SHARES = ("loss", "ber")
@@ -51,8 +60,8 @@ class Demand:
         servo: Id, for a servo.
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
-            that are wrong, fall of the supply [V/s], reading of a bent antenna [counts], jump of a
-            position [ticks], or value of a register.
+            that are wrong, fall of the supply [V/s], reading of a bent antenna, hum, noise or
+            plateau [counts], drift [counts/s], jump of a position [ticks], or value of a register.
         t: When it begins [s].
     """
 
@@ -91,7 +100,7 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
-    if match["what"] in _SIDES and size > _MOST_COUNTS:
+    if match["what"] in SIDES and size > _MOST_COUNTS:
         raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
     if match["what"] == _JUMP and not 1 <= abs(size) <= MOST_TICKS:
         raise BadInputError(f"--fault: expected a jump of 1 to {MOST_TICKS} ticks, found {text!r}")
@@ -174,8 +183,8 @@ def _break_robot(robot: TwinRobot, demand: Demand) -> None:
     if demand.target == "wire":
         for noise in (robot.noise, robot.bus.noise):
             setattr(noise, demand.what, demand.size)
-    elif demand.what in _SIDES:
-        robot.hold(_SIDES.index(demand.what), demand.size)
+    elif demand.what in _READINGS:
+        robot.converter.set(demand.what, demand.size)
     elif demand.what == "ber":
         robot.noise.ber = demand.size
     else:
@@ -187,6 +196,8 @@ def _break_bus(bus: ServoBus, demand: Demand) -> None:
         bus.latency = demand.size
     elif demand.what == "ber":
         bus.noise.ber = demand.size
+    elif demand.what == "echo":
+        bus.echo = True
     else:
         bus.loss = 1.0 if demand.what == "silent" else demand.size
 

@@ -7,7 +7,6 @@ robot stands and the board repeats its first reading.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -22,6 +21,7 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.battery import Battery
 from antennate.twin.bus import ServoBus
+from antennate.twin.converter import Converter
 from antennate.twin.driven_servo import DrivenServo, servos_of
 from antennate.twin.noise import Noise
 from antennate.twin.orders import Plugging
@@ -59,8 +59,10 @@ class TwinRobot:
         battery: Numbers of its supply.
         servos: Its servos in the order of its joints, set up for it by default.
         pushes: Joints without torque that somebody turns, as `push.Pushes` reads them.
+        mains: Frequency of a hum on its readings [Hz].
 
     Attributes:
+        converter: Makes the board's codes of readings, and breaks them on demand.
         bus: The servos on their wire.
         plugging: Plugs servos in and turns shafts, by orders.
         t: Time up to which everything has happened [s].
@@ -84,6 +86,7 @@ class TwinRobot:
         battery: BatteryParams | None = None,
         servos: Sequence[DrivenServo] | None = None,
         pushes: Sequence[str] = (),
+        mains: float = 50.0,
     ) -> None:
         self._body = body
         self._watch = watch
@@ -99,9 +102,7 @@ class TwinRobot:
         self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
         self._ticks = self._walked = self._booted = 0
         self._held_in_reset = self._off = False
-        self._wires = ["", ""]
-        self._floating = np.random.default_rng(boot_id)
-        self._held = [math.nan, math.nan]
+        self.converter = Converter(boot_id, mains)
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self.touch = touch or TouchStimulus((), robot.antenna)
         self.on_return: Callable[[], None] = lambda: None
@@ -225,19 +226,13 @@ class TwinRobot:
         self._off |= dtr != rts
 
     def break_board(self, what: str) -> None:
-        """Let the board fall silent, start anew after BOOT_TICKS, or break an antenna's wire.
-
-        An open wire leaves the converter's pin unconnected: it reads anything. A short reads 0.
-        """
+        """Let the board fall silent, or start anew after BOOT_TICKS."""
         if what == "silent":
             self.board_silent = True
-        elif what == "reset":
+        else:
             self._boot_id = (self._boot_id * 1_103_515_245 + 12_345) & 0xFFFFFFFF
             self._encoder = frame.SampleEncoder(self._boot_id)
             self._booted = self._ticks + BOOT_TICKS
-        else:
-            kind, side = what.split("_")
-            self._wires[side == "right"] = kind
 
     def order_touch(self, text: str) -> None:
         """Touch an antenna at once; a robot that has walked and has no torque is put back first.
@@ -250,7 +245,7 @@ class TwinRobot:
 
     def hold(self, side: int, counts: float) -> None:
         """Hold the reading of antenna 0 (left) or 1 at a value [counts]; NaN releases it."""
-        self._held[side] = counts
+        self.converter.held[side] = counts
 
     @property
     def _used(self) -> bool:
@@ -308,25 +303,14 @@ class TwinRobot:
         noise = np.zeros(2)
         if self._chance is not None and self._standing:
             noise = np.rint(self._chance.normal(0.0, _STANDING_NOISE, 2))
+        now = self._ticks * self._period
         if self._standing:
-            now = self._ticks * self._period
             noise = noise + np.rint(self.touch.change(now, self._visit.begun))
-        read = np.where(np.isnan(self._held), self._counts, self._held)
-        left, right = (
-            self._converted(counts, wire)
-            for counts, wire in zip(read + noise, self._wires, strict=True)
-        )
+        left, right = self.converter.codes(now, self._counts, noise)
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
         size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
         self._stream += self._buffer[:size]
-
-    def _converted(self, counts: float, wire: str) -> int:
-        """What the converter gives for a reading behind a wire that may be broken."""
-        if wire == "open":
-            return int(self._floating.integers(frame.FULL_SCALE + 1))
-        shorted = wire == "short" or math.isnan(counts)
-        return 0 if shorted else min(max(int(counts), 0), frame.FULL_SCALE)
 
     def _greet(self) -> None:
         rate = round(1 / self._period)

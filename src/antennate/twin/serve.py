@@ -164,6 +164,7 @@ class TwinServer(_Server):
         super().__init__(robot.bus, endpoints, orders)
         self._robot, self._faults = robot, faults
         self._board = endpoints["esp32"]
+        robot.converter.radio = self._board.path.startswith("udp://")
         self._physics: Physics | None = None
         self.late = 0.0
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED
+from antennate.antenna.plateau import Plateau
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import told
@@ -28,6 +29,7 @@ CURVE = (
     Measure("threshold", "theta"),
     Measure("r2", "R²", form=".3f"),
     Measure("rmse", "RMSE of b", form=".4f"),
+    Measure("noise_counts", "noise", "counts", form=".1f"),
     Measure("valid_counts", "valid for", "counts", form=".0f"),
     Measure("valid_bend", "valid for levels"),
 )
@@ -178,7 +180,16 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 
 def _warning(result: Mapping[str, Any]) -> str:
-    """What a poor fit comes from."""
+    """What saturates, and what a poor fit comes from."""
+    return f"{_saturated(result)}{_poor(result)}"
+
+
+def _saturated(result: Mapping[str, Any]) -> str:
+    found = result.get("plateau")
+    return f"; {Plateau(**found).text('the readings')}" if found else ""
+
+
+def _poor(result: Mapping[str, Any]) -> str:
     if not result["poor"]:
         return ""
     known = result["assessment"]

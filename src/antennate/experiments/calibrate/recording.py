@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -18,68 +17,36 @@ from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.clock import TIME_UNITS, Wrap, out_of_place, seconds, unwrapped
 from antennate.experiments.calibrate.clock import check as check_time
+from antennate.experiments.calibrate.columns import (
+    BEND,
+    BEND_UNITS,
+    READING,
+    SPEED,
+    SPEED_UNITS,
+    TIME,
+    TRIAL,
+    RecordingParams,
+    impossible,
+)
 from antennate.experiments.calibrate.readings import (
     READING_UNITS,
     Conversion,
     Outlier,
-    impossible,
     outliers,
     to_counts,
     unit_named,
     usual,
 )
 from antennate.files import read_limited
-from antennate.params.base import Params, number
 from antennate.robots.sensor import SensorParams
 from antennate.types import Floats, Ints
 
-BEND_UNITS = {"1": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
-SPEED_UNITS = {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001}
-_LARGEST_BEND = {"1": 1.05, "rad": 2 * math.pi, "deg": 360.0, "m": 1.0, "mm": 1000.0}
-"""Beyond these a value was hardly meant in its unit."""
-_LARGEST_SPEED = 1.0
-"""Beyond it a speed was hardly meant in its unit [m/s]: nobody pushes an antenna faster."""
+_MOST_SPEEDS = 12
+"""More different speeds than this were measured and not commanded."""
 _LARGEST_FILE = 50_000_000
 _NAMED = 20
 """Most rows that are named one by one."""
-_TRIAL, _SPEED, _TIME, _READING, _BEND = range(5)
-"""Columns of a recording as it is read."""
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
-
-
-class RecordingParams(Params):
-    """Columns and units of a recording."""
-
-    time_column: str = number("time", "1", "assumed: plain")
-    """Column of time."""
-    time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI")
-    """Its unit."""
-    counts_column: str = number("counts", "1", "assumed: plain")
-    """Column of readings."""
-    reading_unit: Literal["counts", "ohm", "kohm", "V", "mV"] = number(
-        "counts", "1", "assumed: what the board sends"
-    )
-    """Its unit; others become counts by the divider and converter of antenna.sensor."""
-    bend_column: str = number("bend", "1", "assumed: plain")
-    """Column of bend or position."""
-    bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
-        "1", "1", "assumed: 0 straight, 1 full"
-    )
-    """Its unit."""
-    bend_zero: float | None = number(None, "unit of bend", "assumed: its smallest value")
-    """Value when straight."""
-    bend_full: float | None = number(None, "unit of bend", "assumed: its largest value")
-    """Value when fully bent."""
-    trial_column: str = number("trial", "1", "assumed: plain")
-    """Column that numbers pushes, if any."""
-    speed_column: str = number("speed_m_s", "1", "assumed: plain")
-    """Column of pushing speed, if any."""
-    speed_unit: Literal["m/s", "cm/s", "mm/s"] = number("m/s", "1", "assumed: SI")
-    """Its unit."""
-    most_lost: float = number(
-        0.02, "1", "assumed: far more than the serial logs we have seen", ge=0, le=0.5
-    )
-    """Share of damaged rows, and of outliers, up to which they are left out and counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +109,9 @@ def read(
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
     table, lines, damages = _rows(path, data, params, rate)
     total = len(table) + len(damages)
-    trial = _numbered(path, table[:, _TRIAL], lines, params.trial_column)
+    trial = _numbered(path, table[:, TRIAL], lines, params.trial_column)
     if rate is None:
-        t, wraps = unwrapped(table[:, _TIME] * TIME_UNITS[params.time_unit], trial, lines)
+        t, wraps = unwrapped(table[:, TIME] * TIME_UNITS[params.time_unit], trial, lines)
         astray = out_of_place(t, trial)
         if astray.mean() <= params.most_lost:
             why = f"expected time to rise within a push, found {params.time_column} out of place"
@@ -155,16 +122,26 @@ def read(
     else:
         t, wraps = _counted(trial) / rate, []
     _check_share(path, damages, total, params.most_lost)
-    readings, bend = table[:, _READING], _normalised(path, lines, table[:, _BEND], params)
+    readings, bend = table[:, READING], _normalised(path, lines, table[:, BEND], params)
     counts, conversion = to_counts(
         path, params.reading_unit, readings, lines, sensor or SensorParams()
     )
-    speed: Floats = np.abs(table[:, _SPEED]) * SPEED_UNITS[params.speed_unit]
+    speed = _of_pushes(np.abs(table[:, SPEED]) * SPEED_UNITS[params.speed_unit], trial)
     samples, t, far, kept = _without_outliers(Samples(counts, bend, trial, speed, lines), t, params)
     handled = Handled(
         total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion
     )
     return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
+
+
+def _of_pushes(speed: Floats, trial: Ints) -> Floats:
+    """Speeds [m/s], shape (n,); measured ones as the median of their trial, by two digits."""
+    if len(np.unique(speed[np.isfinite(speed)])) <= _MOST_SPEEDS:
+        return speed
+    found = np.zeros_like(speed)
+    for push in np.unique(trial):
+        found[trial == push] = float(f"{np.median(speed[trial == push]):.2g}")
+    return found
 
 
 def _without_outliers(
@@ -300,32 +277,14 @@ def _values(
             value = number_of(cell)
         except ValueError as error:
             return f"expected {error} {found}"
-        if i == _TIME and (clock := seconds(cell)) is not None:
+        if i == TIME and (clock := seconds(cell)) is not None:
             value = clock / TIME_UNITS[params.time_unit]
         if not math.isfinite(value):
             return f"expected a finite number {found}; delete the row"
-        if why := _impossible(i, value, header[place], params):
+        if why := impossible(i, value, header[place], params):
             return why
         values.append(value)
     return values
-
-
-def _impossible(place: int, value: float, name: str, params: RecordingParams) -> str:
-    """What was expected of a number that its unit hardly allows, empty if it does."""
-    unit, flag, wanted = params.reading_unit, "reading-unit", ""
-    if place == _READING:
-        wanted = impossible(unit, value)
-    elif place == _SPEED:
-        unit, flag = params.speed_unit, "speed-unit"
-        if abs(value) * SPEED_UNITS[unit] > _LARGEST_SPEED:
-            wanted = f"speeds up to {_LARGEST_SPEED:g} m/s in {name}"
-    elif place == _BEND:
-        unit, flag = params.bend_unit, "bend-unit"
-        if abs(value) > _LARGEST_BEND[unit]:
-            wanted = f"at most {_LARGEST_BEND[unit]:g} in {name}"
-    if not wanted:
-        return ""
-    return f"expected {wanted}, found {value:g}; is {unit} the right --columns.{flag}?"
 
 
 def _normalised(path: Path, lines: Ints, raw: Floats, params: RecordingParams) -> Floats:

@@ -19,6 +19,7 @@ from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
 from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
+from antennate.antenna.plateau import Plateau, plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
@@ -148,6 +149,7 @@ class CalibrateOutcome(Outcome):
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
             "recording": None if self.raw.handled is None else asdict(self.raw.handled),
+            "plateau": None if (found := self._plateau()) is None else asdict(found),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
@@ -162,6 +164,11 @@ class CalibrateOutcome(Outcome):
             return False
         alone = min(found.one_way_r2)
         return alone >= good or 1.0 - alone <= (1.0 - r2) / 2.0
+
+    def _plateau(self) -> Plateau | None:
+        """Readings that stand at their highest, too few to refuse them."""
+        samples = self.raw.samples
+        return plateau_of(samples.counts, samples.level)
 
     def levels(self) -> Floats:
         """Bending levels that the calibration gives its own data, shape (n,)."""
@@ -243,6 +250,12 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
     return replace(recording, samples=replace(s, counts=counts))
 
 
+def _noise(samples: Samples) -> float | None:
+    """Noise of single readings [counts], None if it cannot be told."""
+    noise = white_noise(samples.counts, samples.trial)
+    return float(noise) if np.isfinite(noise) else None
+
+
 def run(
     config: CalibrateConfig,
     workers: int | Workers = 1,
@@ -270,6 +283,7 @@ def run(
             config.threshold,
             config.full_scale,
             config.least_r2,
+            _noise(raw.samples),
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""

@@ -69,7 +69,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             *((f"frames {name}", [str(found[name])]) for name in ("contact", "free", "unknown")),
             ("animals", [str(result["animals"])]),
             ("animals known in too few frames, left out", [str(result["skipped"])]),
-            *((text, [str(result["handled"][name])]) for name, text in HANDLED.items()),
+            *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
         ],
     )
     return shapes, varied, counts
@@ -102,7 +102,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     return (
         f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
-        f"{100 * most['change']:.1f} points.{right}{single}{_beyond(result)}{_unseen(result)}"
+        f"{100 * most['change']:.1f} points.{right}{_beyond(result)}{_unseen(result)}"
         f"{so_few and f' {so_few}'}"
     )
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
+from antennate.antenna.plateau import plateau_of
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.board_survey import BoardSurvey
@@ -15,6 +17,7 @@ from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sens
 from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.safety import diagnosis
 from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
+from antennate.hardware.safety.noise import usual_noise
 from antennate.messages import typed
 from antennate.params.control import CurveParams
 
@@ -25,11 +28,20 @@ _CURES = {
     diagnosis.Finding.SHORT_LO: "the sensor is torn off its wire, its plug is out, or it is "
     "shorted to ground",
     diagnosis.Finding.SHORT_HI: "the wire of this antenna is shorted to the supply",
-    diagnosis.Finding.STUCK: "the converter always gives one value: reset the board, check the pin",
+    diagnosis.Finding.STUCK: "the converter always gives one value: reset the board, check "
+    "the pin; if it is the highest value, set its attenuation",
+    diagnosis.Finding.NOISE: "keep its wires away from mains, motors and servo cables, join the "
+    "grounds, put 100 nF from pin to ground; an open wire hums, too",
     diagnosis.Finding.SATURATED: "let the antenna straighten; then choose another divider resistor",
     diagnosis.Finding.OUT_OF_CAL: f"calibrate this antenna again: `{typed('record')}`, "
     f"`{typed('calibrate')}`",
 }
+_RADIO = (
+    "if it is quiet by cable, the radio disturbs the converter: put 100 nF from each pin to ground "
+    "and the antenna of the radio away from the wires; or calibrate by radio"
+)
+_OFTEN = 0.1
+"""Share of the readings that makes an antenna bad, although most of them are good."""
 _DEGRADED = (diagnosis.Finding.OUT_OF_CAL, diagnosis.Finding.SPIKY, diagnosis.Finding.SATURATED)
 
 
@@ -117,27 +129,72 @@ def _antenna(
     board: BoardSurvey, config: DoctorConfig, name: str, counts: list[float]
 ) -> Iterator[tuple[Finding, str, str]]:
     """Findings on an antenna by its readings [counts]."""
-    noise, middle, quiet = float(np.std(counts)), float(np.median(counts)), config.doctor.noise
-    cure = "leave the antenna alone; then check its plug, cable and ground"
-    noisy = Finding(f"{noise:.1f} counts", "warn" if noise > quiet else "ok", cure)
-    yield noisy, f"{name} noise", f"at most {quiet:g} counts"
+    yield _noise(board, config, name, counts)
     try:
         channel = ChannelDiagnosis(Band.of(_curve(config, name), config.reaches[name == "right"]))
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         yield wrong, f"{name} calibration", "leaves the rails free"
         return
+    seen: list[diagnosis.Finding] = []
+    noise = ""
     for reading, value in zip(board.readings, counts, strict=True):
-        channel.step(1e-6 * reading.elapsed_us, value)
-    shown = channel.reading.finding
+        seen.append(channel.step(1e-6 * reading.elapsed_us, value).finding)
+        noise = channel.noise_text or noise
+    shown, middle = _usual(seen), float(np.median(counts))
+    low, high = _limits(_curve(config, name))
+    if shown is diagnosis.Finding.OUT_OF_CAL and low <= middle <= high:
+        shown = diagnosis.Finding.OK  # noise reaches beyond, which has a row of its own
+    told = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
     signal = Finding(
-        f"{shown.value} ({middle:.0f} counts)",
+        f"{told} ({middle:.0f} counts)",
         "ok" if shown is diagnosis.Finding.OK else "warn" if shown in _DEGRADED else "bad",
         _CURES.get(shown, "check plug, cable and divider of this antenna"),
     )
+    plateau = plateau_of(np.array(counts))
+    if plateau is not None and not _at_ground(shown):
+        signal = Finding(plateau.text("the readings"), "bad", _CURES[diagnosis.Finding.STUCK])
     yield signal, f"{name} antenna", "ok"
     if shown.usable:
         yield _at_rest(config, name, middle)
+
+
+def _usual(seen: list[diagnosis.Finding]) -> diagnosis.Finding:
+    """What a tenth of the readings say of a channel that is not usable, else most of them."""
+    counted = Counter(seen[diagnosis.AGREE :] or seen)
+    worse = [found for found in counted if not found.usable]
+    found = max(worse, key=lambda one: counted[one], default=seen[-1])
+    often = worse and counted[found] > _OFTEN * len(seen)
+    return found if often else counted.most_common(1)[0][0]
+
+
+def _at_ground(shown: diagnosis.Finding) -> bool:
+    """Whether the readings stand at a rail for another reason than saturation."""
+    return shown in (diagnosis.Finding.SHORT_LO, diagnosis.Finding.SHORT_HI)
+
+
+def _noise(
+    board: BoardSurvey, config: DoctorConfig, name: str, counts: list[float]
+) -> tuple[Finding, str, str]:
+    """How noisy the readings are, also beside those of the calibration."""
+    good = config.doctor
+    before, right = good.calibrated_noise, good.calibrated_noise_right
+    before = right if name == "right" and right is not None else before
+    noise, usual = float(np.std(counts)), usual_noise(counts)
+    usually = max(before or 0.0, 1.0)
+    louder = noise > good.noise_ratio * usually
+    found, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
+    cure = "leave the antenna alone; then check its plug, cable and ground"
+    bad = noise > good.noise
+    if bad and usual.hums and board.rate is not None:
+        found += f": a hum of {usual.text(board.rate)}"
+        cure = _CURES[diagnosis.Finding.NOISE]
+    if before is not None:
+        expected += f", {before:.1f} when it was calibrated"
+        if louder:
+            bad, found = True, f"{found}, {noise / usually:.0f} times that"
+            cure = _RADIO if board.radio else cure
+    return Finding(found, "warn" if bad else "ok", cure), f"{name} noise", expected
 
 
 def _curve(config: DoctorConfig, name: str) -> CurveParams:
@@ -146,9 +203,14 @@ def _curve(config: DoctorConfig, name: str) -> CurveParams:
     return right if right is not None and name == "right" else both
 
 
+def _limits(curve: CurveParams) -> tuple[float, float]:
+    """Readings that are within the calibrated range [counts]."""
+    return curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
+
+
 def _at_rest(config: DoctorConfig, name: str, counts: float) -> tuple[Finding, str, str]:
     curve, threshold = _curve(config, name), config.control.rule.threshold
-    low, high = curve.counts_low - diagnosis.MARGIN, curve.counts_high + diagnosis.MARGIN
+    low, high = _limits(curve)
     level = float(bending_level(curve, np.array(counts)))
     finding = Finding(
         f"{counts:.0f} counts, b = {level:.2f}",

@@ -36,6 +36,7 @@ class BoardSurvey:
         broken: Pieces with a wrong CRC or code after the greeting.
         boots: Times it started anew meanwhile.
         servos: Whether servos answer on the port.
+        radio: Whether the board sends by radio.
     """
 
     hello: Hello | None = None
@@ -48,6 +49,7 @@ class BoardSurvey:
     broken: int = 0
     boots: int = 0
     servos: bool = False
+    radio: bool = False
 
     @property
     def counts(self) -> Floats:

@@ -24,6 +24,10 @@ def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, st
     """Each with the name of its check and what would be good, in the order to be shown."""
     robot, good = config.robot, config.doctor
     yield _baud(bus), "baud", f"all at {bus.baud}"
+    if bus.echoes:
+        cure = "nothing, as echoes are dropped; other programs may need an adapter without"
+        echo = Finding(f"{bus.echoes} requests came back", "warn", cure)
+        yield echo, "echo of the adapter", "none"
     if not (bus.here or bus.elsewhere):
         return
     yield _ids(bus, robot), "ids", ids_text(robot.ids)

@@ -67,6 +67,7 @@ class BusSurvey:
         fast: They were read with fast sync reads.
         asked: Answers asked for while timing reads.
         missed: Those that did not come.
+        echoes: Requests that came back from the adapter itself.
     """
 
     baud: int
@@ -79,6 +80,7 @@ class BusSurvey:
     fast: bool = True
     asked: int = 0
     missed: int = 0
+    echoes: int = 0
 
     @property
     def whole(self) -> list[int]:
@@ -92,6 +94,7 @@ class BusSurvey:
             "read_time_s": self.read_time,
             "answers_asked": self.asked,
             "answers_missed": self.missed,
+            "echoes": self.echoes,
             "servos": [
                 asdict(servo)
                 | {"baud": self.baud, "registers": self.registers.get(i, {})}
@@ -119,6 +122,7 @@ def survey_bus(
         survey.registers = _registers(bus, survey.whole)
         _time_pings(bus, survey, now)
         _time_reads(bus, survey, params.reads, now)
+        survey.echoes = bus.tally.echoes
     if not survey.here:
         survey.board = _antenna_board(opener, now)
     if set(robot.ids) - set(survey.here) and not survey.board:

@@ -66,6 +66,7 @@ def examine(
 
     def board_rows(path: str, opener: Opener) -> Iterator[Row]:
         survey = checkup.board = survey_board(opener, config.robot, config.doctor, now)
+        survey.radio = path.startswith("udp:")
         for finding, check, expected in board_checks.findings(survey, config):
             yield finding.row("esp32", check, expected)
 

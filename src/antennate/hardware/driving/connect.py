@@ -182,7 +182,8 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
         )
         more = f"`{typed('doctor')}` tells more, slow adapters too"
         cure = more if error.cure else f"{check}; {more}"
-        raise BringUpError(f"--bus: {error}", cure) from None
+        echo = "; the adapter works, as it sends back what it gets" if bus.tally.echoes else ""
+        raise BringUpError(f"--bus: {error}{echo}", cure) from None
     status = bringup.read_register(bus, robot.ids, XC430_W240["hardware_error_status"])
     if ill := [f"{', '.join(hardware_errors(b))} in servo {i}" for i, b in status.items() if b]:
         raise BringUpError(

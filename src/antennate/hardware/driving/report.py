@@ -134,6 +134,7 @@ class Report:
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,
             "broken_answers": answers.bad_crc,
+            "echoes": answers.echoes,
             "margins": {
                 name: round(share, 3)
                 for name, share in asdict(session.actuators.state.margins).items()

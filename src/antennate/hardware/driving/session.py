@@ -215,6 +215,7 @@ class Session:
             valid=self.robot.used,
             refused=self._refused,
             findings=self.quality.findings,
+            noise=self.quality.noise,
             decided_at=control.result.decided_at,
             maneuver=control.decision.maneuver,
             contact=control.decision.contact,

@@ -17,17 +17,21 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
+from itertools import islice
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from antennate.hardware.actuators import Tally
 from antennate.hardware.dynamixel import packets
 from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
+from antennate.hardware.dynamixel.echo import Echo
 from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
 from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.dynamixel.pending import PendingRequests
 from antennate.hardware.ports.port import Port, PortError
 
 CHUNK = 1024
+_CHUNKS = 64
+"""Most chunks thrown away at once: more than Linux keeps for a line."""
 PING_DATA = 3
 """Bytes of the answer to a ping: model number and firmware version."""
 FAST_TRIES = 3
@@ -84,7 +88,7 @@ class Bus:
         self._port, self._clock = port, clock
         self._fast_failures, self._fast_tries = 0, FAST_TRIES
         self._pending = PendingRequests(self.timing.latest, clock)
-        self._calm = False
+        self._calm, self._echo = False, Echo()
         self._last_byte = self._sent = clock()
 
     @exclusive
@@ -292,12 +296,13 @@ class Bus:
     def _send(self, request: bytes, end: float | None, anyway: bool = False) -> bool:
         """Send once the bus is known to be quiet; False, unless `anyway`, if `_quiet` says no."""
         calm, self._calm = self._calm, False
-        dropped = self._port.drain()
+        dropped = self._drain()
         self.tally.drained += dropped
         if dropped:
             self._last_byte = self._clock()
         if (dropped or not calm) and not self._quiet(end) and not anyway:
             return False
+        self._echo.expect(request)
         self._port.write(request)
         self._sent = max(self._sent, self._clock()) + self.timing.wire(len(request))
         return True
@@ -318,11 +323,26 @@ class Bus:
             if end is None:
                 until += max(self._clock() - now - left, 0.0)
 
+    def _drain(self) -> int:
+        """Throw away what has come; how many bytes that was without echoes."""
+        if not self._echo.requests:
+            return self._port.drain()
+        parts = iter(lambda: self._port.read(CHUNK, 0.0), b"")
+        return sum(len(self._without_echo(part)) for part in islice(parts, _CHUNKS))
+
     def _listen(self, timeout: float, end: float) -> bytes:
-        part = self._port.read(CHUNK, max(min(timeout, end - self._clock()), 0.0))
-        if part:
-            self._last_byte = self._clock()
-        return part
+        """What comes within a time [s] and is no echo."""
+        end = min(end, self._clock() + timeout)
+        while part := self._port.read(CHUNK, max(end - self._clock(), 0.0)):
+            if part := self._without_echo(part):
+                self._last_byte = self._clock()
+                return part
+        return b""
+
+    def _without_echo(self, part: bytes) -> bytes:
+        rest = self._echo.remove(part)
+        self.tally.echoes = self._echo.requests
+        return rest
 
 
 def fitting(packet: Packet, length: int, late: set[int]) -> Status | None:

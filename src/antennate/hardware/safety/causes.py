@@ -38,6 +38,7 @@ class Cause(Enum):
     REBOOT = (State.HOLD, "the antenna board has restarted")
     LOST = (State.HOLD, "no good reading for too long")
     STUCK = (State.HOLD, "a channel repeats one reading")
+    NOISE = (State.HOLD, "noise hides what a flex sensor reads")
     OPEN = (
         State.HOLD,
         "a channel floats: its wire is open, or its flex sensor bent far beyond its calibration",
@@ -107,6 +108,7 @@ class Inputs:
         valid: Valid samples that arrived since the tick before, without those that were too old.
         refused: Samples since then that were not valid.
         findings: Of the left and the right channel.
+        noise: Size and frequency of the noise of a channel that is NOISE, left and right.
         decided_at: Time at which the controller finished its newest decision [s].
         maneuver: That decision.
         contact: The contact that it was decided on, left and right.
@@ -137,6 +139,7 @@ class Inputs:
     valid: int
     refused: int
     findings: tuple[Finding, Finding]
+    noise: tuple[str, str]
     decided_at: float
     maneuver: int
     contact: tuple[int, int]

@@ -28,7 +28,11 @@ CURES = MappingProxyType(
         Cause.STALE: f"{_BOARD}; close other programs",
         Cause.REBOOT: _BOARD,
         Cause.LOST: _WIRE,
-        Cause.STUCK: f"{_WIRE}; switch the antenna board off and on",
+        Cause.STUCK: f"{_WIRE}; switch the antenna board off and on; if it is stuck at its highest "
+        "reading alone, the attenuation of the converter is not set",
+        Cause.NOISE: "keep the wires of that antenna away from mains, motors and servo cables; "
+        "join the grounds of board, supply and computer; put 100 nF from the pin to ground; an "
+        "open wire hums, too (`antennate doctor`)",
         Cause.OPEN: f"{_WIRE}; if it bends farther than when it was calibrated, calibrate again",
         Cause.SHORT_LO: f"{_WIRE}; is the flex sensor still on them?",
         Cause.SHORT_HI: f"{_WIRE}; where do they touch the supply?",

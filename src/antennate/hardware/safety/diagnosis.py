@@ -6,7 +6,7 @@ once three readings in a row agree on it. Without a reading to use, the counts a
 
 The flex sensor is the upper half of a divider, so one torn off its wire reads 0 like a short to
 ground, and both are SHORT_LO. OPEN is a pin of the converter that is connected to nothing: its
-readings wander over the whole range.
+readings wander over the whole range. NOISE is narrower than that, or a hum.
 """
 
 from __future__ import annotations
@@ -15,10 +15,13 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
+from statistics import median
 
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
+from antennate.hardware.safety.noise import Noise, noise_of
 from antennate.params.control import CurveParams
 
 LOW_RAIL = 5.0
@@ -36,6 +39,20 @@ brings (assumed)."""
 STUCK = 100
 """Equal readings in a row that mean a stuck converter: 1 s; a sensor at rest has noise of 2 to 3
 counts, so they do not happen (assumed)."""
+NEARLY_STUCK = 150
+"""Readings in a row within two counts that mean the same, for a converter whose last bit toggles:
+1.5 s; with noise of 0.9 counts they come once in four days, and the quietest of real sensors, 12
+bits, 3.3 V, had 1.7 counts (computed, measured)."""
+_NEAR = 2.0
+"""Farthest apart that such readings are [counts]."""
+HIDDEN = 0.15
+"""Amplitude of a noise that hides the flex sensor [spans]: from there on the check by touch sees no
+rest, and readings are doubted as jumps (assumed)."""
+_FLOATING = FULL_SCALE / 3
+"""Least that the readings of a floating wire differ in the window [counts]: one window of white
+noise over the whole range in 3000 differs less (computed)."""
+_MEMORY = 1.0
+"""Time for which a hum is remembered while readings that were skipped break its sine [s]."""
 JUMP = 1 / 3
 """Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
@@ -69,6 +86,7 @@ class Finding(Enum):
     SATURATED = "at the rail of a bent flex sensor"
     LOST = "no good reading for too long"
     STUCK = "always the same reading"
+    NOISE = "noise that hides the flex sensor"
     OPEN = "floating, wire open"
     SHORT_LO = "short to ground, or flex sensor torn off"
     SHORT_HI = "short to supply"
@@ -84,7 +102,7 @@ class Finding(Enum):
         return self in _BROKEN
 
 
-_BROKEN = {Finding.STUCK, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
+_BROKEN = {Finding.STUCK, Finding.NOISE, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
 _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
 
@@ -148,6 +166,7 @@ class ChannelDiagnosis:
         counted: Readings by the finding they got.
         bad: Readings not believed.
         outside: Readings beyond the band that were believed.
+        noise: The noise of a channel that is NOISE.
 
     Raises:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
@@ -171,13 +190,16 @@ class ChannelDiagnosis:
         self.reading = _NOTHING
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)
+        self._times: deque[float] = deque(maxlen=WINDOW)
+        self.noise, self._hummed = Noise(0.0), -math.inf
         self._bad: deque[bool] = deque(maxlen=WINDOW)
         self._share: deque[bool] = deque(maxlen=SHARE_WINDOW)
         self._outside: deque[bool] = deque(maxlen=WINDOW)
         self._good = math.nan
         self._bad_run = LONGEST_HOLD + 1
         self._doubted: list[float] = []
-        self._equal = 0
+        self._equal = self._near_equal = 0
+        self._least = self._most = math.nan
 
     def step(self, t: float, counts: float) -> Reading:
         """Take a reading.
@@ -193,12 +215,31 @@ class ChannelDiagnosis:
         self._t = t
         self._equal = self._equal + 1 if self._raw and counts == self._raw[-1] else 1
         self._raw.append(counts)
+        self._times.append(t)
+        self._count_near(counts)
         self._believe(counts)
         finding = self._find()
         value = self._used(finding) if finding.usable else math.nan
         self.counted[finding] += 1
         self.reading = Reading(value, finding, counts if self._plausible(counts) else math.nan)
         return self.reading
+
+    @property
+    def noise_text(self) -> str:
+        """Size and frequency of the noise of a channel that is NOISE, empty for others."""
+        if self.reading.finding is not Finding.NOISE:
+            return ""
+        usual = median(after - before for before, after in pairwise(self._times))
+        return self.noise.text(1.0 / usual)  # though some readings were skipped
+
+    def _count_near(self, counts: float) -> None:
+        """Count readings in a row that lie within two counts."""
+        self._least, self._most = min(self._least, counts), max(self._most, counts)
+        if self._most - self._least <= _NEAR and not math.isnan(counts):
+            self._near_equal += 1
+        else:
+            self._least = self._most = counts
+            self._near_equal = 1
 
     def _used(self, finding: Finding) -> float:
         """The reading to use; how far a flex sensor at the rail is bent is not known."""
@@ -255,10 +296,34 @@ class ChannelDiagnosis:
             return Finding.SHORT_LO
         if full and self._pinned(low=False):
             return Finding.SHORT_HI
-        if self._equal >= STUCK:
+        if self._equal >= STUCK or self._near_equal >= NEARLY_STUCK:
             return Finding.STUCK
-        floats = sum(self._bad) >= OPEN_BAD or self._at_both_rails()
-        return Finding.OPEN if full and floats else None
+        if not full:
+            return None
+        if self._at_both_rails():
+            return Finding.OPEN
+        return self._noise_or_open(spoiled=sum(self._bad) >= OPEN_BAD)
+
+    def _noise_or_open(self, spoiled: bool) -> Finding | None:
+        """Noise is a hum, or narrower than what a floating wire gives; a step is wide only once."""
+        raw, least = list(self._raw), 2.0 * HIDDEN * self._band.span
+        width = max(raw) - min(raw)
+        if any(map(math.isnan, raw)) or not least <= width <= FULL_SCALE:
+            return Finding.OPEN if spoiled else None
+        noise, before = noise_of(raw), self.noise
+        if noise.hums:
+            self._hummed = self._t
+        elif self._t - self._hummed < _MEMORY and sum(self._bad) >= SATURATED:
+            noise = Noise(noise.size, before.frequency)
+        self.noise = noise
+        if noise.hums:
+            return Finding.NOISE
+        older, newer = raw[: WINDOW // 2], raw[WINDOW // 2 :]
+        if not spoiled:
+            return None
+        if width >= _FLOATING or max(newer) - min(newer) < least:
+            return Finding.OPEN
+        return Finding.NOISE if max(older) - min(older) >= least else None
 
     def _at_both_rails(self) -> bool:
         """Whether the window has two readings or more at either rail, which no flex sensor can."""

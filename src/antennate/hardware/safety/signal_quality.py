@@ -40,6 +40,7 @@ class SignalQuality:
         bands = Band.of(conditioning, reaches[0]), Band.of(right or conditioning, reaches[1])
         self.channels = [ChannelDiagnosis(band) for band in bands]
         self.check = None if touch is None else TouchCheck(touch, bands)
+        self._together = (drift or DriftParams()).together
         self.drifts = [Drift(drift or DriftParams(), band) for band in bands]
         self._t = -math.inf
 
@@ -54,10 +55,13 @@ class SignalQuality:
         fresh, self._t = t > self._t, t
         found = [channel.step(t, c) for channel, c in zip(self.channels, counts, strict=True)]
         if self.check is not None and fresh:
-            self.check.step(*(reading.taken for reading in found))
+            self.check.step(*(math.nan if r.finding.broken else r.taken for r in found))
         for drift, reading, seen in zip(self.drifts, found, contact, strict=True):
             resting = reading.taken if reading.finding in _RESTING else math.nan
             drift.step(t, resting, seen == Contact.FREE)
+        if min(drift.bent_for for drift in self.drifts) >= self._together:
+            for drift in self.drifts:
+                drift.follow_bent()
 
     @property
     def counts(self) -> list[float]:
@@ -82,10 +86,16 @@ class SignalQuality:
         """Which antennae are broken and what to do, empty if none is."""
         return "; ".join(
             f"mend wire, plug or sensor of the {side} antenna, it is {finding.name}: "
-            f"{finding.value}"
-            for side, finding in zip(_SIDES, self.findings, strict=True)
+            f"{finding.value}{f', {noise}' if noise else ''}"
+            for side, finding, noise in zip(_SIDES, self.findings, self.noise, strict=True)
             if finding.broken
         )
+
+    @property
+    def noise(self) -> tuple[str, str]:
+        """Size and frequency of the noise of the left and the right channel, empty if not NOISE."""
+        left, right = (channel.noise_text for channel in self.channels)
+        return left, right
 
     @property
     def refused(self) -> bool:

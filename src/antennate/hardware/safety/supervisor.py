@@ -111,9 +111,12 @@ class Supervisor:
         found: dict[Cause, str] = {}
         if not 0.0 <= inputs.age <= params.stale_age:
             found[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
-        for side, finding in zip(("left", "right"), inputs.findings, strict=True):
+        for side, finding, noise in zip(
+            ("left", "right"), inputs.findings, inputs.noise, strict=True
+        ):
             if (cause := OF_FINDING.get(finding)) is not None:
-                found[cause] = f"{found[cause]}, {side}" if cause in found else side
+                text = f"{side} {noise}" if noise else side
+                found[cause] = f"{found[cause]}, {text}" if cause in found else text
         self._boots(now, inputs, found)
         self.meter.step(now, inputs.valid)
         if self.meter.wrong:
