@@ -168,7 +168,7 @@ class DynamixelActuators:
         ticks = np.array([state.positions.get(servo, math.nan) for servo in ids])
         state.angles = tuple(self.joints.angles(ticks).tolist())
         if self._goals is not None:
-            idle = {*state.watchdogs, *state.disarmed}  # which is why they do not follow
+            idle = {*state.watchdogs, *state.disarmed, *state.modes}  # why they do not follow
             unknown = np.array([state.missed[servo] > 0 or servo in idle for servo in ids])
             self._judge((began, state.read_at), np.where(unknown, math.nan, ticks))
 

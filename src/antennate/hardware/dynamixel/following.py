@@ -43,8 +43,8 @@ class Following:
     Args:
         joints: The joints.
         params: When a joint does not follow.
-        well: Whether the servo of an id has its torque and its watchdog, asked before its joint is
-            named as one that does not follow.
+        well: Whether the servo of an id has its torque, its watchdog and its mode, asked before its
+            joint is named as one that does not follow.
 
     Attributes:
         faults: What is wrong.

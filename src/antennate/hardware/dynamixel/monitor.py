@@ -137,22 +137,26 @@ class ServoMonitor(ActuatorState):
             if (data := self._one(servo, DRIVE)) is not None:
                 pwm, position = data[: _PWM.size], data[-_POSITION.size :]
                 self.drive = servo, _PWM.decode(pwm), _POSITION.decode(position)
-        elif self._modes:
-            servo = next(self._mode_turn)
-            mode = self._modes[servo]
-            data = None if self.missed[servo] else self._one(servo, Span(_MODE.address, _MODE.size))
-            if data is not None and (found := _MODE.decode(data)) != mode:
-                self.modes[servo] = f"mode {found} where {mode} is due"
-            elif data is not None:
-                self.modes.pop(servo, None)
+        elif self._modes and not self.missed[servo := next(self._mode_turn)]:
+            self._ask_mode(servo)
+
+    def _ask_mode(self, servo: int) -> None:
+        data = self._one(servo, Span(_MODE.address, _MODE.size))
+        due = self._modes.get(servo)
+        if data is None or due is None:
+            return
+        self.modes.pop(servo, None)
+        if (mode := _MODE.decode(data)) != due:
+            self.modes[servo] = f"mode {mode} where {due} is due"
 
     def well(self, servo: int) -> bool:
-        """Whether a servo says, out of turn, that it has its torque and its watchdog."""
+        """Whether a servo says, out of turn, that it has its torque, its watchdog and its mode."""
         try:
             answered = self.guard(servo)
+            self._ask_mode(servo)
         except PortError:
             return False
-        return answered and servo not in {*self.watchdogs, *self.disarmed}
+        return answered and servo not in {*self.watchdogs, *self.disarmed, *self.modes}
 
     def guard(self, servo: int) -> bool:
         """Ask a servo for the watchdog and the torque that it was given; whether it answered."""
