@@ -138,7 +138,7 @@ def _of_robot(file: RobotFile) -> TwinConfig:
 
 def _file(places: Places) -> Path | None:
     """The file to read; servos alone have no robot."""
-    return places.config if places.servos is not None else usual_file(places)
+    return places.config if places.servos else usual_file(places)
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
