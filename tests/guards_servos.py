@@ -383,7 +383,7 @@ SERVOS = [
     ),
     Guard(
         "limit of a joint",
-        put(Following, "_leave", constant(None)),
+        put(Following, "leave", constant(None)),
         partial(
             test_following.test_B21_a_joint_is_pushed_beyond_its_limit_for_a_moment_and_at_full_drive,
             1.03,
@@ -418,7 +418,7 @@ SERVOS = [
     ),
     Guard(
         "hardware error in the dry run",
-        put(dry_run, "_latched", constant("")),
+        put(dry_run, "latched_causes", constant("")),
         partial(test_following.test_B24_a_hardware_error_is_refused_at_once, 0.2, "overheat"),
     ),
     Guard(

@@ -129,7 +129,7 @@ def test_G4_room_for_the_result_is_kept_while_a_robot_is_driven(tmp_path: Path) 
         folder.without_trials()
         kept = [path.stat().st_size for path in folder.path.iterdir()]
         folder.finish({"schema": 1})
-        assert [path.name for path in folder.path.iterdir()] == ["result.json"]
+        assert {path.name for path in folder.path.iterdir()} == {"files.txt", "result.json"}
     assert sum(kept) >= 2**16
 
 

@@ -12,8 +12,7 @@ from antennate.cli.status import write
 from antennate.errors import AntennateError
 from antennate.hardware.driving.priority import give_way
 from antennate.messages import one_line
-from antennate.telemetry.view.channel import FAILED, READY, Channel
-from antennate.telemetry.view.process import IDLE
+from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 
 if TYPE_CHECKING:
     from antennate.telemetry.view.show import Display

@@ -38,7 +38,9 @@ def keep_wish() -> None:
     nothing is drawn. If it says nothing, the engine loads GLFW, which starts a process. Processes
     of workers inherit the setting.
     """
-    _wish[0] = os.environ.get(_NAME, "")
+    said = os.environ.get(_NAME, "")
+    if said != _OFF:
+        _wish[0] = said
     os.environ[_NAME] = _OFF
 
 

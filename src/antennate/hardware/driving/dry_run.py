@@ -44,7 +44,7 @@ class DryRun:
         """Look at antennae and supervisor, at a time since the beginning [s], once a tick."""
         if not self._waits:
             return
-        if latched := _latched(out):
+        if latched := latched_causes(out):
             self._give_up(t, latched)
         elif self.asks:
             self._follow(t, out)
@@ -78,7 +78,7 @@ class DryRun:
         self._waits, self.refusal, self.end = False, why, t
 
 
-def _latched(out: Outputs | None) -> str:
+def latched_causes(out: Outputs | None) -> str:
     """A hardware error, which keeps torque off until a reboot; empty if there is none."""
     found = () if out is None or out.torque else out.causes
     return "; ".join(a.text for a in found if a.present and a.cause is Cause.SERVO_ERROR)

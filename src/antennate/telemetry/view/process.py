@@ -13,12 +13,10 @@ from importlib.util import find_spec
 
 from antennate.errors import BadInputError, MissingPackageError, WorkerError, reason
 from antennate.messages import extra
-from antennate.telemetry.view.channel import END, FAILED, READY, Channel
+from antennate.telemetry.view.channel import END, FAILED, IDLE, READY, Channel
 from antennate.telemetry.view.foxglove import require_foxglove
 
 HOST = "127.0.0.1"
-IDLE = "idle"
-"""Word that lets the process give way to all others."""
 _STARTING = 60.0
 """Longest wait for the process to serve [s]: its imports on a busy machine; assumed."""
 _ENDING = 2.0
