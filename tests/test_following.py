@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,10 +45,13 @@ class Bench:
         self.zeros: Floats = np.array(ROBOT.zeros, float)
         self.following.arm(self.zeros, dict.fromkeys(ROBOT.ids, FULL))
 
-    def tick(self, goal: float, place: float, pwm: int | None = None) -> None:
-        """Goal and place of the joint from its zero [ticks]; its drive, if it is read."""
+    def tick(self, goal: float, place: float, pwm: int | None = None, stands: bool = False) -> None:
+        """Goal and place of the joint from its zero [ticks]; its drive, if it is read.
+
+        The goal moves a little from tick to tick, as in a wave, unless the robot stands.
+        """
         goals, places = self.zeros.copy(), self.zeros.copy()
-        goals[self.at] += goal
+        goals[self.at] += goal + (0.0 if stands else 0.1 * (self.n % 2))
         places[self.at] += place
         self.n += 1
         self.following.step((0.01 * self.n, 0.01 * self.n + 0.002), goals, places)
@@ -76,7 +80,38 @@ def test_B20_a_joint_far_behind_at_full_drive_is_not_named_as_long_as_it_moves()
     assert not bench.named
     bench.run(2, 4096.0, 0.0, FULL)
     assert bench.named == {"behind"}
-    assert bench.following.faults.behind[9].endswith("has not moved for 2 s")
+    assert bench.following.faults.behind[9].endswith("has not moved for 2 s of moving goals")
+
+
+@pytest.mark.parametrize("joint", [YAW, LEG])
+def test_B20_a_joint_that_leans_while_the_robot_stands_is_healthy(joint: int) -> None:
+    """A minute of HOLD, row L9: its servo pushes, and no wave frees it; then the wave does."""
+    bench, lean = Bench(joint), 0.6 * SATURATED
+    bench.run(150, lean, 0.0, round(0.6 * FULL))
+    for _ in range(6000):
+        bench.tick(lean, 0.0, round(0.6 * FULL), stands=True)
+    assert bench.following.suspects == [joint]
+    assert not bench.named
+    bench.run(45, lean, 0.0, round(0.6 * FULL))
+    assert not bench.named
+    bench.run(10, lean, 0.0, round(0.6 * FULL))
+    assert bench.named == {"behind"}
+
+
+def test_B21_a_joint_pushed_beyond_its_limit_while_the_robot_stands_is_healthy() -> None:
+    bench, limit = Bench(YAW), ROBOT.yaw_limit / (2 * math.pi) * 4096
+    for way in np.linspace(0.0, limit + 1.1 * SATURATED, 60).tolist():
+        bench.tick(min(way, limit), way, -FULL)
+    for _ in range(6000):
+        bench.tick(limit, limit + 1.1 * SATURATED, -FULL, stands=True)
+    assert not bench.named
+
+
+def test_B20_a_joint_that_does_not_drive_is_named_while_the_robot_stands() -> None:
+    bench = Bench(YAW)
+    for _ in range(14):
+        bench.tick(SATURATED, 0.0, 0, stands=True)
+    assert bench.named == {"behind"}
 
 
 @pytest.mark.parametrize(("pwm", "named"), [(0, True), (650, True), (680, False), (FULL, False)])
@@ -166,11 +201,13 @@ def test_arming_forgets_what_was_wrong_and_takes_a_joint_where_it_stands() -> No
     bench.run(14, SATURATED, 0.0, 0)
     bench.run(14, 0.0, 1500.0, 0)
     assert bench.named == {"behind", "outside", "leaps"}
+    nearest = replace(bench.following.margins)
     stood = bench.zeros.copy()
     stood[YAW] += 1500.0
     bench.following.arm(stood, dict.fromkeys(ROBOT.ids, FULL))
     bench.run(20, 1500.0, 1500.0)
     assert not bench.named
+    assert bench.following.margins == nearest
 
 
 CASES = [

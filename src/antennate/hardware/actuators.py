@@ -51,12 +51,12 @@ class JointFaults:
 
 @dataclass(slots=True)
 class Margins:
-    """How near joints have come to each bound since torque came on, as a share of it.
+    """How near joints have come to each bound in a drive, as a share of it.
 
     Attributes:
         behind: Time in a row for which a joint that is behind drove too little.
-        stuck: Time in a row for which a joint that is behind did not move.
-        outside: Time in a row for which a joint was beyond its limit and the error of full drive.
+        stuck: Time of moving goals for which a joint that is behind did not move.
+        outside: The same for a joint beyond its limit and the error of full drive.
         speed: Way of a joint from one reading to the next.
     """
 

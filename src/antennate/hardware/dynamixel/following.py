@@ -4,11 +4,12 @@ A joint may be behind its goal for a good reason: something holds it, and its se
 it has. So a joint that is behind is asked for its drive, Present PWM. The position loop gives
 gain · error up to the bound of the drive; a servo that gives much less is not driven, or tells a
 wrong position. A joint that is behind and does not move at all for a gait cycle is stuck, or its
-gear, its encoder or a wire of its motor is broken, which no register tells.
+gear, its encoder or a wire of its motor is broken, which no register tells. Only time in which its
+goal moves counts: while a robot stands, no wave frees a joint that leans on something.
 
 The goal of a joint is within its limit. Beyond it by more than the error of full drive, a joint is
 overpowered, as a body that pushes in a corner may be for a moment. It is named if its servo gives
-less than that, too, or if it stays there for a gait cycle.
+less than that, too, or if it stays there for a gait cycle in which its goal moves.
 
 The goal is as near as any of the last few ticks was: goals take time to arrive and may get lost.
 Nothing here reads a clock or a port.
@@ -25,6 +26,7 @@ import numpy as np
 from antennate.hardware.actuators import JointFaults, Margins
 from antennate.hardware.dynamixel.tables import POSITION_UNIT
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety.deadlines import WATCHDOG
 from antennate.params.safety import FollowingParams
 from antennate.robots.servos import FULL_DRIVE
 from antennate.types import Floats
@@ -33,8 +35,6 @@ _GOALS = 3
 """Ticks of which the nearest goal counts: one on its way, one lost (assumed)."""
 _READINGS = 3
 """Readings of the drive in a row that must all be wrong: chance spoils single ones (assumed)."""
-_AGE = 0.1
-"""Oldest that a position may be when it is read [s]: the watchdog of a servo."""
 
 
 class Following:
@@ -48,7 +48,7 @@ class Following:
 
     Attributes:
         faults: What is wrong.
-        margins: How near it came to that.
+        margins: How near it came to that, over all arm events.
         suspects: Places in the robot's order of joints whose drive should be read.
     """
 
@@ -70,6 +70,7 @@ class Following:
         zero, reach = np.array(robot.zeros, float), np.array(robot.limits) / POSITION_UNIT
         self._low: Floats = zero - reach
         self._high: Floats = zero + reach
+        self.margins = Margins()
         self.disarm()
 
     def arm(self, stood: Floats, pwm: Mapping[int, int]) -> None:
@@ -80,7 +81,7 @@ class Following:
 
     def disarm(self) -> None:
         """Torque is off, or about to come on anew."""
-        self.faults, self.margins = JointFaults(), Margins()
+        self.faults = JointFaults()
         self.rest()
 
     def rest(self) -> None:
@@ -96,6 +97,7 @@ class Following:
         self._beyond: Floats = np.zeros(count)
         self._before: Floats = np.full(count, math.nan)
         self._read: Floats = np.full(count, math.nan)
+        self._judged = math.nan
 
     def step(self, span: tuple[float, float], goals: Floats, positions: Floats) -> None:
         """Judge the positions of a tick.
@@ -105,9 +107,10 @@ class Following:
             goals: The goals last sent [ticks], shape (n,).
             positions: Of the joints [ticks], NaN for one that did not answer, shape (n,).
         """
+        self._wait(span[1], goals)
         self._goals.append(goals.copy())
         self._leap(span, positions)
-        self.leave(span[1], positions)
+        self._leave(span[1], positions)
         near, far = np.min(self._goals, axis=0), np.max(self._goals, axis=0)
         with np.errstate(invalid="ignore"):
             behind = np.clip(positions, near, far) - positions
@@ -151,6 +154,14 @@ class Following:
             if self._beyond[at] * self._gain[at] >= 1.0:
                 self._tell_beyond(at)
 
+    def _wait(self, now: float, goals: Floats) -> None:
+        """Times of joints whose goal stands still since the last tick do not go on."""
+        if self._goals:
+            pause = np.where(goals == self._goals[-1], now - self._judged, 0.0)
+            self._rested += pause
+            self._within += pause
+        self._judged = now
+
     def _due(self, behind: Floats) -> Floats:
         """Least drive for these errors [full drives], shape (n,)."""
         return np.minimum(self._share * self._gain * abs(behind), self._most)
@@ -161,7 +172,7 @@ class Following:
             self.margins.stuck = max(self.margins.stuck, stuck)
             if stuck >= 1.0 and self._follows_not(at):
                 away, time = self._radians(behind[at]), f"{self._stuck_time:g} s"
-                text = f"is {away} behind and has not moved for {time}"
+                text = f"is {away} behind and has not moved for {time} of moving goals"
                 self._tell(self.faults.behind, at, text)
 
     def _follows_not(self, at: int) -> bool:
@@ -169,7 +180,7 @@ class Following:
         servo = self._ids[at]
         return servo in self.faults.behind or self._well(servo)
 
-    def leave(self, now: float, positions: Floats) -> None:
+    def _leave(self, now: float, positions: Floats) -> None:
         """Whether joints are beyond their limits by more than the error of full drive."""
         low, high = self._least
         with np.errstate(invalid="ignore"):
@@ -189,7 +200,7 @@ class Following:
     def _leap(self, span: tuple[float, float], positions: Floats) -> None:
         began, ended = span
         way = abs(positions - self._before)
-        time = ended - self._read + _AGE
+        time = ended - self._read + WATCHDOG  # its packet may be as old
         leap = way / (self._fastest * time)
         self.margins.speed = max(self.margins.speed, float(np.nanmax(leap, initial=0.0)))
         for at in np.flatnonzero(leap >= 1.0).tolist():
