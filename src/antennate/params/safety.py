@@ -47,7 +47,7 @@ class FollowingParams(Params):
     stuck_time: float = number(
         2.0, "s", "assumed: a gait cycle at half a hertz; its wave frees a joint", gt=0, le=60
     )
-    """Time of moving goals for which a joint that is behind does not move, or is beyond its limit."""
+    """Time with moving goals for which a joint is behind without motion, or beyond its limit."""
     still: float = number(
         0.02, "rad", "assumed: four times the backlash of 0.25 degrees (datasheet)", gt=0, le=1
     )

@@ -9,12 +9,11 @@ from antennate.hardware.dynamixel import inquiry
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.inquiry import Present
 from antennate.hardware.dynamixel.tables import XC430_W240, Register, model_name
+from antennate.hardware.safety.deadlines import READ_OUTSIDE
 
 _READS = 10
 """Tries until a servo is given up that is asked: 1 s, so that a computer which stands still for a
 while is no silent servo (assumed)."""
-_BUDGET = 0.1
-"""Time for one reading of all outside the loop [s]: ten times what 19 answers take (assumed)."""
 
 
 class BringUpError(ActuatorError):
@@ -91,7 +90,7 @@ def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int,
     Raises:
         BringUpError: A servo did not answer after several tries.
     """
-    values = inquiry.read_some(bus, ids, register, _READS, _BUDGET)
+    values = inquiry.read_some(bus, ids, register, _READS, READ_OUTSIDE)
     if left := [servo for servo in ids if servo not in values]:
         raise BringUpError(f"could not read {register.name} of servos {left}")
     return values

@@ -109,7 +109,7 @@ ACCELERATION_UNIT = 214.577 * 2.0 * math.pi / 3600.0
 POSITION_UNIT = 2.0 * math.pi / 4096
 """One count of a position [rad]."""
 WATCHDOG_UNIT = 0.020
-"""One count of the bus watchdog [s]."""
+"""One count of the bus watchdog [s] (e-manual of the XC430-W240, address 98)."""
 RETURN_DELAY_UNIT = 2e-6
 """One count of the return delay time [s]."""
 

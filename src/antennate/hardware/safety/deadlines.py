@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from antennate.errors import ConfigError
+from antennate.hardware.dynamixel.tables import WATCHDOG_UNIT
 from antennate.params.safety import SupervisorParams
 
 READ_ONE = 0.003
@@ -22,8 +23,8 @@ READ_ALL = 0.007
 """Time for the positions of all servos [s]: what a tick of 10 ms leaves for reading (assumed)."""
 ANSWER = 0.07
 """Latest answer while servos have torque [s]: less than their watchdogs allow (assumed)."""
-WATCHDOG_UNIT = 0.02
-"""Unit of the register Bus Watchdog [s] (e-manual of the XC430-W240, address 98)."""
+READ_OUTSIDE = 0.1
+"""Time for one reading of all outside the loop [s]: ten times what 19 answers take (assumed)."""
 WATCHDOG_COUNTS = 5
 """Bus watchdog of a robot that walks [20 ms]: a servo stops ten ticks after the last packet
 (assumed)."""

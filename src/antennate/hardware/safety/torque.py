@@ -16,14 +16,12 @@ from antennate.hardware.dynamixel.bringup import BringUpError, read_register
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import EXTENDED_MODE, XC430_W240, Register
 from antennate.hardware.ports.port import PortError
-from antennate.hardware.safety.deadlines import READ_LEG, WATCHDOG_COUNTS
+from antennate.hardware.safety.deadlines import READ_LEG, READ_OUTSIDE, WATCHDOG_COUNTS
 
 _TRIES = 5
 """Tries to take torque off: at 1 % loss five in a row are one in 10^10 (assumed)."""
 _WRITES = 3
 """Writes until a servo that has another value is given up: noise seldom spoils three (assumed)."""
-_BUDGET = 0.1
-"""Time for one reading of all outside the loop [s]: ten times what 19 answers take (assumed)."""
 _COMMON = XC430_W240.registers
 _TORQUE, _GOAL = _COMMON["torque_enable"], _COMMON["goal_position"]
 
@@ -128,7 +126,7 @@ def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
 
 
 def disable(
-    bus: Bus, ids: Sequence[int], tries: int = _TRIES, budget: float = _BUDGET
+    bus: Bus, ids: Sequence[int], tries: int = _TRIES, budget: float = READ_OUTSIDE
 ) -> list[int]:
     """Torque off as well as can be, whatever the bus does: the ids that did not confirm it.
 

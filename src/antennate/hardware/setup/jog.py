@@ -19,12 +19,13 @@ from antennate.hardware.dynamixel.tables import (
     POSITION_UNIT,
     TABLES,
     VELOCITY_UNIT,
+    WATCHDOG_UNIT,
     Register,
     hardware_errors,
 )
 from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import torque
-from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS, WATCHDOG_UNIT
+from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import Joint
 from antennate.params.setup import JogParams
@@ -134,7 +135,7 @@ class Jog:
         self._newest = self._newest._replace(goal=goal)
 
     def look(self) -> JogState:
-        """What the joint does; call it at least every 0.1 s, or its watchdog stops it.
+        """What the joint does; call it at least every 0.2 s, or its watchdog stops it.
 
         Raises:
             SetupError: It does not answer any more, or reports an error.

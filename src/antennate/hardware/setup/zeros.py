@@ -16,6 +16,7 @@ import numpy as np
 from antennate.hardware.dynamixel.answers import POSITION, Value
 from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
 from antennate.params.setup import SetupParams
 from antennate.robots.joints import QUARTER, STRAIGHT
@@ -29,8 +30,6 @@ POSE = (
 )
 _PERIOD = 0.05
 """Time between two readings [s]."""
-_BUDGET = 0.1
-"""Time for one reading of all [s]: ten times what 19 answers take (assumed)."""
 _LOST = 20
 """Readings in a row that one servo may miss: a second (assumed)."""
 _STEP = 2.0 * math.pi / TICKS_A_TURN
@@ -92,7 +91,7 @@ class Positions:
             PortError: The bus is gone.
         """
         while True:
-            answers = self._bus.read_all(self._ids, POSITION, _BUDGET)
+            answers = self._bus.read_all(self._ids, POSITION, READ_OUTSIDE)
             for servo, reply in answers.items():
                 if isinstance(reply, Value):
                     self._newest[servo] = XC430_W240["present_position"].decode(reply.data)
