@@ -23,6 +23,8 @@ from antennate.telemetry.topics import ANTENNA
 from antennate.telemetry.writer import LogWriter
 
 TICKS = 30
+MESSAGE = 0x05
+"""Kind of the record of a message; its channel comes first (specification of MCAP)."""
 LAST = 2**64 - 1
 """Latest time [ns] that MCAP can tell."""
 
@@ -260,19 +262,23 @@ def test_damage_to_a_log_in_another_order_is_named_where_it_is(
     assert f"first at byte {places[-2][0]} of new.mcap" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("further", "places"), [(0, 1), (1, 2)])
 def test_damage_to_an_unguarded_log_is_named_where_it_shows(
-    log: Path, capsys: pytest.CaptureFixture[str]
+    further: int, places: int, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The kind of a record in its middle is none that there is."""
+    """The kind of a record is none that there is; inside a tick that leaves half a tick, too."""
     new = anew(log, use_chunking=False)
     data = bytearray(new.read_bytes())
-    places = [begin for _, begin, _ in records(bytes(data))]
-    data[places[len(places) // 2]] = 0x7F
+    with new.open("rb") as file:
+        antenna = next(make_reader(file).iter_messages(topics="/antenna"))[1].id
+    begins = [begin for kind, begin, _ in records(bytes(data)) if kind == MESSAGE]
+    ticks = [n for n, at in enumerate(begins) if data[at + 9] == antenna]  # each begins with it
+    data[begins[ticks[TICKS // 2] + further]] = 0x7F
     new.write_bytes(data)
     code, found, said = info(new, capsys)
     assert code == 2
     assert 0 < found["ticks"] < TICKS
-    assert found["damaged"] == 1
+    assert found["damaged"] == places
     assert found["missing"] == TICKS - found["ticks"]
     assert "damaged record" in said
 
