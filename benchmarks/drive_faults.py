@@ -286,6 +286,7 @@ def once(case: str, chance: random.Random) -> dict[str, Any]:
     trace = any("Traceback" in line for line in run.lines)
     complete = "worst_state" in found or case == "SIGKILL"
     keys = ("code", "worst_state", "why", "torque_off", "servos_on", "ended", "refusal", "next")
+    keys = (*keys, "pace")
     outcome = {key: found[key] for key in keys if key in found}
     good = walked and complete and not trace and "HANGS" not in run.lines and check(found)
     good = good and found.get("next", 0) == 0

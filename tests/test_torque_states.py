@@ -116,6 +116,7 @@ class Robot(RuleBasedStateMachine):
             quality=SignalQuality(ConditioningParams()),
         )
         self.decided: Outputs | None = None
+        self.sent = b""
         self.armed = self.pressed = self.standing = self.decided_before = False
         step = self.session.supervisor.step
 
@@ -142,15 +143,25 @@ class Robot(RuleBasedStateMachine):
         out, session = self.decided, self.session
         assert out is not None, one
         assert out.torque, one
+        assert out.arming or out.feed_watchdog, "the decision of this tick lets it"
+        changed = self.changed(one)
         if out.arming:
             assert self.pressed, "torque by an arm event alone"
             self.armed = True
             return
         assert one.address == GOAL, one
         assert self.armed, one
+        assert out.move or not changed, "a goal that is new only if the supervisor lets it move"
         held = session.control.standing or self.standing
         slow = session.control.rate < 1.0 and self.decided_before  # every second tick, no more
         assert self.mind.answered or held or slow, "a goal without a decision of this tick"
+
+    def changed(self, one: Written) -> bool:
+        """Whether goals for all servos differ from those of the last such write."""
+        if one.address != GOAL:
+            return False
+        before, self.sent = self.sent, one.data
+        return self.sent != before
 
     def tick(self, asked: bool = True) -> None:
         """One tick of the loop; `asked` is whether the loop reaches the controller."""
