@@ -4,6 +4,8 @@ Trials of `tunnel` in simulation: in every tick the simulated servos tell goal, 
 as real ones would, and `Following` judges them. Below 1 nothing is named:
 
     python benchmarks/following.py --trials 200 --seed 1 --json > margins.json
+
+With `--hold 4` the robot stands for 4 s after every 4 s of its walk, as in HOLD.
 """
 
 import argparse
@@ -25,7 +27,20 @@ from antennate.robots.servos import FULL_DRIVE
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, Controller, JointCommand
+
+
+class Holding:
+    """A controller whose command stands still for a time [s] after each such time of walking."""
+
+    def __init__(self, control: Controller, time: float) -> None:
+        self._control, self._time = control, time
+        self._command: JointCommand | None = None
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        if self._command is None or not self._time or float(frame.t[0]) // self._time % 2 == 0:
+            self._command = self._control.step(frame)
+        return self._command
 
 
 class Trial:
@@ -37,7 +52,9 @@ class Trial:
         status: How it ended.
     """
 
-    def __init__(self, config: TunnelConfig, body: SimRobot, name: str, number: int) -> None:
+    def __init__(
+        self, config: TunnelConfig, body: SimRobot, name: str, number: int, hold: float
+    ) -> None:
         scene, period = make_scene(config.scene, config.tunnel), config.control.period
         start = draw_trial(config, scene, number, config.control.gait, period)
         body.load(0, start.world, start.chance)
@@ -52,7 +69,7 @@ class Trial:
         self.following.arm(self._goals, dict.fromkeys(config.robot.ids, FULL_DRIVE))
         self.ticks = self.saturated = 0
         self.status = ""
-        run_loop(body, self._control, period, self._go_on)
+        run_loop(body, Holding(self._control, hold), period, self._go_on)
 
     def _go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
         """The last goals have moved the joints; judge that, and take the next ones."""
@@ -73,12 +90,12 @@ class Trial:
         return not self.status
 
 
-def trials(seed: int, numbers: range, name: str) -> Iterator[dict[str, Any]]:
+def trials(seed: int, numbers: range, name: str, hold: float) -> Iterator[dict[str, Any]]:
     """Each trial: how it ended, its margins, and the causes that were named."""
     config = TunnelConfig(seed=seed)
     body = SimRobot(1, config.robot, config.control.period, config.physics.timestep)
     for number in numbers:
-        trial = Trial(config, body, name, number)
+        trial = Trial(config, body, name, number, hold)
         faults = {key: words for key, words in asdict(trial.following.faults).items() if words}
         margins = {key: round(share, 4) for key, share in asdict(trial.following.margins).items()}
         yield {
@@ -98,10 +115,12 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--controller", default="closed")
+    parser.add_argument("--hold", type=float, default=0.0, help="time to walk and to stand [s]")
     parser.add_argument("--json", action="store_true", help="print one JSON object and no lines")
     args = parser.parse_args()
     rows: list[dict[str, Any]] = []
-    for row in trials(args.seed, range(args.first, args.first + args.trials), args.controller):
+    numbers = range(args.first, args.first + args.trials)
+    for row in trials(args.seed, numbers, args.controller, args.hold):
         rows.append(row)
         if not args.json:
             print(row, flush=True)
