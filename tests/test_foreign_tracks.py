@@ -110,6 +110,28 @@ def test_a_column_without_a_name_is_called_by_its_place(
         classified(path, columns={"time": f"column {last}"})
 
 
+def test_a_name_that_is_missing_in_the_header_is_asked_for(
+    points: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    """R names its row names not at all (`write.table`): every other name is one place too early."""
+    path = write(tmp_path / "a.csv", points)
+    whole, names = path.read_text(), path.read_text().split("\n")[0]
+    width = names.count(",") + 1
+    path.write_text(whole.replace("frame,", "", 1))
+    said = rf"row 2: expected {width - 1} cells, found {width}; does row 1 lack .* --columns.frame$"
+    with pytest.raises(antennate.BadInputError, match=said):
+        classified(path)
+    path.write_text(whole.replace("frame,", "row,", 1))
+    result, _ = classified(path, columns={"frame": "row"})
+    assert result.summary["handled"]["absent"] == 0
+    path.write_text(f"{names}\n0{',1,2' * (width // 2 + 1)}\n")
+    with pytest.raises(antennate.BadInputError, match=r"decimal commas\? write points$"):
+        classified(path)
+    path.write_text(f"{names}\n1,2\n")
+    with pytest.raises(antennate.BadInputError, match=r"found 2 \(truncated\); delete the row$"):
+        classified(path)
+
+
 @pytest.mark.parametrize("inner", [(), ("1", "2")])
 def test_a_tip_that_is_never_seen_is_said_and_the_other_antenna_still_tells_the_sides(
     inner: tuple[str, ...], points: dict[str, np.ndarray], tmp_path: Path

@@ -85,7 +85,17 @@ def _numbers(
 ) -> list[float]:
     """Numbers of a row, NaN for a cell that says of itself that it has none."""
     if len(cells) != len(header):
-        raise BadInputError(f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}")
+        why = "; are there decimal commas? write points"
+        if len(cells) < len(header):
+            why = " (truncated); delete the row"
+        elif any("." in cell for cell in cells):
+            why = (
+                "; does row 1 lack the name of a column? R writes none above its row names: write "
+                "one there, and name the column of frames with --columns.frame"
+            )
+        raise BadInputError(
+            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
+        )
     values: list[float] = []
     for place in places:
         cell = cells[place].strip()
