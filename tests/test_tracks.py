@@ -7,6 +7,7 @@ import functools
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -289,7 +290,7 @@ def test_an_npz_that_is_not_of_trex_is_told_so(kind: str, found: str, tmp_path: 
     """And nobody is advised to load it as code."""
     path = tmp_path / "a.npz"
     objects = np.array([{}, {}], object)
-    poses = {f"pose{axis}{name}": np.zeros(2) for name in NAMES for axis in "XY"}
+    poses: Any = {f"pose{axis}{name}": np.zeros(2) for name in NAMES for axis in "XY"}
     whole = saved(path, np.savez_compressed, frame=np.arange(9), **poses)
     content = {
         "text": b"hello",
