@@ -35,7 +35,7 @@ def test_a_tutorial_runs(page: str, tmp_path: Path) -> None:
 def hold_marks(record: Command, script: Script) -> None:
     """Hold the antenna at each mark that is asked for."""
     assert script.twin is not None
-    for _ in range(4 * 5):
+    for _ in range(6 * 5):
         mark = record.until(r"hold at (\d+) mm")[1]
         script.twin.order(f"touch left:{mark}mm")
         time.sleep(0.3)  # the bend has to arrive before it is confirmed

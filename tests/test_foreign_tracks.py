@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import tracemalloc
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,6 +110,28 @@ def test_a_column_without_a_name_is_called_by_its_place(
         classified(path, columns={"time": f"column {last}"})
 
 
+def test_a_name_that_is_missing_in_the_header_is_asked_for(
+    points: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    """R names its row names not at all (`write.table`): every other name is one place too early."""
+    path = write(tmp_path / "a.csv", points)
+    whole, names = path.read_text(), path.read_text().split("\n")[0]
+    width = names.count(",") + 1
+    path.write_text(whole.replace("frame,", "", 1))
+    said = rf"row 2: expected {width - 1} cells, found {width}; does row 1 lack .* --columns.frame$"
+    with pytest.raises(antennate.BadInputError, match=said):
+        classified(path)
+    path.write_text(whole.replace("frame,", "row,", 1))
+    result, _ = classified(path, columns={"frame": "row"})
+    assert result.summary["handled"]["absent"] == 0
+    path.write_text(f"{names}\n0{',1,2' * (width // 2 + 1)}\n")
+    with pytest.raises(antennate.BadInputError, match=r"decimal commas\? write points$"):
+        classified(path)
+    path.write_text(f"{names}\n1,2\n")
+    with pytest.raises(antennate.BadInputError, match=r"found 2 \(truncated\); delete the row$"):
+        classified(path)
+
+
 @pytest.mark.parametrize("inner", [(), ("1", "2")])
 def test_a_tip_that_is_never_seen_is_said_and_the_other_antenna_still_tells_the_sides(
     inner: tuple[str, ...], points: dict[str, np.ndarray], tmp_path: Path
@@ -171,12 +195,19 @@ def test_a_wall_that_is_far_or_within_reach_of_many_is_said(
     assert "an antenna reaches beyond the wall: is it where the file has it?" in result.sentence
 
 
-def npz(path: Path, length: int) -> None:
-    """A file of TRex whose arrays say that they are so long; little of them is there."""
+AXES = [f"pose{axis}{k}" for k in range(3) for axis in "XY"]
+
+
+def npz(path: Path, length: int, names: Iterable[str] = ("frame", *AXES), rest: int = -1) -> None:
+    """A file of TRex whose arrays say that they are so long; little of them is there.
+
+    Those after the first are `rest` long, if that is given.
+    """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
-        for name in ("frame", *(f"pose{axis}{k}" for k in range(3) for axis in "XY")):
+        for place, name in enumerate(names):
             with packed.open(f"{name}.npy", "w") as file:
-                about = {"descr": "<f8", "fortran_order": False, "shape": (length,)}
+                shape = (rest if place and rest >= 0 else length,)
+                about = {"descr": "<f8", "fortran_order": False, "shape": shape}
                 np.lib.format.write_array_header_1_0(file, about)
                 file.write(bytes(8000))
 
@@ -200,7 +231,7 @@ def test_what_a_file_unpacks_to_is_judged_before_it_is_unpacked(
     words += ["--points.head", "1", "--rate", "30", "--out", str(tmp_path / "out")]
     assert main(["tracks", "--files", str(path), *words]) == 2
     error = capsys.readouterr().err
-    assert f"{path}: expected at most 1 GB once unpacked, found " in error
+    assert f"{path}: expected at most 200 MB once unpacked, found " in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
     tracemalloc.start()
@@ -209,6 +240,55 @@ def test_what_a_file_unpacks_to_is_judged_before_it_is_unpacked(
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 10e6
+
+
+def header_of(size: int) -> bytes:
+    """The begin of an array of NumPy whose header says that it is so long."""
+    return b"\x93NUMPY\x02\x00" + size.to_bytes(4, "little") + bytes(size)
+
+
+@pytest.mark.parametrize(
+    ("names", "length", "rest", "said"),
+    [
+        (("frame", "poseX", "speed"), 10**7, -1, "expected a point 0"),
+        (("frame", "speed"), 10**7, -1, "expected an npz file of TRex with poseX0"),
+        (AXES, 10**7, -1, "expected an array frame, found none"),
+        (("frame", *AXES[:5]), 10**6, -1, "expected an array poseY2, found none"),
+        (("frame", *AXES), 10**6, 10, "expected 1000000 values of "),
+        (("frame", *AXES, "missing"), 10, 10**6, "expected 10 values of "),
+        (("frame", *AXES, "frame_rate"), 10**6, -1, "expected 1 values of frame_rate, found 1000"),
+        (("frame", *AXES, "missing", "frame_rate"), 57_142_857, 10, "expected at most 200 MB"),
+        (("frame", "frame", *AXES), 10, -1, "frame is there twice"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_names_and_lengths_are_judged_before_an_array_is_unpacked(
+    names: tuple[str, ...], length: int, rest: int, said: str, tmp_path: Path
+) -> None:
+    npz(tmp_path / "a.npz", length, names, rest)
+    refused_in_little_memory(tmp_path / "a.npz", said)
+
+
+def refused_in_little_memory(path: Path, said: str) -> None:
+    tracemalloc.start()
+    with pytest.raises(antennate.BadInputError) as caught:
+        read(path, ("0", "1", "2"), ColumnsParams())
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert f"{path}: expected" in str(caught.value)
+    assert said in str(caught.value)
+    assert peak < 2e6
+
+
+def test_hostile_headers_and_texts_of_arrays_are_refused_in_little_memory(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    npz(path, 10, AXES)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("frame.npy", header_of(50_000_000))
+    refused_in_little_memory(path, "found a damaged one")
+    arrays: dict[str, Any] = {name: np.zeros(3) for name in AXES}
+    np.savez(path, **arrays, frame=np.array(["0", "1", "2"]))
+    refused_in_little_memory(path, "frame is no array of numbers")
 
 
 def test_a_blank_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

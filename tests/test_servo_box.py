@@ -275,6 +275,7 @@ def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() ->
 
 
 OF_A_ROBOT = (
+    "--mains=60",
     *("--scene=flat", "--seed=3", "--trial=2", "--robot.mass=3", "--robot=hexapod"),
     *("--tunnel.strewn=1", "--physics.timestep=0.001", "--variation.slip-time=2"),
     *("--control.rate=50", "--control.gait.amplitude=0.1", "--battery.voltage=10"),

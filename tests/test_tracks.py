@@ -7,10 +7,11 @@ import functools
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from tracked import DWELL, POINTS, animal, bent, classified, dwelling, write
+from tracked import DWELL, NAMES, POINTS, animal, bent, classified, dwelling, write
 
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
@@ -289,13 +290,14 @@ def test_an_npz_that_is_not_of_trex_is_told_so(kind: str, found: str, tmp_path: 
     """And nobody is advised to load it as code."""
     path = tmp_path / "a.npz"
     objects = np.array([{}, {}], object)
-    whole = saved(path, np.savez_compressed, frame=np.arange(9), poseX0=np.arange(9))
+    poses: Any = {f"pose{axis}{name}": np.zeros(2) for name in NAMES for axis in "XY"}
+    whole = saved(path, np.savez_compressed, frame=np.arange(9), **poses)
     content = {
         "text": b"hello",
         "npy": saved(path, np.save, arr=np.zeros(3)),
         "empty": b"",
         "another": saved(path, speed=np.zeros(3), time=np.zeros(3)),
-        "objects": saved(path, frame=objects, poseX0=np.zeros(2)),
+        "objects": saved(path, frame=objects, **poses),
         "damaged": whole.replace(whole[70:80], 10 * b"\xff"),
     }
     path.write_bytes(content[kind])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from twin_rig import Rig, rig
 
+from antennate.cli import main
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -21,6 +22,7 @@ from antennate.hardware.safety.causes import State
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
+from antennate.twin.converter import Converter
 from antennate.twin.faults import Faults, read
 from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot
@@ -185,6 +187,56 @@ def test_a_fault_of_the_answers_is_taken_back() -> None:
     assert heard == [False, True]
 
 
-@pytest.mark.parametrize("text", ["servo:7=torque_enable:0", "servo:7=silent", "bus=latency:0.05"])
+@pytest.mark.parametrize("counts", [0.0, 4095.0, 60000.0, 1250.0])
+@pytest.mark.parametrize("others", [(), ("hum:900",), ("plateau:1250",), ("plateau:0", "sticky")])
+def test_every_code_is_one_of_the_converter(counts: float, others: tuple[str, ...]) -> None:
+    """0 to 4095 of 12 bits (ESP32 datasheet), and none above a plateau."""
+    converter = Converter(seed=1, mains=50.02)
+    demands = [read(f"esp32={text}") for text in (f"left:{counts}", *others, "stuck_left")]
+    for demand in demands:
+        converter.set(demand.what, demand.size)
+    codes = [converter.codes(t, np.full(2, 1800.0), np.zeros(2))[0] for t in np.arange(40) / 100]
+    largest = next((int(text[8:]) for text in others if text.startswith("plateau")), 4095)
+    assert min(codes) >= 0
+    assert max(codes) <= largest
+    assert max(codes) - min(codes) <= 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("plateau:-5", "a code of 0 to 4095, as plateau:SIZE"),
+        ("plateau:4096", "a code of 0 to 4095"),
+        ("plateau", "a code of 0 to 4095"),
+        ("hum", "0 to 65535 counts, as hum:SIZE"),
+        ("hum:-3", "0 to 65535 counts"),
+        ("radio_noise", "0 to 65535 counts"),
+        ("radio_noise:-3", "0 to 65535 counts"),
+        ("drift", "at most 65535 counts a second"),
+        ("drift:1e9", "at most 65535 counts a second"),
+        ("drift:1e999", "finite numbers"),
+        ("left", "a reading of 0 to 65535"),
+        ("right:-1", "a reading of 0 to 65535"),
+        ("ber", "a share of 0 to 1"),
+    ],
+)
+def test_a_fault_without_its_size_or_out_of_range_is_one_line(
+    text: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["twin", "--fault", f"esp32={text}", "--duration", "0.1"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"--fault: expected {said}" in line
+    assert line.endswith(f"found 'esp32={text}'")
+
+
+@pytest.mark.parametrize("text", ["servo:7=late", "bus=latency", "bus=latency:-1", "bus=discharge"])
+def test_delays_and_falls_need_a_size_too(text: str) -> None:
+    with pytest.raises(BadInputError, match=r"--fault: expected (seconds|volts)"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["servo:7=torque_enable:0", "servo:7=silent", "bus=latency:0.05", "esp32=left:0"]
+)
 def test_a_fault_is_told_as_it_was_asked_for(text: str) -> None:
     assert str(read(text)) == text

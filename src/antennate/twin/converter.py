@@ -56,7 +56,7 @@ class Converter:
         elif side in SIDES:
             self.wires[SIDES.index(side)] = kind
         else:
-            setattr(self, what, size or what == "sticky")
+            setattr(self, what, True if what == "sticky" else size)
 
     def codes(self, t: float, readings: Floats, noise: Floats) -> tuple[int, int]:
         """Codes at the time t [s] of exact readings (2,) and their noise (2,) [counts]."""
@@ -77,12 +77,14 @@ class Converter:
             return 0
         if self.sticky:
             counts = self._stick(counts + self._chance.normal(0.0, _STICKY_NOISE))
-        code = min(max(round(counts), 0), int(self.plateau))
         if wire != "stuck":
-            return code
+            return self._clamped(counts)
         if math.isnan(self._stuck[place]):
-            self._stuck[place] = code
-        return int(self._stuck[place] + self._chance.integers(-1, 2))
+            self._stuck[place] = self._clamped(counts)
+        return self._clamped(self._stuck[place] + self._chance.integers(-1, 2))
+
+    def _clamped(self, counts: float) -> int:
+        return min(max(round(counts), 0), int(self.plateau))
 
     def _stick(self, counts: float) -> float:
         if self._chance.random() >= _STICKY_SHARE:

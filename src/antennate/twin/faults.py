@@ -5,12 +5,14 @@ A register of a servo takes a value by its name: `servo:7=return_delay_time:250`
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from antennate.errors import BadInputError
 from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.hardware.esp32.frame import FULL_SCALE
 from antennate.robots.servos import MOST_TICKS
 from antennate.twin.bus import ServoBus
 from antennate.twin.converter import SIDES
@@ -48,7 +50,17 @@ _KNOWN = {
     "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
 }
-_SHARES = ("loss", "ber")
+_SIZES = {
+    **dict.fromkeys(SIDES, (0.0, _MOST_COUNTS, f"a reading of 0 to {_MOST_COUNTS}")),
+    **dict.fromkeys(("hum", "radio_noise"), (0.0, _MOST_COUNTS, f"0 to {_MOST_COUNTS} counts")),
+    "drift": (-_MOST_COUNTS, _MOST_COUNTS, f"at most {_MOST_COUNTS} counts a second"),
+    "plateau": (0.0, FULL_SCALE, f"a code of 0 to {FULL_SCALE}"),
+    **dict.fromkeys(("loss", "ber"), (0.0, 1.0, "a share of 0 to 1")),
+    **dict.fromkeys(("late", "latency"), (0.0, math.inf, "seconds from 0 on")),
+    "discharge": (-math.inf, math.inf, "volts a second"),
+    _JUMP: (-MOST_TICKS, MOST_TICKS, f"a jump of 1 to {MOST_TICKS} ticks"),
+}
+"""Faults that mean nothing without a size: the least, the largest and how they are called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +85,8 @@ class Demand:
 
     def __str__(self) -> str:
         servo = f":{self.servo}" if self.servo else ""
-        register = self.what in XC430_W240.registers
-        size = f":{self.size:g}" if self.size or register else ""
+        sized = self.what in XC430_W240.registers or self.what in _SIZES
+        size = f":{self.size:g}" if self.size or sized else ""
         return f"{self.target}{servo}={self.what}{size}"
 
 
@@ -82,7 +94,7 @@ def read(text: str) -> Demand:
     """One demand from its text.
 
     Raises:
-        BadInputError: It has another form, or is not known.
+        BadInputError: It has another form, is not known, or lacks a size or has one out of range.
     """
     match = _FORM.fullmatch(text)
     if match is None:
@@ -100,15 +112,18 @@ def read(text: str) -> Demand:
         raise BadInputError(
             f"--fault: expected numbers for size and time, found {text!r}"
         ) from None
-    if match["what"] in SIDES and size > _MOST_COUNTS:
-        raise BadInputError(f"--fault: expected a reading of 0 to {_MOST_COUNTS}, found {text!r}")
-    if match["what"] == _JUMP and not 1 <= abs(size) <= MOST_TICKS:
-        raise BadInputError(f"--fault: expected a jump of 1 to {MOST_TICKS} ticks, found {text!r}")
-    if match["what"] in _SHARES and not 0.0 <= size <= 1.0:
-        raise BadInputError(f"--fault: expected a share of 0 to 1, found {text!r}")
+    if not (math.isfinite(size) and math.isfinite(t)):
+        raise BadInputError(f"--fault: expected finite numbers, found {text!r}")
+    _check_size(match["what"], size, given=bool(match["size"]), text=text)
     if register:
         _check_register(match["what"], size)
     return Demand(target, int(match["id"] or 0), match["what"], size, t)
+
+
+def _check_size(what: str, size: float, given: bool, text: str) -> None:
+    least, largest, called = _SIZES.get(what, (-math.inf, math.inf, ""))
+    if called and not (given and least <= size <= largest and (what != _JUMP or abs(size) >= 1)):
+        raise BadInputError(f"--fault: expected {called}, as {what}:SIZE, found {text!r}")
 
 
 def _check_register(name: str, value: float) -> None:

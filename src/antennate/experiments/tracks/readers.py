@@ -39,6 +39,9 @@ _DAMAGES = (
     ValueError,
 )
 """What NumPy raises for a damaged npz file."""
+_TREX = "an npz file of TRex with poseX0, poseY0 and so on"
+_LONGEST_HEADER = 1 << 14
+"""More than NumPy takes of an array's header [byte]; one may say of itself that it has 4 GB."""
 
 
 def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
@@ -82,7 +85,17 @@ def _numbers(
 ) -> list[float]:
     """Numbers of a row, NaN for a cell that says of itself that it has none."""
     if len(cells) != len(header):
-        raise BadInputError(f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}")
+        why = "; are there decimal commas? write points"
+        if len(cells) < len(header):
+            why = " (truncated); delete the row"
+        elif any("." in cell for cell in cells):
+            why = (
+                "; does row 1 lack the name of a column? R writes none above its row names: write "
+                "one there, and name the column of frames with --columns.frame"
+            )
+        raise BadInputError(
+            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
+        )
     values: list[float] = []
     for place in places:
         cell = cells[place].strip()
@@ -226,61 +239,74 @@ def _trex(path: Path, names: Sequence[str]) -> list[Track]:
     import io
 
     data = read_limited(path, LARGEST)
-    wanted = "an npz file of TRex with poseX0, poseY0 and so on"
     if not data.startswith(b"PK"):
-        raise BadInputError(f"{path}: expected {wanted}, found {'none' if data else 'nothing'}")
-    wanted_keys = {"frame", "frame_rate", "missing", *(f"pose{c}{n}" for n in names for c in "XY")}
+        raise BadInputError(f"{path}: expected {_TREX}, found {'none' if data else 'nothing'}")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            keys = list(file.files)
-            require_room_for(path, _unpacked(file.zip, wanted_keys))
-            held: dict[str, Any] = {
-                key: np.asarray(file[key], np.float64).reshape(-1)
-                for key in keys
-                if key in wanted_keys
-            }
+            held = _arrays(path, file, names)
     except BadInputError:
         raise
     except _DAMAGES as error:
         found = "objects of Python" if "pickle" in str(error) else f"a damaged one: {error}"
-        raise BadInputError(f"{path}: expected {wanted}, found {found}") from None
-    known = sorted(key.removeprefix("poseX") for key in keys if key.startswith("poseX"))
-    if not known:
-        others = shortened(", ".join(keys) or "no array")
-        raise BadInputError(f"{path}: expected {wanted}, found {others}")
-    require_points(path, names, known)
-    if "frame" not in held:
-        raise BadInputError(f"{path}: expected an array frame, found none")
+        raise BadInputError(f"{path}: expected {_TREX}, found {found}") from None
     frames = numbered(path, held["frame"])
-    lost = held.get("missing", np.zeros(len(frames))) > 0
+    lost = held["missing"] > 0 if "missing" in held else np.zeros(len(frames), bool)
     points = {}
     for name in names:
-        pair = [held.get(f"pose{axis}{name}", np.zeros(0)) for axis in "XY"]
-        if len(lost) != len(frames) or any(len(values) != len(frames) for values in pair):
-            raise BadInputError(
-                f"{path}: expected {len(frames)} values of point {name}, found "
-                f"{', '.join(str(len(values)) for values in pair)}"
-            )
-        values = np.stack(pair, axis=1)
+        values = np.stack([held[f"pose{axis}{name}"] for axis in "XY"], axis=1)
         values[~np.isfinite(values).all(axis=1) | lost] = np.nan
         points[name] = values
     rate = float(held["frame_rate"][0]) if len(held.get("frame_rate", ())) else None
     return [Track(str(path), "", frames, rate, points, {})]
 
 
-def _unpacked(packed: zipfile.ZipFile, keys: Collection[str]) -> int:
-    """What some arrays of an npz file take as numbers of 8 bytes, by their own headers [byte]."""
-    total = 0
+def _arrays(path: Path, file: Any, names: Sequence[str]) -> dict[str, Floats]:
+    """Arrays of an npz file of TRex. Names, then lengths, are judged before one is unpacked."""
+    known = sorted(key.removeprefix("poseX") for key in file.files if key.startswith("poseX"))
+    if not known:
+        others = shortened(", ".join(file.files) or "no array")
+        raise BadInputError(f"{path}: expected {_TREX}, found {others}")
+    require_points(path, names, known)
+    needed = ["frame", *(f"pose{axis}{name}" for name in names for axis in "XY")]
+    for key in needed:
+        if key not in file.files:
+            raise BadInputError(f"{path}: expected an array {key}, found none")
+    wanted = [*needed, *(key for key in ("missing", "frame_rate") if key in file.files)]
+    lengths, total = _lengths(file.zip, wanted)
+    require_room_for(path, total)
+    for key in wanted:
+        least, most = (0, 1) if key == "frame_rate" else (lengths["frame"], lengths["frame"])
+        if not least <= lengths[key] <= most:
+            raise BadInputError(f"{path}: expected {most} values of {key}, found {lengths[key]}")
+    return {key: np.asarray(file[key], np.float64).reshape(-1) for key in wanted}
+
+
+def _lengths(packed: zipfile.ZipFile, keys: Collection[str]) -> tuple[dict[str, int], int]:
+    """How many numbers some arrays of an npz file have, and what all take [byte], by their headers.
+
+    Numbers count as 8 bytes at least, as they become floats.
+    """
+    lengths, total = dict[str, int](), 0
     for entry in packed.infolist():
-        if entry.filename.removesuffix(".npy") not in keys:
+        if (key := entry.filename.removesuffix(".npy")) not in keys:
             continue
         with packed.open(entry) as file:
-            version = np.lib.format.read_magic(file)
-            read_header = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, _, kind = read_header(file)
-        total += math.prod(shape) * max(8, kind.itemsize)
-    return total
+            shape, _, kind = _header(file.read(_LONGEST_HEADER))
+        if kind.hasobject:
+            raise ValueError(f"{key} is pickled")
+        if kind.kind not in "biuf" or min(shape, default=0) < 0:
+            raise ValueError(f"{key} is no array of numbers")
+        if key in lengths:
+            raise ValueError(f"{key} is there twice")
+        lengths[key] = math.prod(shape)
+        total += lengths[key] * max(8, kind.itemsize)
+    return lengths, total
+
+
+def _header(begin: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    import io
+
+    file = io.BytesIO(begin)
+    if np.lib.format.read_magic(file) == (1, 0):
+        return np.lib.format.read_array_header_1_0(file)
+    return np.lib.format.read_array_header_2_0(file)

@@ -16,7 +16,11 @@ from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
 
 LARGEST = 10**9
-"""No file is longer [bytes], nor what it unpacks to: a day at 30 Hz of 24 points."""
+"""No file is longer [bytes]."""
+UNPACKED = 2 * 10**8
+"""Nor does what is read of it unpack to more [bytes]: 1.4 million frames of the eight points of two
+antennae and a body axis (two coordinates, frame and `missing`, 8 bytes each). That is 6 h at 60 Hz,
+at which TRex tracks while it films (Walter and Couzin 2021, eLife 10:e64000)."""
 
 
 @dataclass(frozen=True)
@@ -96,11 +100,11 @@ def require_room_for(path: Path, size: int) -> None:
     """Check, before anything is unpacked, how much a file unpacks to [byte].
 
     Raises:
-        BadInputError: It is more than `LARGEST`.
+        BadInputError: It is more than `UNPACKED`.
     """
-    if size > LARGEST:
+    if size > UNPACKED:
         raise BadInputError(
-            f"{path}: expected at most {in_units(LARGEST)} once unpacked, found {in_units(size)}; "
+            f"{path}: expected at most {in_units(UNPACKED)} once unpacked, found {in_units(size)}; "
             "split the recording, or name fewer points"
         )
 
