@@ -142,4 +142,5 @@ EXPERIMENT = Experiment.of_folder(
         config, 1, on_step, on_row, logs, view
     ),
     captions=CAPTIONS,
+    explained="docs/results.md",
 )

@@ -89,7 +89,7 @@ def trajectories(
         _name_column(panels[0, i], label)
     for panel in panels[-1]:
         panel.set_xlabel("x [m]")
-    for panel in panels[:, 0]:
+    for panel in panels[:, 0] if len(trials) > 1 else panels[0]:
         panel.set_ylabel("y [m]")
     return figure
 
