@@ -2,12 +2,15 @@
 
 import re
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import phone
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 from PIL import Image
 
 from antennate import figures as style
@@ -202,6 +205,30 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     assert named == list(BUILT_IN)
 
 
+@pytest.mark.parametrize("trials", [1, 2, 3, 4])
+@pytest.mark.parametrize("names", [("open",), tuple(BUILT_IN)])
+def test_no_words_of_trajectories_lie_on_others_or_are_cut(trials, names):
+    """Titles, names, ticks, labels and legend, also where one scene is larger than others."""
+    figure = trajectories(names, range(4 - trials, 4))
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    hidden = {
+        tick.label1
+        for panel in figure.axes
+        for axis in (panel.xaxis, panel.yaxis)
+        for tick in axis.get_major_ticks()
+        if not axis.get_view_interval()[0] <= tick.get_loc() <= axis.get_view_interval()[1]
+    }
+    texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+    texts = [text for text in texts if text not in hidden]
+    boxes = {text: text.get_window_extent(renderer) for text in texts}
+    for one, two in combinations(texts, 2):
+        assert not boxes[one].overlaps(boxes[two]), (one, two)
+    for text, box in boxes.items():
+        assert 0 <= box.x0 <= box.x1 <= figure.bbox.x1, text
+        assert 0 <= box.y0 <= box.y1 <= figure.bbox.y1, text
+
+
 def test_trajectories_of_different_extent_have_the_same_ticks():
     """A small scene alone would have closer ones than a large one."""
     small = path(0.5)
@@ -298,11 +325,20 @@ def test_the_legend_names_only_what_the_scene_has():
 
 
 @pytest.mark.parametrize(("trials", "ends"), [(4, [0.5, 0.5]), (5, [0.15, 0.85])])
-def test_an_interval_is_drawn_where_there_are_enough_trials(trials, ends):
+def test_an_interval_of_a_mean_is_drawn_where_there_are_enough_trials(trials, ends):
+    """That of a share holds for any count."""
     one = {**summaries()["open"], "trials": trials, "successes": trials / 2}
     figure = tunnel.summary({"open": one}, rows(), LIMIT)
-    drawn = np.concatenate([line.get_xdata() for line in figure.axes[0].lines])
-    assert [drawn.min(), drawn.max()] == pytest.approx(ends)
+    share, _, time = figure.axes
+    drawn = np.concatenate([line.get_xdata() for line in share.lines])
+    assert [drawn.min(), drawn.max()] == pytest.approx([0.15, 0.85])
+    drawn = np.concatenate([line.get_xdata() for line in time.lines])
+    few = trials < style.ENOUGH_TRIALS
+    assert [drawn.min(), drawn.max()] == ([32.5, 32.5] if few else [12.5, 50.0])
+    assert "no intervals" not in share.get_title(loc="left")
+    said = time.get_title(loc="left")
+    assert said.startswith("Time to the exit; ")
+    assert ("no intervals below 5 trials" in said) == few
 
     panel = style.canvas(3.0, 3.0).subplots()
     found = [{"f": 0.5, "f_95": (0.15, 0.85)}]

@@ -108,9 +108,12 @@ def test_a_page_says_when_it_was_run_and_how_to_read_it() -> None:
     assert main(["report", "run"]) == 0
     assert "UTC; the rest took " in Page(Path("run/report.html")).text
     _, _, reading = page.text.partition("How to read this")
-    for term in ("Wilson 95 %", "Restricted mean time", "McNemar", "Wilcoxon"):
+    for term in (
+        *("Wilson 95 %", "Restricted mean time", "McNemar", "Wilcoxon"),
+        *("Progress over time", "Stuck episodes", "Hold"),
+    ):
         assert f"{term}: " in reading
-    assert "Trials from above: a row for each trial" in page.text
+    assert "Trials from above, the first five at most: a row for each trial" in page.text
     assert "<code>invalid</code>" in page.source
     assert "`" not in page.text.partition("Parameters")[0]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from antennate.experiments.sweep import run as sweep
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.experiment import EXPERIMENT
 from antennate.experiments.tracks.config import TrackWallParams
+from antennate.experiments.tracks.experiment import EXPERIMENT as TRACKS
 from antennate.experiments.tracks.walls import wall_of
 from antennate.params.scene import BenchPhysicsParams
 
@@ -251,6 +253,21 @@ def test_few_trials_have_no_interval_and_say_so(tmp_path: Path) -> None:
     assert all(row["share_95"] is None for row in result.summary["shapes"].values())
     assert result.sentence.endswith(
         "Fewer than 5 trials decide nothing; their means have no interval."
+    )
+
+
+def test_criteria_have_the_names_of_their_flags_and_angles_are_in_degrees() -> None:
+    """The defaults of docs/tracks.md: 0.15 lengths, 90, 20 and 10 degrees, 0.05 s; 20 % less."""
+    result = antennate.run("tracks", synthetic={"trials": 2, "frames": 300})
+    shapes, varied, _ = TRACKS.tables(result.summary)
+    assert shapes.title == "Shapes in contact"
+    assert shapes.note.startswith("Shares of the frames in contact, the mean over 2 trials.")
+    assert [name for name, _ in varied.rows][::2] == [
+        *("gap [lengths] 0.12", "angle [deg] 72", "flex [deg] 16", "offset [deg] 8"),
+        "duration [s] 0.04",
+    ]
+    assert re.search(
+        r"Of all criteria the (gap|angle|flex|offset|duration) matters", result.sentence
     )
 
 

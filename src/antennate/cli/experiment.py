@@ -277,7 +277,7 @@ def _end(
         raise KeyboardInterrupt
     failure = _keep(experiment, outcome, options, run)
     try:
-        tell(result, options, *_words(experiment, result))
+        tell(result, options, *_words(experiment, result), experiment.explained)
     except AntennateError:
         if failure is None:
             raise

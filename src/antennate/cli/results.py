@@ -114,9 +114,13 @@ def _original(path: Path) -> Path | None:
 
 
 def tell(
-    result: Mapping[str, Any], options: ResultOptions, tables: Iterable[Table], sentence: str
+    result: Mapping[str, Any],
+    options: ResultOptions,
+    tables: Iterable[Table],
+    sentence: str,
+    explained: str = "",
 ) -> None:
-    """Print the result: as JSON, or as tables and one closing sentence."""
+    """Print the result: as JSON, or as tables, where they are explained, and a closing sentence."""
     if options.json:
         write_result(to_json(result))
         return
@@ -126,6 +130,8 @@ def tell(
     from rich.text import Text
 
     console = Console(file=sys.stdout, highlight=False)
+    if explained:
+        console.print(Text(f"What the rows mean: {explained}"), soft_wrap=True)
     console.print(Text(sentence), soft_wrap=not console.is_terminal)
 
 

@@ -111,6 +111,7 @@ class Experiment(Generic[Config, Found]):
         trials: Its trials one by one, for studies; without them a study runs it as a whole.
         continued: Whether its folder is continued without being asked, and keeps its trials.
         measures: What it tells of its trials; studies take labels and units from them.
+        explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
         tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
@@ -137,6 +138,7 @@ class Experiment(Generic[Config, Found]):
     trials: Trials[Config] | None = None
     continued: bool = False
     measures: Sequence[Measure] = ()
+    explained: str = ""
     captions: Mapping[str, str] = field(default_factory=dict)
     on_workers: bool = True
     in_shards: bool = True

@@ -133,6 +133,9 @@ def share(count: int, valid: int, interval: Sequence[float] | None = None, word:
     return f"{count} of {valid}{word}" + (f" ({shown(interval)})" if interval else "")
 
 
+FEW = f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
+
+
 def few(trials: Iterable[int]) -> str:
     """What is said where valid trials are too few for an interval of a mean; empty if they are not.
 
@@ -142,7 +145,7 @@ def few(trials: Iterable[int]) -> str:
     some = [count for count in trials if count]
     if not some or min(some) >= ENOUGH:
         return ""
-    return f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
+    return FEW
 
 
 class Interim:

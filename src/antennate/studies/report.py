@@ -19,7 +19,7 @@ from antennate.files import read_limited
 from antennate.params.base import Params
 from antennate.studies import dates, page, terms
 from antennate.studies.formats import to_toml
-from antennate.studies.measures import NONE, Table
+from antennate.studies.measures import FEW, NONE, Table
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import (
     BY_HAND,
@@ -279,9 +279,12 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     results = [run.result() for run in runs]
     parts = [f"<h1>antennate {page.escape(view.name)}: {page.escape(' and '.join(names))}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
-    for name, run, result in zip(names, runs, results, strict=True):
-        parts.append(f"<h2>{page.escape(name)}</h2>{page.paragraphs(view.sentence(result))}")
+    told = [view.sentence(result) for result in results]
+    for name, run, text in zip(names, runs, told, strict=True):
+        alone = page.paragraphs(text.replace(FEW, "").strip())
+        parts.append(f"<h2>{page.escape(name)}</h2>{alone}")
         parts.append(page.block(_command(run, view), wrap=True))
+    parts.append(page.paragraphs(FEW if any(FEW in text for text in told) else ""))
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
     parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))

@@ -13,6 +13,12 @@ _TERMS = {
     "known.",
     "restricted_mean_time_s": "Restricted mean time: the mean over all valid trials, where one "
     "that fails counts as the whole time limit. So giving up early does not look fast.",
+    "progress_per_time_m_s": "Progress over time: how far all valid trials came together, over "
+    "their time together, so that failures count. Speed over successes: the mean of progress over "
+    "time of each trial that succeeded.",
+    "stuck": "Stuck episodes: how often the robot, for 5 s, did not gain 0.02 m on its best "
+    "progress; it has recovered if it then did.",
+    "hold": "Hold: the maneuver in which the robot stands still.",
     "mcnemar_p": "McNemar: two conditions meet the same trials, and only those trials count that "
     "one of them passes and the other does not. p is how often chance alone would split these so "
     "unevenly or more; below 0.05 is usually taken for a difference.",

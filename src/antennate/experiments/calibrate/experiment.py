@@ -249,4 +249,5 @@ EXPERIMENT = Experiment.of_folder(
     check=require_solver,
     parts="pushes",
     captions=CAPTIONS,
+    explained="docs/results-bench.md",
 )

@@ -41,8 +41,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         "* is on the front: no other design is as good in all of these and better in one.\nMeans "
         "with 95 % intervals. The front was chosen by these values, so they are optimistic."
     )
-    if so_few := _few(judged, "objectives"):
-        note += f" {so_few}"
+    if (so_few := _few(judged, "objectives")) and any(each["fresh"] for each in result["designs"]):
+        note += f" {so_few}"  # without fresh trials the sentence says it
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
     found = [Table("The front and the references", [*heads, *names], rows, note)]

@@ -108,4 +108,5 @@ EXPERIMENT = Experiment.of_folder(
     logs=gait.log_names,
     viewed=lambda config, on_step, _, view, logs: gait.run(config, 1, on_step, view, logs),
     captions=CAPTIONS,
+    explained="docs/results.md",
 )

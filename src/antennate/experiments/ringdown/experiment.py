@@ -82,5 +82,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     filmed=True,
     captions=CAPTIONS,
+    explained="docs/results-bench.md",
     on_workers=False,
 )

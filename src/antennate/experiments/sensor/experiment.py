@@ -194,5 +194,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     captions=CAPTIONS,
+    explained="docs/results-bench.md",
     on_workers=False,
 )

@@ -88,5 +88,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     parts="fits",
     captions=CAPTIONS,
+    explained="docs/results-bench.md",
     on_workers=False,
 )

@@ -183,5 +183,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     captions=CAPTIONS,
+    explained="docs/results-bench.md",
     on_workers=False,
 )

@@ -67,7 +67,9 @@ def _points(result: Mapping[str, Any]) -> Table:
     ]
     so_few = _few(result)
     interval = "" if so_few else " with its 95 % interval"
-    note = f"Mean of each point{interval}, {_ended(result)} in all. {so_few}".strip()
+    note = f"Mean of each point{interval}, {_ended(result)} in all."
+    if so_few and result["effects"]:  # without effects the sentence says it
+        note += f" {so_few}"
     if len(rows) > _MOST:
         note += f" The first {_MOST} of {len(rows)} points; result.json has all."
     if not shown_axes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,18 +24,22 @@ HANDLED = {
     "outliers": "points in wrong places, left out",
     "bridged": "points bridged over short gaps",
 }
-LABELS = {
-    "gap": "gap to the wall / length",
-    "angle": "angle of pointing [rad]",
-    "flex": "bend [rad]",
-    "offset": "offset of the tip [rad]",
-    "duration": "duration [s]",
+_DEGREES = 180.0 / math.pi
+UNITS = {
+    "gap": ("lengths", 1.0),
+    "angle": ("deg", _DEGREES),
+    "flex": ("deg", _DEGREES),
+    "offset": ("deg", _DEGREES),
+    "duration": ("s", 1.0),
 }
+"""Unit in which a criterion is shown, and how many of it are one of the flag's."""
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The shapes, what depends on each criterion, and what was wrong with the tracks."""
-    found, notes = result["frames"], []
+    found, trials = result["frames"], result["trials_in_contact"]
+    many = "one trial" if trials == 1 else f"the mean over {trials} trials"
+    notes = [f"Shares of the frames in contact, {many}."]
     if result["classified_by"] == "direction":
         notes.append(
             "With two points along an antenna its bend cannot be seen: forward and "
@@ -43,7 +48,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     if _free_air(result):
         notes.append("Without a wall every frame counts as contact.")
     shapes = Table(
-        f"Share of the frames in contact, trials: {result['trials_in_contact']}",
+        "Shapes in contact",
         ["share", "95 %"],
         [
             (name, [shown(row["share"]), shown(row["share_95"] or NONE)])
@@ -56,7 +61,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         [*SHAPES, "change"],
         [
             (
-                f"{LABELS[row['criterion']]} {row['value']:.3g}",
+                _criterion(row["criterion"], row["value"]),
                 [*(shown(row["share"][name]) for name in SHAPES), shown(row["change"])],
             )
             for row in result["sensitivity"]
@@ -73,6 +78,11 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         ],
     )
     return shapes, varied, counts
+
+
+def _criterion(name: str, value: float) -> str:
+    unit, scale = UNITS[name]
+    return f"{name} [{unit}] {scale * value:.3g}"
 
 
 def _free_air(result: Mapping[str, Any]) -> bool:
@@ -100,7 +110,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     so_few = few([result["trials_in_contact"]])
     where = "With no wall given" if _free_air(result) else "In contact"
     return (
-        f"{where}: {listed} of the frames. Of all criteria {LABELS[most['criterion']]} matters "
+        f"{where}: {listed} of the frames. Of all criteria the {most['criterion']} matters "
         f"most: changed by {100 * result['vary']:g} % it moves a share by "
         f"{100 * most['change']:.1f} points.{right}{_beyond(result)}{_unseen(result)}"
         f"{so_few and f' {so_few}'}"
@@ -158,5 +168,6 @@ EXPERIMENT = Experiment.of_folder(
     failed=lambda result: not result["trials_in_contact"],
     parts="files",
     captions=CAPTIONS,
+    explained="docs/tracks.md",
     on_workers=False,
 )

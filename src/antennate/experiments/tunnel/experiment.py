@@ -14,7 +14,7 @@ from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
-from antennate.studies.measures import Table, few, shown, successes
+from antennate.studies.measures import Table, few, successes
 from antennate.telemetry.parts import log_name
 
 _STUDENT = "Intervals of means are Student's, cut at 0 and the limit."
@@ -33,7 +33,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         measures.CONTROLLER,
         f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
         f"{result['time_limit_s']:g} s.\nInvalid trials do not count in the rows below "
-        f"`invalid`. {few(_valid(result)) or _STUDENT}",
+        f"`invalid`.{'' if few(_valid(result)) else f' {_STUDENT}'}",
         about(controllers),
     )
     two_by_two = Table.of(
@@ -79,15 +79,27 @@ def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:
         pair = result["paired"].get(key)
         if pair is None or pair["time_difference_95"] is None:
             continue
-        later = pair["time_difference_s"]  # the first of the pair less the second
-        ends = sorted(end if later > 0 else -end for end in pair["time_difference_95"])
-        less = (later > 0) == key.startswith(f"{rival}-")
+        sign = 1 if key.startswith(f"{rival}-") else -1  # so that a gain of the first is positive
+        gain = sign * pair["time_difference_s"]
+        ends = sorted((sign * end for end in pair["time_difference_95"]), reverse=gain >= 0)
         return (
-            f"; {short[first]} against {short[rival]}: McNemar p {pair['mcnemar_p']:.2g}, "
-            f"restricted mean time {abs(later):.1f} s {'less' if less else 'more'} "
-            f"({shown(ends, '.1f')})"
+            f"; {short[first]} against {short[rival]}: {_faster(gain)} (95 % interval: "
+            f"{_span(ends)}; a failure counts as the limit), McNemar p {pair['mcnemar_p']:.2g}"
         )
     return ""
+
+
+def _span(ends: Sequence[float]) -> str:
+    """Gains of time from one end to the other [s], the larger of that sign first if both occur."""
+    if min(ends) < 0 < max(ends):
+        return f"{_faster(ends[0])} to {_faster(ends[1])}"
+    low, high = sorted(ends, key=abs)
+    return f"{abs(low):.1f} to {_faster(high)}"
+
+
+def _faster(gain: float) -> str:
+    """A gain of time in words, from [s]."""
+    return f"{abs(gain):.1f} s {'faster' if gain >= 0 else 'slower'}"
 
 
 def _valid(result: Mapping[str, Any]) -> list[int]:
@@ -105,10 +117,10 @@ def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:
 
 
 CAPTIONS = {
-    "trajectories": "Trials from above: a row for each trial, a column for each "
-    "controller, coloured by maneuver.",
-    "summary": "Success, time in the scene, and restricted mean time of each "
-    "controller, with 95 % intervals from five trials on.",
+    "trajectories": "Trials from above, the first five at most: a row for each trial, a column for "
+    "each controller, coloured by maneuver.",
+    "summary": "Success of each controller with its Wilson 95 % interval, time in the scene, and "
+    "restricted mean time, with a 95 % interval from five trials on.",
 }
 
 EXPERIMENT = Experiment.of_folder(
@@ -130,4 +142,5 @@ EXPERIMENT = Experiment.of_folder(
         config, 1, on_step, on_row, logs, view
     ),
     captions=CAPTIONS,
+    explained="docs/results.md",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -25,6 +26,11 @@ MARGIN = 0.3
 """Shown around the scene and the robots at the end [m]."""
 FARTHEST = 1.0
 """Robots farther out than this are cut off [m]; a trial ends before, unless the physics failed."""
+
+_LEFT, _RIGHT, _BETWEEN, _NARROWEST = 0.55, 0.05, 0.36, 1.35
+"""Beside the panels, between two of them, and the least width of one [inches]."""
+_HEAD, _TITLE, _TICKS, _AXIS, _LEGEND_LINE = 0.52, 0.28, 0.24, 0.46, 0.195
+"""Heights [inches]: name and title, title alone, ticks, ticks and label, a line of the legend."""
 
 _OUTLINE = 0.7
 """Width of lines around the robot [points]: its antennae are thinner than that."""
@@ -65,13 +71,16 @@ def trajectories(
     """
     table = {(row.controller, row.trial): row for row in rows}
     boxes = {t: _box([paths[a, t] for a in controllers if (a, t) in paths]) for t in trials}
-    sides = [high - low for low, high in filter(None, boxes.values())] or [np.ones(2)]
-    figure, panels = _panels(len(trials), len(controllers), sides)
-    step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, np.max(sides)))[0])
+    known = [high - low for low, high in filter(None, boxes.values())] or [np.ones(2)]
+    most = np.max(known, axis=0)
+    sides = [most if box is None else box[1] - box[0] for box in boxes.values()]
+    step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, most.max()))[0])
+    figure, panels = _panels(len(controllers), sides, step, _handles(list(paths.values())))
     for i, (controller, label) in enumerate(short_names(controllers).items()):
         for j, trial in enumerate(trials):
-            panel, place = panels[j, i], (controller, trial)
-            _frame(panel, boxes[trial], step)
+            panel, place, box = panels[j, i], (controller, trial), boxes[trial]
+            if box is not None:
+                panel.set(xlim=(box[0][0], box[1][0]), ylim=(box[0][1], box[1][1]))
             said = "not run"
             if place in paths:
                 _draw_trial(panel, paths[place])
@@ -80,25 +89,43 @@ def trajectories(
         _name_column(panels[0, i], label)
     for panel in panels[-1]:
         panel.set_xlabel("x [m]")
-    for panel in panels[:, 0]:
+    for panel in panels[:, 0] if len(trials) > 1 else panels[0]:
         panel.set_ylabel("y [m]")
-    handles = _handles(list(paths.values()))
-    columns = int(figure.get_figwidth() // 2)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure
 
 
-def _panels(rows: int, columns: int, sides: Sequence[Floats]) -> tuple[Figure, Any]:
-    """An empty figure and its panels, shape (rows, columns), as high as the boxes need."""
-    aspect = float(max(side[1] for side in sides) / max(side[0] for side in sides))
-    width = 1.6 if rows > 1 and columns > 1 else style.WIDTH - 0.5
-    height = (width - 0.3) * aspect + 0.35
-    if rows == 1:
-        figure = style.canvas(style.WIDTH, 1.5 + columns * (height + 0.3))
-        return figure, figure.subplots(columns, 1, squeeze=False).T
-    around = 1.5 + 0.25 * max(0, SHOWN_TRIALS - rows)  # few rows have little room to give away
-    figure = style.canvas(max(0.5 + width * columns, style.WIDTH), around + rows * height)
-    return figure, figure.subplots(rows, columns, squeeze=False)
+def _panels(
+    columns: int, sides: Sequence[Floats], step: float, handles: Sequence[Any]
+) -> tuple[Figure, Any]:
+    """A figure with its legend and its panels, shape (rows, columns), all of one scale.
+
+    Every place is known, so nothing is left to a layout engine: with panels of a fixed aspect it
+    puts titles on the letters above them.
+    """
+    room = style.WIDTH - _LEFT - _RIGHT - (columns - 1) * _BETWEEN
+    alone = len(sides) == 1
+    width = style.WIDTH - _LEFT - _RIGHT if alone else max(_NARROWEST, room / columns)
+    sizes = [side * width / max(side[0] for side in sides) for side in sides]
+    across = style.WIDTH if alone else style.WIDTH - room + columns * width
+    in_line = max(1, int(across // 2))
+    low = _AXIS + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
+    down = [size[1] for size in sizes] * (columns if alone else 1)
+    gap = _AXIS + _HEAD if alone else _TICKS + _TITLE
+    high = low + sum(down) + (len(down) - 1) * gap + _HEAD
+    figure = Figure(figsize=(across, high))
+    panels = np.empty((len(sides), columns), object)
+    for j, i in np.ndindex(panels.shape):
+        line = i if alone else j
+        left = _LEFT + (0 if alone else i * (width + _BETWEEN))
+        base = high - _HEAD - sum(down[: line + 1]) - line * gap
+        shape = left / across, base / high, sizes[j][0] / across, sizes[j][1] / high
+        panels[j, i] = panel = figure.add_axes(shape)
+        panel.set_aspect("equal", adjustable="box")
+        panel.grid(visible=False)
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_locator(MultipleLocator(step))
+    figure.legend(handles=handles, loc="lower center", ncols=in_line)
+    return figure, panels
 
 
 def _name_column(panel: Axes, label: str) -> None:
@@ -127,16 +154,6 @@ def _box(paths: Sequence[TrialPath]) -> tuple[Floats, Floats] | None:
     pushed = np.concatenate([low[None], *(each for path in paths for each in path.after)])
     pushed = pushed[((pushed > low - FARTHEST) & (pushed < high + FARTHEST)).all(axis=1)]
     return np.minimum(low, pushed.min(axis=0)), np.maximum(high, pushed.max(axis=0))
-
-
-def _frame(panel: Axes, box: tuple[Floats, Floats] | None, step: float) -> None:
-    panel.set_aspect("equal", adjustable="box")
-    panel.grid(visible=False)
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(MultipleLocator(step))
-    if box is not None:
-        panel.set_xlim(box[0][0], box[1][0])
-        panel.set_ylim(box[0][1], box[1][1])
 
 
 def _draw_trial(panel: Axes, path: TrialPath) -> None:
@@ -209,9 +226,8 @@ def summary(
         if not valid:
             continue
         time = found["restricted_mean_time_s"]
-        ends = found["wilson95"], found["restricted_mean_time_95"]
-        share95, time95 = ends if valid >= style.ENOUGH_TRIALS else ((), ())
-        _interval(rate, i, found["successes"] / valid, share95, colour)
+        time95 = found["restricted_mean_time_95"] if valid >= style.ENOUGH_TRIALS else None
+        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
         _interval(mean, i, time, time95 or (), colour)
         exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
         inside.step(
@@ -245,12 +261,12 @@ def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float, trial
     rate.set(
         xlim=(-0.02, 1.02),
         xlabel="trials that succeeded [%]",
-        title=f"Success; {style.interval_note('Wilson 95 %', trials)}",
+        title="Success; Wilson 95 %",
     )
     mean.set(
         xlim=(0, 1.02 * time_limit),
         xlabel="restricted mean time [s]",
-        title=style.interval_note("Time to the exit; 95 %", trials).capitalize(),
+        title=f"Time to the exit; {style.interval_note('95 %', trials)}",
     )
     inside.set(
         xlim=(0, time_limit),

@@ -36,9 +36,7 @@ def outcomes(result: Mapping[str, Any]) -> Figure:
     figure = style.canvas(style.WIDTH, 6.0)
     whole, late = figure.subplots(2, 1)
     profiles = result["profiles"]
-    trials = min(profile["trials"] for profile in profiles.values())
-    note = style.interval_note("lines: Wilson 95 % of success", trials)
-    _draw_outcomes(whole, profiles, f"Whole travel; {note}")
+    _draw_outcomes(whole, profiles, "Whole travel; lines: Wilson 95 % of success")
     after = {name: profile["after_start"] for name, profile in profiles.items()}
     start = f"first {1e3 * result['start_m']:g} mm"
     _draw_outcomes(late, after, f"After the {start}, in which the\nantenna bows from its approach")
@@ -60,7 +58,7 @@ def _draw_outcomes(panel: Axes, profiles: Mapping[str, Mapping[str, Any]], title
         floor += shares
     for place, profile in zip(places, profiles.values(), strict=True):
         ends = profile["wilson95"]
-        if ends and profile["trials"] >= style.ENOUGH_TRIALS:
+        if ends:
             panel.plot([place, place], ends, color=style.INK, linewidth=1.4)
     labels = [
         f"{name.replace('_', chr(10))}\nn = {profile['trials']}"
