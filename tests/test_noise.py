@@ -276,7 +276,7 @@ def test_S3_a_quiet_antenna_that_is_held_at_marks_has_no_plateau() -> None:
 
 
 def test_S3_the_doctor_names_a_plateau() -> None:
-    """Readings of 1876 with noise of 2.5 vary below 1876; at 1860 they cannot be told from stuck."""
+    """Readings of 1876 with noise of 2.5 vary below 1876; at 1860 they look as if stuck."""
     for plateau, words in ((1876, "saturates"), (1860, "stuck")):
         rows = wrong(Patient(f"esp32=plateau:{plateau}").examine(bus=False))
         for side in ("left", "right"):
