@@ -200,6 +200,11 @@ FILMS = [
         partial(test_noise.test_S14_a_hum_is_named_with_size_and_frequency, 120.0, 50.0, "50 Hz"),
     ),
     Guard(
+        "hum that its beat hides",
+        put(diagnosis.ChannelDiagnosis.__init__, "__defaults__", (0.1,)),
+        partial(test_noise.test_S14_a_hum_stays_in_force_while_its_beat_hides_it, 400.0, 50.02),
+    ),
+    Guard(
         "isolated spikes",
         put(diagnosis, "AGREE", 1),
         test_diagnosis.test_S6_a_real_jump_is_believed_after_three_readings,

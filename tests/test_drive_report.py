@@ -23,7 +23,9 @@ from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
-from antennate.params.safety import TouchCheckParams
+from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.params.control import ConditioningParams
+from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.telemetry.feed import Feed
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
@@ -138,6 +140,38 @@ def test_why_is_of_the_longest_time_in_the_worst_state() -> None:
     assert "SHORT_LO" in report.why
     assert "STALE" not in report.why
     assert report.result(made.session)["worst_s"] == pytest.approx(0.7, abs=0.2)
+
+
+def test_S14_why_tells_a_hum_as_large_as_it_was() -> None:
+    """Mains of 50.2 Hz alternate by 400 sin(0.4 pi t + 1): little at 1.75 s, 400 at 2.95 s."""
+
+    def act(made: Rig, t: float) -> None:
+        made.robot.converter.mains = 50.2
+        made.robot.converter.hum = 400.0 if t > 1.75 else 0.0
+
+    _, report = driven(act, config=CONFIG.model_copy(update={"duration": 4.0}))
+    assert report.worst is State.HOLD
+    sizes = [float(size) for size in re.findall(r"±(\d+) counts at 50 Hz", report.why)]
+    assert sizes == pytest.approx([400.0, 400.0], rel=0.05)
+
+
+def test_S14_a_hum_that_is_gone_keeps_the_torque_off_for_its_time() -> None:
+    """It is seen for half a second of the dry run."""
+
+    def act(made: Rig, t: float) -> None:
+        made.robot.converter.mains = 50.0
+        made.robot.converter.hum = 400.0 if t < 0.5 else 0.0
+
+    _, report = driven(act, config=CONFIG.model_copy(update={"dry_run": 2.0}))
+    assert report.on is None
+    assert "HOLD NOISE" in report.refusal
+    made = rig(TwinConfig())
+    made.session.quality = SignalQuality(
+        ConditioningParams(), limits=SupervisorParams(hum_time=1.0)
+    )
+    _, report = driven(act, made, CONFIG.model_copy(update={"dry_run": 2.0}))
+    assert report.refusal == ""
+    assert report.worst <= State.DEGRADED
 
 
 def test_why_is_of_a_fault_rather_than_of_a_key_that_was_let_go() -> None:

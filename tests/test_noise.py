@@ -26,6 +26,7 @@ from antennate.hardware.safety.diagnosis import ChannelDiagnosis, Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.params.doctor import DoctorParams
+from antennate.params.safety import SupervisorParams
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
@@ -86,6 +87,59 @@ def test_S14_skipped_readings_do_not_change_the_frequency() -> None:
     assert channel.counted[Finding.NOISE] > 240
 
 
+def beating(amplitude: float, frequency: float, n: int) -> tuple[ChannelDiagnosis, list[Finding]]:
+    """What a channel finds in readings that a hum beats with, from where it is seen."""
+    channel = ChannelDiagnosis(BAND)
+    found = [
+        channel.step(i * PERIOD, counts).finding
+        for i, counts in enumerate(hum(amplitude, frequency, n, 0.3).tolist())
+    ]
+    return channel, found[found.index(Finding.NOISE) :]
+
+
+@pytest.mark.parametrize("frequency", [49.95, 49.98, 50.02, 50.05])
+@pytest.mark.parametrize("amplitude", [120.0, 400.0])
+def test_S14_a_hum_stays_in_force_while_its_beat_hides_it(
+    amplitude: float, frequency: float
+) -> None:
+    """Readings alternate by sin(2 pi (f - 50 Hz) t): mains of 50.02 Hz have a null every 25 s."""
+    channel, found = beating(amplitude, frequency, 6000)
+    assert len(found) > 5000
+    assert set(found) == {Finding.NOISE}
+    assert channel.noise_text.endswith("at 50 Hz or an alias of it")
+    assert channel.noise.size == pytest.approx(amplitude, abs=4 * NOISE)
+
+
+def test_S14_a_hum_that_ends_is_over_after_its_time_and_a_gap_does_not_end_it() -> None:
+    """The next one is told by its own size."""
+    channel, _ = beating(400.0, 50.02, 1000)
+    quiet = hum(0.0, 50.0, 4000)
+    found = [channel.step(10.0 + i * PERIOD, c).finding for i, c in enumerate(quiet[:1500])]
+    assert channel.step(26.0, FREE).finding is Finding.NOISE  # 1 s without a reading
+    assert channel.noise_text.startswith("±40")
+    found += [channel.step(26.0 + i * PERIOD, c).finding for i, c in enumerate(quiet[1500:], 1)]
+    over = found.index(Finding.OK)
+    assert set(found[:over]) == {Finding.NOISE}
+    assert set(found[over:]) == {Finding.OK}
+    assert 10.0 + (over + 100) * PERIOD == pytest.approx(10.0 + 30.0, abs=0.2)
+    assert channel.noise_text == ""
+    channel.step(60.0, FREE)
+    for i, counts in enumerate(hum(120.0, 50.0, 40, np.pi / 2).tolist()):
+        channel.step(60.0 + (i + 1) * PERIOD, counts)
+    assert channel.noise.size == pytest.approx(120.0, abs=4 * NOISE)
+
+
+def test_S14_the_time_of_a_hum_is_a_parameter() -> None:
+    quality = SignalQuality(ConditioningParams(), limits=SupervisorParams(hum_time=2.0))
+    readings = np.concatenate([hum(400.0, 50.0, 100, np.pi / 2), hum(0.0, 50.0, 400)])
+    found = []
+    for n, counts in enumerate(readings.tolist()):
+        quality.step(n * PERIOD, [counts, FREE], [Contact.FREE, Contact.FREE])
+        found.append(quality.findings[0])
+    assert set(found[100:295]) == {Finding.NOISE}
+    assert set(found[315:]) == {Finding.OK}
+
+
 def test_S14_noise_of_no_frequency_is_no_open_wire() -> None:
     """Normal noise of 250 counts; a floating pin wanders over all 4096."""
     noise = np.random.default_rng(2).normal(0.0, 250.0, 300)
@@ -140,6 +194,7 @@ def test_S4_the_doctor_names_a_converter_that_is_stuck_but_for_a_count() -> None
     row = wrong(Patient("esp32=stuck_left").examine(bus=False))["esp32: left antenna"]
     assert row.grade == "bad"
     assert "stuck" in row.found
+    assert "saturates" not in row.found
 
 
 @pytest.mark.parametrize("rate", [-30.0, -10.0, -2.0, 2.0, 10.0, 30.0])
@@ -221,10 +276,12 @@ def test_S3_a_quiet_antenna_that_is_held_at_marks_has_no_plateau() -> None:
 
 
 def test_S3_the_doctor_names_a_plateau() -> None:
-    rows = wrong(Patient("esp32=plateau:1860").examine(bus=False))
-    for side in ("left", "right"):
-        assert "saturates" in rows[f"esp32: {side} antenna"].found
-        assert "attenuation" in rows[f"esp32: {side} antenna"].cure
+    """Readings of 1876 with noise of 2.5 vary below 1876; at 1860 they look as if stuck."""
+    for plateau, words in ((1876, "saturates"), (1860, "stuck")):
+        rows = wrong(Patient(f"esp32=plateau:{plateau}").examine(bus=False))
+        for side in ("left", "right"):
+            assert words in rows[f"esp32: {side} antenna"].found
+            assert "attenuation" in rows[f"esp32: {side} antenna"].cure
 
 
 def test_S14_the_doctor_compares_noise_by_radio_with_that_of_the_calibration() -> None:

@@ -20,22 +20,34 @@ _COVERED = 0.1
 _NEAR = 1.0
 """Distance from the highest reading that is the same [counts]."""
 
+_STILL = 2.0
+"""Farthest apart that readings are which stand still [counts], as of a converter that is stuck."""
 _SIGMA = 1.0 / (0.6745 * 6.0**0.5)
 """From the median of what normal noise does to second differences to its standard deviation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
-    """The highest reading [counts], and the share of all that stand at it."""
+    """The highest reading [counts], and the share of all that stand at it.
+
+    Attributes:
+        still: Whether none lies below it by more than a converter that is stuck toggles.
+    """
 
     counts: float
     share: float
+    still: bool = False
 
     def text(self, whose: str) -> str:
         """It in words, with what may be wrong."""
+        if self.still:
+            return (
+                f"all of {whose} stand at {self.counts:.0f} counts or at most {_STILL:.0f} below: "
+                "the converter is stuck there"
+            )
         return (
             f"{100 * self.share:.0f} % of {whose} stand at {self.counts:.0f} counts, the highest: "
-            "the converter saturates there, or is stuck; check its attenuation and the divider"
+            "the converter saturates there; check its attenuation and the divider"
         )
 
 
@@ -56,7 +68,8 @@ def plateau_of(counts: Floats, bend: Floats | None = None) -> Plateau | None:
             return None
         least = SHOWN
     share = float(there.mean())
-    return Plateau(most, share) if share >= least else None
+    still = bool(most - counts.min() <= _STILL)
+    return Plateau(most, share, still) if share >= least else None
 
 
 def white_noise(counts: Floats, part: Ints) -> float:

@@ -117,7 +117,10 @@ _EXAMINED = (
     *paths_of(ConditioningParams, "control.conditioning"),
     "control.conditioning_right",
     "control.rule.threshold",
-    *(f"limits.{name}" for name in ("rate", "rate_error", "supply_warn", "supply_hold")),
+    *(
+        f"limits.{name}"
+        for name in ("rate", "rate_error", "hum_time", "supply_warn", "supply_hold")
+    ),
 )
 """What the doctor looks at of control and supervisor."""
 

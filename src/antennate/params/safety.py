@@ -76,6 +76,15 @@ class SupervisorParams(Params):
     """Age of a sample from which on it is not acted upon."""
     recovery: int = number(10, "1", "assumed: 100 ms, as the running mean", ge=1, le=1000)
     """Fresh valid samples in a row that end a loss of data."""
+    hum_time: float = number(
+        30.0,
+        "s",
+        "computed: mains 0.02 Hz off half the rate beat with it and hide a hum for up to 25 s; "
+        "Europe's mains wander by 0.05 Hz (EU 2017/1485)",
+        gt=0,
+        le=3600,
+    )
+    """Time for which a hum that was seen stays in force."""
     repeats: int = number(3, "1", "assumed: once is chance, three times is a defect", ge=1, le=100)
     """Holds, failures of the controller or reboots of the board that become a fault."""
     repeat_time: float = number(10.0, "s", "assumed: five gait cycles", gt=0, le=600)

@@ -131,7 +131,8 @@ def _antenna(
     """Findings on an antenna by its readings [counts]."""
     yield _noise(board, config, name, counts)
     try:
-        channel = ChannelDiagnosis(Band.of(_curve(config, name), config.reaches[name == "right"]))
+        band = Band.of(_curve(config, name), config.reaches[name == "right"])
+        channel = ChannelDiagnosis(band, config.limits.hum_time)
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")
         yield wrong, f"{name} calibration", "leaves the rails free"

@@ -107,6 +107,7 @@ def prepare(
             touch=config.touch if config.touch_check else None,
             reaches=config.reaches,
             right=config.control.conditioning_right,
+            limits=config.limits,
         ),
         limits=config.limits,
     )

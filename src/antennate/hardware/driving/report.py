@@ -18,6 +18,7 @@ class _Spell:
     state: State
     why: str
     causes: set[Cause]
+    noise: str = ""
     ticks: int = 0
 
     @property
@@ -27,8 +28,11 @@ class _Spell:
         wished = causes - {Cause.UNKNOWN_CONTACT} == {Cause.RELEASED}
         return self.state, not wished, self.ticks
 
-    def go_on(self, why: str, causes: set[Cause]) -> None:
-        """One more tick of it."""
+    def go_on(self, why: str, causes: set[Cause], noise: str) -> None:
+        """One more tick of it; a hum is told as large as it was."""
+        if self.noise and noise:
+            self.why = self.why.replace(self.noise, noise)
+        self.noise = noise or self.noise
         more = causes == self.causes and len(why) > len(self.why)  # of the same causes, more servos
         if more or not causes <= self.causes:
             self.why = why
@@ -91,10 +95,11 @@ class Report:
     def _explain(self, out: Outputs, why: str) -> None:
         """Keep why the worst state lasted longest."""
         causes, spell = {active.cause for active in out.causes}, self._spell
+        noise = "".join(each.detail for each in out.causes if each.cause is Cause.NOISE)
         if spell is None or out.state is not spell.state:
             spell = _Spell(out.state, why, causes | (spell.causes if spell else set()))
             self._spell = spell
-        spell.go_on(why, causes)
+        spell.go_on(why, causes, noise)
         if spell.rank > self._worst:
             self.worst, self.why, self._worst = spell.state, spell.why, spell.rank
 

@@ -6,7 +6,8 @@ once three readings in a row agree on it. Without a reading to use, the counts a
 
 The flex sensor is the upper half of a divider, so one torn off its wire reads 0 like a short to
 ground, and both are SHORT_LO. OPEN is a pin of the converter that is connected to nothing: its
-readings wander over the whole range. NOISE is narrower than that, or a hum.
+readings wander over the whole range. NOISE is narrower than that, or a hum. A hum stays for a time
+in which it is not seen: near half the rate of the readings it beats with them and seems to stop.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from antennate.antenna.sensor import FULL_SCALE
 from antennate.errors import CalibrationError
 from antennate.hardware.safety.noise import Noise, noise_of
 from antennate.params.control import CurveParams
+from antennate.params.safety import SupervisorParams
 
 LOW_RAIL = 5.0
 """Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
@@ -52,7 +54,8 @@ _FLOATING = FULL_SCALE / 3
 """Least that the readings of a floating wire differ in the window [counts]: one window of white
 noise over the whole range in 3000 differs less (computed)."""
 _MEMORY = 1.0
-"""Time for which a hum is remembered while readings that were skipped break its sine [s]."""
+"""Time for which wide readings are still a hum where some that were skipped break its sine [s]."""
+_HUM_TIME = SupervisorParams().hum_time
 JUMP = 1 / 3
 """Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
@@ -161,37 +164,39 @@ _NOTHING = Reading(math.nan, Finding.LOST)
 class ChannelDiagnosis:
     """Diagnoses the readings of one antenna by its calibrated range.
 
+    A hum that was seen stays in force for `hum_time` [s].
+
     Attributes:
         reading: The newest result; LOST before the first.
         counted: Readings by the finding they got.
         bad: Readings not believed.
         outside: Readings beyond the band that were believed.
-        noise: The noise of a channel that is NOISE.
+        noise: The noise of a channel that is NOISE: of a hum the largest while it is in force.
 
     Raises:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
     """
 
-    def __init__(self, band: Band) -> None:
+    def __init__(self, band: Band, hum_time: float = _HUM_TIME) -> None:
         if not LOW_RAIL < band.low < band.high < HIGH_RAIL:
             raise CalibrationError(
                 f"a calibrated range must lie within {LOW_RAIL:g} and {HIGH_RAIL:g} "
                 f"counts, so that a broken wire can be told from a flex sensor; found {band.low:g} "
                 f"to {band.high:g}; choose another divider resistor"
             )
-        self._band = band
+        self._band, self._hum_time = band, hum_time
+        self.noise, self._hummed, self._usual = Noise(0.0), -math.inf, math.nan
         self.counted = dict.fromkeys(Finding, 0)
         self.bad = 0
         self.outside = 0
         self.reset()
 
     def reset(self) -> None:
-        """Forget all readings but not the counters."""
+        """Forget all readings, but neither the counters nor a hum."""
         self.reading = _NOTHING
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)
         self._times: deque[float] = deque(maxlen=WINDOW)
-        self.noise, self._hummed = Noise(0.0), -math.inf
         self._bad: deque[bool] = deque(maxlen=WINDOW)
         self._share: deque[bool] = deque(maxlen=SHARE_WINDOW)
         self._outside: deque[bool] = deque(maxlen=WINDOW)
@@ -229,8 +234,7 @@ class ChannelDiagnosis:
         """Size and frequency of the noise of a channel that is NOISE, empty for others."""
         if self.reading.finding is not Finding.NOISE:
             return ""
-        usual = median(after - before for before, after in pairwise(self._times))
-        return self.noise.text(1.0 / usual)  # though some readings were skipped
+        return self.noise.text(1.0 / self._usual)
 
     def _count_near(self, counts: float) -> None:
         """Count readings in a row that lie within two counts."""
@@ -281,6 +285,8 @@ class ChannelDiagnosis:
         broken = self._broken()
         if broken is not None:
             return broken
+        if self._t - self._hummed < self._hum_time:
+            return Finding.NOISE
         if self._bad_run > LONGEST_HOLD:
             return Finding.LOST
         if self._at_rail(low=self._band.polarity < 0) >= SATURATED:
@@ -310,13 +316,10 @@ class ChannelDiagnosis:
         width = max(raw) - min(raw)
         if any(map(math.isnan, raw)) or not least <= width <= FULL_SCALE:
             return Finding.OPEN if spoiled else None
-        noise, before = noise_of(raw), self.noise
-        if noise.hums:
-            self._hummed = self._t
-        elif self._t - self._hummed < _MEMORY and sum(self._bad) >= SATURATED:
-            noise = Noise(noise.size, before.frequency)
-        self.noise = noise
-        if noise.hums:
+        noise = noise_of(raw)
+        quiet = self._t - self._hummed
+        self._remember(noise, quiet)
+        if noise.hums or (quiet < _MEMORY and sum(self._bad) >= SATURATED):
             return Finding.NOISE
         older, newer = raw[: WINDOW // 2], raw[WINDOW // 2 :]
         if not spoiled:
@@ -324,6 +327,14 @@ class ChannelDiagnosis:
         if width >= _FLOATING or max(newer) - min(newer) < least:
             return Finding.OPEN
         return Finding.NOISE if max(older) - min(older) >= least else None
+
+    def _remember(self, noise: Noise, quiet: float) -> None:
+        """Keep the largest hum while one is in force; a hum was seen last so long before [s]."""
+        if noise.hums:
+            self._hummed = self._t
+        if quiet >= self._hum_time or (noise.hums and noise.size > self.noise.size):
+            self.noise = noise  # though some readings were skipped, the median is the period
+            self._usual = median(after - before for before, after in pairwise(self._times))
 
     def _at_both_rails(self) -> bool:
         """Whether the window has two readings or more at either rail, which no flex sensor can."""

@@ -14,7 +14,7 @@ from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params.control import ConditioningParams, CurveParams
 from antennate.params.endurance import DriftParams
-from antennate.params.safety import TouchCheckParams
+from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")
@@ -36,9 +36,11 @@ class SignalQuality:
         touch: TouchCheckParams | None = None,
         reaches: tuple[float | None, float | None] = (None, None),
         right: CurveParams | None = None,
+        limits: SupervisorParams | None = None,
     ) -> None:
         bands = Band.of(conditioning, reaches[0]), Band.of(right or conditioning, reaches[1])
-        self.channels = [ChannelDiagnosis(band) for band in bands]
+        hum_time = (limits or SupervisorParams()).hum_time
+        self.channels = [ChannelDiagnosis(band, hum_time) for band in bands]
         self.check = None if touch is None else TouchCheck(touch, bands)
         self._together = (drift or DriftParams()).together
         self.drifts = [Drift(drift or DriftParams(), band) for band in bands]
