@@ -372,3 +372,26 @@ def test_a_servo_that_falls_silent_ends_a_drive_with_what_to_do_and_no_word_of_t
     assert "check cables, plugs and supply of the servos (`antennate doctor`)" in cures
     assert "The computer was late" not in out
     assert "What to do" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "worst"),
+    [(9.0, 0.06, State.OK), (0.6, 0.75, State.HOLD), (0.0, 1.5, State.HOLD)],
+)
+def test_B19_a_drive_that_is_stopped_before_readings_can_be_there_blames_no_wire(
+    begin: float, end: float, worst: State
+) -> None:
+    """The board is silent from a time on, and a signal comes at another [s]; twins are healthy."""
+    made = rig(TwinConfig())
+    start = made.clock.now()
+
+    def act(made: Rig, t: float) -> None:
+        made.robot.board_silent = t - start >= begin
+        if t - start >= end:
+            raise KeyboardInterrupt
+
+    made.robot.board_silent = begin == 0.0
+    made, report = driven(act, made, CONFIG.model_copy(update={"dry_run": 5.0}))
+    assert report.worst is worst
+    assert ("no fresh sample" in report.why) == (worst is State.HOLD)
+    assert not (report.why and worst is State.OK)
