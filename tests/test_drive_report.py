@@ -23,6 +23,7 @@ from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.cures import CURES, what_to_do
 from antennate.params.safety import TouchCheckParams
 from antennate.telemetry.feed import Feed
 from antennate.twin.config import TwinConfig, watched
@@ -395,3 +396,17 @@ def test_B19_a_drive_that_is_stopped_before_readings_can_be_there_blames_no_wire
     assert report.worst is worst
     assert ("no fresh sample" in report.why) == (worst is State.HOLD)
     assert not (report.why and worst is State.OK)
+
+
+@pytest.mark.parametrize("cause", [each for each in CURES if each.severity >= State.HOLD])
+def test_each_cure_ends_as_a_sentence(cause: Cause) -> None:
+    (said,) = what_to_do(f"{cause.severity.name} {cause.name}: x")
+    assert re.fullmatch(r"What to do: [A-Z`].*[^?.][?.] See docs/causes\.md\.", said), said
+
+
+def test_cures_of_causes_that_come_together_say_each_step_once_and_arming_last() -> None:
+    names = ("WATCHDOG", "DISARMED", "BUS_ERROR", "SILENT_SERVO", "PAUSE")
+    (said,) = what_to_do("; ".join(f"FAULT {name}: x" for name in names))
+    for words in ("lose other programs", "check cables, plugs and supply", "drive --arm"):
+        assert said.lower().count(words) == 1, said
+    assert said.endswith("; then start `drive --arm` again. See docs/causes.md.")
