@@ -320,7 +320,12 @@ def test_negative_numbers_and_none_are_values():
 
 def test_bad_folders(capsys, tmp_path):
     (tmp_path / "file").write_text("mine")
-    assert "expected to write file, found: File exists" in refusal(capsys, *QUICK, "--out", "file")
+    for words in ((), ("--overwrite",)):
+        line = refusal(capsys, *QUICK, "--out", "file", *words)
+        assert "file: expected a folder, found a file; give another --out" in line
+    (tmp_path / "link").symlink_to("nowhere")
+    line = refusal(capsys, *QUICK, "--out", "link", "--overwrite")
+    assert "link: expected a folder, found a link to nothing; give another --out" in line
     assert "Not a directory" in refusal(capsys, *QUICK, "--out", "file/sub")
     assert (tmp_path / "file").read_text() == "mine"
     (tmp_path / "mine").mkdir()
@@ -328,6 +333,15 @@ def test_bad_folders(capsys, tmp_path):
     line = refusal(capsys, *QUICK, "--out", "mine")
     assert "found mine/config.toml; choose another" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
+
+
+@pytest.mark.parametrize(
+    "words", [("springs",), ("tracks", "--no-figures"), ("study", "a.toml"), ("doctor",)]
+)
+def test_a_path_that_is_too_long_is_one_line(capsys, tmp_path, words):
+    """A name has at most 255 bytes (POSIX NAME_MAX of Linux)."""
+    (tmp_path / "a.toml").write_text('experiment = "springs"\n')
+    assert refusal(capsys, *words, "--out", "a" * 300)
 
 
 @pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])

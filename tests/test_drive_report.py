@@ -23,6 +23,7 @@ from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.cures import CURES, what_to_do
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
@@ -406,3 +407,40 @@ def test_a_servo_that_falls_silent_ends_a_drive_with_what_to_do_and_no_word_of_t
     assert "check cables, plugs and supply of the servos (`antennate doctor`)" in cures
     assert "The computer was late" not in out
     assert "What to do" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "worst"),
+    [(9.0, 0.06, State.OK), (0.6, 0.75, State.HOLD), (0.0, 1.5, State.HOLD)],
+)
+def test_B19_a_drive_that_is_stopped_before_readings_can_be_there_blames_no_wire(
+    begin: float, end: float, worst: State
+) -> None:
+    """The board is silent from a time on, and a signal comes at another [s]; twins are healthy."""
+    made = rig(TwinConfig())
+    start = made.clock.now()
+
+    def act(made: Rig, t: float) -> None:
+        made.robot.board_silent = t - start >= begin
+        if t - start >= end:
+            raise KeyboardInterrupt
+
+    made.robot.board_silent = begin == 0.0
+    made, report = driven(act, made, CONFIG.model_copy(update={"dry_run": 5.0}))
+    assert report.worst is worst
+    assert ("no fresh sample" in report.why) == (worst is State.HOLD)
+    assert not (report.why and worst is State.OK)
+
+
+@pytest.mark.parametrize("cause", [each for each in CURES if each.severity >= State.HOLD])
+def test_each_cure_ends_as_a_sentence(cause: Cause) -> None:
+    (said,) = what_to_do(f"{cause.severity.name} {cause.name}: x")
+    assert re.fullmatch(r"What to do: [A-Z`].*[^?.][?.] See docs/causes\.md\.", said), said
+
+
+def test_cures_of_causes_that_come_together_say_each_step_once_and_arming_last() -> None:
+    names = ("WATCHDOG", "DISARMED", "BUS_ERROR", "SILENT_SERVO", "PAUSE")
+    (said,) = what_to_do("; ".join(f"FAULT {name}: x" for name in names))
+    for words in ("lose other programs", "check cables, plugs and supply", "drive --arm"):
+        assert said.lower().count(words) == 1, said
+    assert said.endswith("; then start `drive --arm` again. See docs/causes.md.")

@@ -46,7 +46,7 @@ BAD = {
     "one reading": (b"time,counts,bend\n0,1800,0\n", "row 2: expected at least 20 readings"),
     "millivolts": (
         GOOD.replace("counts", "counts [mV]").encode(),
-        "row 1: expected counts [mV] in counts as declared, found mV; is it the right",
+        "row 1: expected counts [mV] in counts unless declared, found mV; declare its unit",
     ),
     "bare commas": (
         b"time,counts,bend\n0,00,1800,0,0\n",

@@ -128,13 +128,9 @@ def test_readings_in_a_unit_that_was_not_declared_are_asked_about(
         assert re.search(why, error), error
         assert unit in error
         assert "constant" not in error
-    for column, words in (
-        ("left_kohm", ()),
-        ("left [Ω]", (unit, "kohm")),
-        ("left_mV", (unit, "V")),
-    ):
+    for column in ("left_kohm", "left [Ω]", "left_mV"):
         file = written(tmp_path / "named.csv", time=t, **{column: ohm / 1e3, "bend": bend})
-        error = refused(capsys, "--recording", file, "--columns.counts-column", column, *words)
+        error = refused(capsys, "--recording", file, "--columns.counts-column", column)
         assert f"row 1: expected {column} in " in error
         assert unit in error
 
@@ -163,7 +159,26 @@ def test_speeds_in_another_unit_are_converted_or_asked_about(
     assert " 2 cm/s" in said(capsys, *out, "--columns.speed-unit", "mm/s")
     named = written(tmp_path / "b.csv", time=t, counts=counts, bend=bend, speed_mm_s=back / 100)
     error = refused(capsys, "--recording", named, "--columns.speed-column", "speed_mm_s")
-    assert "row 1: expected speed_mm_s in m/s as declared, found mm/s" in error
+    assert "row 1: expected speed_mm_s in m/s unless declared, found mm/s" in error
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "scale"), [("speed_m_s", "mm/s", 1.0), ("speed_mm_s", "m/s", 0.001)]
+)
+def test_a_unit_that_is_declared_is_believed_against_the_name_of_its_column(
+    column: str, unit: str, scale: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """20 mm/s are 2 cm/s; the default name of the column says m/s, whatever it holds."""
+    counts, bend, t = ramps()
+    speed = {column: np.full(len(t), 20.0 * scale)}
+    words = ["--recording", written(tmp_path / "a.csv", time=t, counts=counts, bend=bend, **speed)]
+    words += ["--columns.speed-column", column]
+    assert "--columns.speed-unit" in refused(capsys, *words)
+    words += ["--columns.speed-unit", unit, "--out", str(tmp_path / "out")]
+    out = said(capsys, *words)
+    assert " 2 cm/s" in out
+    named = column.removeprefix("speed_").replace("_", "/")
+    assert f"{column} is taken in {unit} as declared, though its name says {named}." in out
 
 
 def test_measured_speeds_are_those_of_their_pushes(tmp_path: Path) -> None:

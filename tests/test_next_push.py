@@ -273,8 +273,8 @@ def test_readings_at_a_rate_need_no_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "words", "why"),
     [
-        ("time [ms],counts,bend", [], "expected time [ms] in s as declared, found ms; is it the"),
-        ("time,counts,bend (deg)", [], "expected bend (deg) in 1 as declared, found deg"),
+        ("time [ms],counts,bend", [], "expected time [ms] in s unless declared, found ms; declare"),
+        ("time,counts,bend (deg)", [], "expected bend (deg) in 1 unless declared, found deg"),
         ("time,counts,bend", ["--rate", "100"], "expected no column time beside --rate"),
         ("stamp,counts,bend", [], "column time, found stamp, counts, bend; name yours"),
         ("stamp,counts,bend", ["--rate", "0"], "--rate"),

@@ -6,6 +6,7 @@ answered with one line on stderr. What a command needs is imported when it runs.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
@@ -117,6 +118,12 @@ def _run(words: Sequence[str], name: str) -> int:
         return OK
     except AntennateError as error:
         sys.stderr.write(f"{name}: error: {one_line(reason(error))}\n")
+        return BAD_INPUT
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        found = shortened(str(error.filename))
+        sys.stderr.write(f"{name}: error: expected a shorter name of a file, found {found}\n")
         return BAD_INPUT
 
 

@@ -321,18 +321,19 @@ def _sentence(result: Mapping[str, Any]) -> str:
     why = f" ({'; '.join(causes)})" if result["why"] else ""
     time = result.get("worst_s")  # results of older versions have none
     worst = f"worst state {state}{f' for {time:.1f} s' if time else ''}{why}"
-    torque = _torque(result)
+    torque, ended = _torque(result), f"ended by {result['ended']}"
     if result["refusal"]:
         more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
         return f"The robot was not armed: {result['refusal']}{more}; {torque}."
     if not result["armed"]:
-        return f"A dry run: nothing was written to the servos, {worst}; --arm lets the robot walk."
+        dry = "A dry run: nothing was written to the servos"
+        return f"{dry}, {worst}; {ended}; --arm lets the robot walk."
     if _idle(result):
-        return f"The robot never walked, no command was sent; {worst}; {torque}."
+        return f"The robot never walked, no command was sent; {worst}; {ended}; {torque}."
     sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
     shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
     walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
-    return f"{walked}, {worst}; ended by {result['ended']}; {torque}."
+    return f"{walked}, {worst}; {ended}; {torque}."
 
 
 def _torque(result: Mapping[str, Any]) -> str:

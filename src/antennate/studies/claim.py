@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -61,6 +62,7 @@ def claim(
     """Take a directory; see `RunDirectory.create`."""
     place = place_of(command, path)
     with writing(place):
+        _require_folder(place)
         missing = [p for p in (place, *place.parents) if not p.exists()]
         place.mkdir(parents=True, exist_ok=path is not None)
         for folder in FOLDERS:
@@ -95,3 +97,10 @@ def claim(
                     each.rmdir()
             raise
         return Claim(place, missing, partial, store, finished, replaced)
+
+
+def _require_folder(place: Path) -> None:
+    """Refuse a name that is there and leads to no folder."""
+    if os.path.lexists(place) and not place.is_dir():
+        what = "a file" if place.exists() else "a link to nothing"
+        raise OutputError(f"{place}: expected a folder, found {what}; give another --out")

@@ -80,7 +80,8 @@ def _file(result: Mapping[str, Any]) -> str:
     handled = result.get("recording")
     if not handled:
         return ""
-    lines = [told(handled["conversion"])] if handled["conversion"] else []
+    lines = [*handled.get("units", ())]  # results of older versions have none
+    lines += [told(handled["conversion"])] if handled["conversion"] else []
     lines += [f"{w['clock'].capitalize()} wrapped in row {w['row']}." for w in handled["wraps"]]
     if handled["damaged"]:
         row, why = handled["damages"][0]

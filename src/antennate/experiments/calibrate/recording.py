@@ -61,6 +61,8 @@ class Handled:
         outliers_kept: Whether they are kept.
         wraps: Where the clock began at 0 again and was unwrapped.
         conversion: How readings became counts, None if they are.
+        units: Where a declared unit was taken and not that in the name of its column, one sentence
+            each.
     """
 
     rows: int
@@ -70,6 +72,7 @@ class Handled:
     outliers_kept: bool
     wraps: tuple[Wrap, ...]
     conversion: Conversion | None
+    units: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,7 @@ def read(
         CalibrationError: Names the row and the cure.
     """
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
-    table, lines, damages = _rows(path, data, params, rate)
+    table, lines, damages, units = _rows(path, data, params, rate)
     total = len(table) + len(damages)
     trial = _numbered(path, table[:, TRIAL], lines, params.trial_column)
     if rate is None:
@@ -129,7 +132,7 @@ def read(
     speed = _of_pushes(np.abs(table[:, SPEED]) * SPEED_UNITS[params.speed_unit], trial)
     samples, t, far, kept = _without_outliers(Samples(counts, bend, trial, speed, lines), t, params)
     handled = Handled(
-        total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion
+        total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion, units
     )
     return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
 
@@ -185,8 +188,10 @@ def _counted(trial: Ints) -> Ints:
 
 def _rows(
     path: Path, data: bytes, params: RecordingParams, rate: float | None
-) -> tuple[Floats, Ints, list[tuple[int, str]]]:
+) -> tuple[Floats, Ints, list[tuple[int, str]], tuple[str, ...]]:
     """Numbers of the rows that are whole, their lines, and lines and reasons of those that are not.
+
+    Last comes what is to be said of their units.
 
     Rows may be damaged: a serial line merges two, cuts one, or mixes in what a board says at boot.
     """
@@ -202,7 +207,7 @@ def _rows(
         )
     names = (params.trial_column, params.speed_column, params.time_column, *needed[-2:])
     places = _places(path, header, names)
-    _check_units(path, header, places, params)
+    units = _units(path, header, places, params)
     rows, numbers, damages = list[list[float]](), list[int](), list[tuple[int, str]]()
     for line, cells in lines:
         values = _values(header, cells, places, params)
@@ -214,7 +219,7 @@ def _rows(
     if not rows and not damages:
         raise CalibrationError(f"{path}: row 2: expected readings, found none; record longer")
     _check_share(path, damages, len(rows) + len(damages), params.most_lost)
-    return np.array(rows), np.array(numbers, dtype=np.int64), damages
+    return np.array(rows), np.array(numbers, dtype=np.int64), damages, units
 
 
 def _check_share(path: Path, damages: list[tuple[int, str]], rows: int, most: float) -> None:
@@ -233,26 +238,37 @@ def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | N
     return [column(header, name) for name in names]
 
 
-def _check_units(
+def _units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
-) -> None:
-    """Refuse a column whose name gives another unit than the one declared."""
+) -> tuple[str, ...]:
+    """Where a unit is declared against that in the name of its column: it is taken, and told.
+
+    Raises:
+        CalibrationError: The name gives another unit, and none was declared.
+    """
     columns = (
-        (places[1], SPEED_UNITS, params.speed_unit, "speed-unit"),
-        (places[2], TIME_UNITS, params.time_unit, "time-unit"),
-        (places[3], (*READING_UNITS, "%"), params.reading_unit, "reading-unit"),
-        (places[4], BEND_UNITS, params.bend_unit, "bend-unit"),
+        (places[1], SPEED_UNITS, "speed_unit"),
+        (places[2], TIME_UNITS, "time_unit"),
+        (places[3], (*READING_UNITS, "%"), "reading_unit"),
+        (places[4], BEND_UNITS, "bend_unit"),
     )
-    for place, known, declared, flag in columns:
+    told = list[str]()
+    for place, known, field in columns:
         if place is None:
             continue
-        named = unit_of(header[place], known)
-        plain = unit_named(named) if flag == "reading-unit" else named
-        if plain in known and plain != declared:
+        named, taken = unit_of(header[place], known), getattr(params, field)
+        plain = unit_named(named) if field == "reading_unit" else named
+        if plain not in known or plain == taken:
+            continue
+        if field not in params.model_fields_set:
             raise CalibrationError(
-                f"{path}: row 1: expected {header[place]} in {declared} as declared, found "
-                f"{named}; is it the right --columns.{flag}?"
+                f"{path}: row 1: expected {header[place]} in {taken} unless declared, found "
+                f"{named}; declare its unit with --columns.{field.replace('_', '-')}"
             )
+        told.append(
+            f"{header[place]} is taken in {taken} as declared, though its name says {named}."
+        )
+    return tuple(told)
 
 
 def _values(

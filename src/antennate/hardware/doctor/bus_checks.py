@@ -132,7 +132,10 @@ def _answer_time(bus: BusSurvey, config: DoctorConfig) -> Finding:
     if slow(bus, config):
         return Finding(usual, "bad", "the adapter is slow: see latency timer")
     longest = f"{usual}, up to {1e3 * max(times.values()):.1f} ms ({late})"
-    return Finding(longest, "bad", f"{late}: check its return delay, then its cable")
+    busy = (
+        "before a twin, or on a busy computer, the computer may be too busy: close other programs"
+    )
+    return Finding(longest, "bad", f"{late}: check its return delay, then its cable; {busy}")
 
 
 def _read_time(bus: BusSurvey, time: float, longest: float) -> Finding:

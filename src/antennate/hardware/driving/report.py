@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.driving.walk import Walk
-from antennate.hardware.safety.causes import DATA, Cause, Outputs, State
+from antennate.hardware.safety.causes import DATA, Active, Cause, Outputs, State
+
+_FILLING = (Cause.STALE, Cause.LOST)
+"""What is said of a healthy board, too, until it has sent a few readings."""
+_FILLED = 1.0
+"""Time that the first good reading of each antenna may take [s]: ten times what it takes by a board
+that samples at 100 Hz (assumed)."""
 
 
 @dataclass(slots=True)
@@ -49,7 +56,7 @@ class Report:
         before: The same up to the first tick with torque, None if it never came on.
         worst: Worst state since torque came on. The short wait for the first decision is left out,
             unless no command follows it. If torque never came on, HOLD if data are missing at the
-            end.
+            end, unless it ended before the first ones could be there.
         why: The causes of the longest time in that state, an operator's key that was let go last.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
@@ -66,6 +73,7 @@ class Report:
     ended: str = ""
     walk: Walk = field(default_factory=Walk)
     _torque: bool = False
+    _felt: bool = False
     _waits: str = ""
     _spell: _Spell | None = None
     _worst: tuple[State, bool, int] = (State.OK, False, 0)
@@ -79,6 +87,7 @@ class Report:
         """Take note of a tick."""
         self.walk.watch(session)
         out = session.outputs
+        self._felt |= out is not None and not any(map(_missing, out.causes))
         if out is None or not (self._torque or out.torque):
             return
         self._torque = True
@@ -109,7 +118,9 @@ class Report:
         if self.before is None and self._waits and self.worst < State.HOLD:
             self._wait(self._waits)
         causes = () if session.outputs is None else session.outputs.causes
-        missing = [each.text for each in causes if each.present and each.cause in DATA]
+        begun = math.inf if self._felt else session.clock.now() - _FILLED
+        found = [each for each in causes if _missing(each)]
+        missing = [x.text for x in found if x.cause not in _FILLING or x.since <= begun]
         if not self._torque and missing:
             self._wait("; ".join(missing))
 
@@ -152,6 +163,11 @@ class Report:
                 *session.actuators.state.tracebacks.kept,
             ],
         }
+
+
+def _missing(active: Active) -> bool:
+    """Whether it is a loss of data that is still there."""
+    return active.present and active.cause in DATA
 
 
 def _only_undecided(out: Outputs) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from types import MappingProxyType
 
 from antennate.hardware.safety.causes import Cause
@@ -52,8 +53,8 @@ CURES = MappingProxyType(
         Cause.BUS_ERROR: f"check the adapter of the servo bus and its cable; {_BUS}",
         Cause.WATCHDOG: f"close other programs; then {_ARM}",
         Cause.DISARMED: f"{_BUS}; then {_ARM}",
-        Cause.NOT_FOLLOWING: f"{_JOINT}: is its gear or horn loose? {_BUS}; then {_ARM}",
-        Cause.OUT_OF_LIMITS: f"{_JOINT} back within its limits; then {_ARM}",
+        Cause.NOT_FOLLOWING: f"{_JOINT}; see whether its gear or horn is loose; {_BUS}; then {_ARM}",
+        Cause.OUT_OF_LIMITS: f"{_JOINT}; bring it back within its limits; then {_ARM}",
         Cause.IMPOSSIBLE_SPEED: f"change that servo if it happens again; {_BUS}; then {_ARM}",
         Cause.WRONG_MODE: "`antennate doctor --fix` sets it; does another program use the bus?",
         Cause.NOT_READY: "do what stands in its brackets",
@@ -77,6 +78,21 @@ def what_to_do(why: str) -> list[str]:
     """
     found = [Cause[name] for name in _NAMED.findall(why)]
     first = [cause for cause in found if cause not in _FOLLOW]
-    likely = dict.fromkeys(CURES[cause] for cause in first or found)
-    cures = ". ".join(cure[0].upper() + cure[1:] for cure in likely)
-    return [f"What to do: {cures}. See docs/causes.md."] if cures else []
+    cures = " ".join(_each_once([CURES[cause] for cause in dict.fromkeys(first or found)]))
+    return [f"What to do: {cures} See docs/causes.md."] if cures else []
+
+
+def _each_once(cures: Sequence[str]) -> list[str]:
+    """Sentences of cures in which no step comes twice; to arm again comes last."""
+    every = [step for cure in cures for step in cure.split("; ")]
+    said = {step for step in every if any(each.startswith(f"{step}, ") for each in every)}
+    told, last = list[str](), list[str]()
+    for cure in cures:
+        steps = [step for step in cure.split("; ") if step not in said]
+        said.update(steps)
+        last += [step for step in steps if step.startswith("then ")]
+        if steps := [step for step in steps if not step.startswith("then ")]:
+            told.append("; ".join(steps))
+    if last:
+        told[-1] = "; ".join([*told[-1:], *last])
+    return [f"{text[0].upper()}{text[1:]}{'' if text[-1] in '?.' else '.'}" for text in told]
