@@ -53,7 +53,7 @@ CURES = MappingProxyType(
         Cause.BUS_ERROR: f"check the adapter of the servo bus and its cable; {_BUS}",
         Cause.WATCHDOG: f"close other programs; then {_ARM}",
         Cause.DISARMED: f"{_BUS}; then {_ARM}",
-        Cause.NOT_FOLLOWING: f"{_JOINT}; see whether its gear or horn is loose; {_BUS}; then {_ARM}",
+        Cause.NOT_FOLLOWING: f"{_JOINT}; see if its gear or horn is loose; {_BUS}; then {_ARM}",
         Cause.OUT_OF_LIMITS: f"{_JOINT}; bring it back within its limits; then {_ARM}",
         Cause.IMPOSSIBLE_SPEED: f"change that servo if it happens again; {_BUS}; then {_ARM}",
         Cause.WRONG_MODE: "`antennate doctor --fix` sets it; does another program use the bus?",
