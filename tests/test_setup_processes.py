@@ -55,7 +55,8 @@ def test_a_pattern_of_ports_is_refused_where_both_are_known(
     known = [] if of_the_file else ["--bus", "one", "--esp32", "two"]
     run = ran(["setup", *known, "--among", "ports/*"], tmp_path)
     assert run.returncode == 2
-    (line,) = run.stderr.splitlines()
+    *said, line = run.stderr.splitlines()
+    assert len(said) == of_the_file  # that the file is read
     assert "--among: expected a port that is to be found" in line
     assert "bus one and esp32 two" in line
 

@@ -27,8 +27,7 @@ BUILT_IN: dict[str, ControllerFactory] = {
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
-    "closed": "walks on until its readings repeat, which means that it is stuck; then backs off "
-    "and turns",
+    "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
 }
 """What ours do, for who meets them for the first time."""
 RIVAL = "open"

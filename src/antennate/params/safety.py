@@ -79,7 +79,7 @@ class SupervisorParams(Params):
     hum_time: float = number(
         30.0,
         "s",
-        "computed: mains 0.02 Hz off half the rate beat with it and hide a hum for up to 25 s; "
+        "assumed: mains 0.02 Hz off half the rate beat with it and hide a hum for up to 25 s; "
         "Europe's mains wander by 0.05 Hz (EU 2017/1485)",
         gt=0,
         le=3600,

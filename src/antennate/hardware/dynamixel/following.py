@@ -110,7 +110,7 @@ class Following:
         self._wait(span[1], goals)
         self._goals.append(goals.copy())
         self._leap(span, positions)
-        self._leave(span[1], positions)
+        self.leave(span[1], positions)
         near, far = np.min(self._goals, axis=0), np.max(self._goals, axis=0)
         with np.errstate(invalid="ignore"):
             behind = np.clip(positions, near, far) - positions
@@ -180,7 +180,7 @@ class Following:
         servo = self._ids[at]
         return servo in self.faults.behind or self._well(servo)
 
-    def _leave(self, now: float, positions: Floats) -> None:
+    def leave(self, now: float, positions: Floats) -> None:
         """Whether joints are beyond their limits by more than the error of full drive."""
         low, high = self._least
         with np.errstate(invalid="ignore"):
