@@ -18,6 +18,9 @@ from antennate.types import Floats
 
 Picture = NDArray[np.uint8]
 _LINE: Colour = (0.8, 0.8, 0.8, 1.0)
+_RIGHT_ANGLE = 90.0 if mujoco.mj_version() < 4_000_000 else 0.0
+"""Field of view of a camera without perspective that sees twice its distance [deg]: the engine
+takes an angle before 4.0, the height that is seen after; 0 then."""
 _SAMPLES = 4
 """Samples of a pixel: thin antennae would flicker otherwise."""
 _THIN = 1.5
@@ -83,7 +86,7 @@ class Camera:
         self._shot = shot
         self._camera = _aimed(shot)
         if shot.flat:
-            self._model.vis.global_.fovy = 2 * shot.distance
+            self._model.vis.global_.fovy = _RIGHT_ANGLE or 2 * shot.distance
         self._driver = importlib.import_module(f"mujoco.{name}").GLContext(*size)
         self._driver.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
