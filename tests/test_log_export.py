@@ -76,6 +76,10 @@ def test_no_run_replaces_the_one_that_it_reads(
     files = [log, Path("run/result.json"), Path("run/config.toml"), Path("run/recording.csv")]
     for file in files[1:]:
         file.write_text("what was measured")
+    names = [str(file.relative_to("run")) for file in files]
+    Path("run/files.txt").write_text(
+        "\n".join(["# Files that this run wrote.", *names, "files.txt"])
+    )
     before = [file.read_bytes() for file in files]
     assert main([*words, "--out", "run", "--overwrite"]) == 2
     err = capsys.readouterr().err
