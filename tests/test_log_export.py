@@ -77,9 +77,8 @@ def test_no_run_replaces_the_one_that_it_reads(
     for file in files[1:]:
         file.write_text("what was measured")
     names = [str(file.relative_to("run")) for file in files]
-    Path("run/files.txt").write_text(
-        "\n".join(["# Files that this run wrote.", *names, "files.txt"])
-    )
+    title = "# Files that this run wrote. --overwrite replaces these alone."
+    Path("run/files.txt").write_text("\n".join([title, *names, ""]))
     before = [file.read_bytes() for file in files]
     assert main([*words, "--out", "run", "--overwrite"]) == 2
     err = capsys.readouterr().err
