@@ -61,7 +61,7 @@ def machines(parts: Mapping[str, Any]) -> str:
                 name + " (quick)" * about["quick"],
                 about["date"],
                 known.index(about["machine"]) + 1,
-                f"{about['seconds']} s",
+                "not measured" if about["seconds"] is None else f"{about['seconds']} s",
                 "not measured" if about["others"] is None else about["others"],
                 f"{about['load_before']}, {about['load_after']}",
             )
