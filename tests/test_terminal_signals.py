@@ -54,3 +54,18 @@ def test_B19_ctrl_c_at_any_time_ends_it_in_order(tmp_path: Path, moment: float) 
     assert result["logs"]
     assert all((out / name).exists() for name in result["logs"])
     assert f"replay {out / result['logs'][0]}" in " ".join(text.split())
+
+
+def test_ctrl_c_while_source_is_executed_keeps_the_exit_code(tmp_path: Path) -> None:
+    """As `dataclasses` does at import: CPython would end itself by SIGINT after our exit code."""
+    command = 'exec("raise KeyboardInterrupt")'
+    module = "import sys, types\nlog = types.ModuleType('antennate.cli.log')\n"
+    module += f"log.command = lambda argv: {command}\nsys.modules[log.__name__] = log\n"
+    (tmp_path / "sitecustomize.py").write_text(module)
+    ended = subprocess.run(
+        [*ANTENNATE, "log"],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert (ended.returncode, ended.stderr) == (INTERRUPTED, "antennate log: interrupted\n")

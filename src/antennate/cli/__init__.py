@@ -56,6 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             code = _run(words, name)
         except KeyboardInterrupt:
             sys.stderr.write(f"{name}: interrupted\n")
+            exec("")  # noqa: S102  CPython forgets that an earlier `exec` was interrupted
             return INTERRUPTED
         output.flush()
         if output.error is None or isinstance(output.error, BrokenPipeError):
