@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
-from antennate.control import controllers
+from antennate.control import blind, controllers
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
 from antennate.params.control import ControlParams
@@ -20,17 +20,27 @@ ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
 
 BUILT_IN: dict[str, ControllerFactory] = {
     "open": controllers.open_loop,
+    "timed": blind.timed,
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
+    "schedule": blind.schedule,
+    "zigzag": blind.zigzag,
+    "random": blind.RandomController,
 }
+USUAL = ("open", "timed", "paper", "closed")
+"""Those of ours that are run if none is named; the others are further controls without touch."""
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
+    "timed": "escapes as closed does, by the clock and whatever it feels: the control of closed",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
+    "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
+    "zigzag": "blind: turns right and left by the clock, always by as much",
+    "random": "blind: backs off and turns at random times, to random sides, by random angles",
 }
 """What ours do, for who meets them for the first time."""
-RIVAL = "open"
+RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
 CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)

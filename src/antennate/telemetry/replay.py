@@ -25,10 +25,9 @@ from antennate.types import AntennaFrame, Controller, JointCommand
 class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
-    controller: str | None = number(
-        None, "1", "assumed: the one recorded", examples=["open", "paper", "closed"]
-    )
-    """Open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded."""
+    controller: str | None = number(None, "1", "assumed: the one recorded", examples=[*BUILT_IN])
+    """Open, timed, paper, closed, schedule, zigzag, random, or MODULE:NAME or FILE.py:NAME of
+    your own, in place of the recorded."""
 
     @field_validator("controller")
     @classmethod

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.readers import unread_by_all
-from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.readers import HARDWARE_ALONE
@@ -24,13 +24,14 @@ class TunnelConfig(TrialConfig):
     )
     """Trials of every controller."""
     controllers: tuple[str, ...] = number(
-        tuple(BUILT_IN),
+        USUAL,
         "1",
-        "assumed: all of ours",
+        "assumed: without touch, with the published rule and with ours",
         min_length=1,
-        examples=["open", "paper", "closed"],
+        examples=[*BUILT_IN],
     )
-    """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
+    """Controllers to run: open, timed, paper, closed, schedule, zigzag, random, or MODULE:NAME or
+    FILE.py:NAME of your own."""
     time_limit: float = number(
         100.0, "s", "paper: 0.04 m/s without feedback; half of that on 2 m", gt=0, le=3600
     )
