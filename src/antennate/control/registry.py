@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
 from antennate.control import blind, controllers
+from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
 from antennate.params.control import ControlParams
@@ -48,17 +49,25 @@ CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.con
 
 
 def about(names: Iterable[str]) -> str:
-    """What the controllers of ours among these do, a line each."""
-    return "\n".join(f"{name}: {ABOUT[name]}" for name in names if name in ABOUT)
+    """What the controllers of ours among these conditions do, a line each, then their readings."""
+    ours = dict.fromkeys(parts_of(name)[0] for name in names)
+    lines = [f"{name}: {ABOUT[name]}" for name in ours if name in ABOUT]
+    return "\n".join([*lines, *about_readings(names)])
 
 
 def compared(names: Sequence[str]) -> tuple[str, str] | None:
     """The two conditions that a headline compares: the last one named, and its rival.
 
     The rival is `RIVAL`, or the first one where that is not among them; None of fewer than two.
+    Conditions with other than their own readings are left out, unless only one is left: then it is
+    compared with the last one that has others.
     """
     if len(names) < 2:
         return None
+    own = [name for name in names if parts_of(name)[1] == OWN]
+    if len(own) == 1:
+        return own[0], [name for name in names if name != own[0]][-1]
+    names = own or names
     rival = RIVAL if RIVAL in names else names[0]
     return [name for name in names if name != rival][-1], rival
 
