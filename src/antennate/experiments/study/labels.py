@@ -46,8 +46,10 @@ def measure_of(experiment: str, column: str) -> Measure:
     return Measure(column, words, _UNITS.get(end, ""), form=".3g")
 
 
-def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float]:
-    """What no value of a measure lies below, and what none exceeds.
+def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float, bool]:
+    """What no value of a measure lies below, what none exceeds, and whether that is a failure.
+
+    A measure that ends at a parameter, as a time at its limit, is that limit where a trial fails.
 
     Args:
         of: The measure.
@@ -55,10 +57,10 @@ def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[flo
         values: Parameters that are not at their defaults, by name.
     """
     if not isinstance(of.most, str):
-        return of.least, of.most
+        return of.least, of.most, False
     known = _experiment(experiment)
     default = known.config.model_fields[of.most].default if known else math.inf
-    return of.least, float(values.get(of.most, default))
+    return of.least, float(values.get(of.most, default)), True
 
 
 def cell(of: Measure, number: Any, interval: Any = None) -> str:

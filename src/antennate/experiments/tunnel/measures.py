@@ -69,7 +69,7 @@ def summary(rows: Sequence[TrialResult], limit: float) -> dict[str, Any]:
     valid = [row for row in rows if row.outcome != "invalid"]
     won = [row for row in valid if row.outcome == "success"]
     times = np.array([row.time_s for row in valid])
-    restricted, ends = statistics.mean95(times, 0.0, limit)
+    restricted, ends = statistics.mean95(times, 0.0, limit, restricted=True)
     progress = sum(row.progress_m for row in valid)
     return {
         "trials": len(rows),
