@@ -17,7 +17,10 @@ from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, few, successes
 from antennate.telemetry.parts import log_name
 
-_STUDENT = "Intervals of means are Student's, cut at 0 and the limit."
+_JOINED = (
+    "Intervals of restricted times join Wilson's of the failures with Student's of the times:\n"
+    "they reach for failures that few trials do not meet."
+)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -36,7 +39,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         one,
         f"{many} a controller, seed {result['seed']}. A failure counts as {until}.\n"
         f"Invalid trials do not count in the rows below "
-        f"`invalid`.{'' if few(_valid(result)) else f' {_STUDENT}'}",
+        f"`invalid`.{'' if few(_valid(result)) else f' {_JOINED}'}",
         about(controllers),
     )
     two_by_two = Table.of(
@@ -47,7 +50,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             if f"{first}-{second}" in pairs
         },
         two,
-        "McNemar's test is exact; Wilcoxon's takes failures as the limit; both two-sided.",
+        "McNemar's test is exact; Wilcoxon's takes failures as the limit, and Pratt's ranks; "
+        "both two-sided.",
     )
     return (one_by_one, two_by_two) if pairs else (one_by_one,)
 

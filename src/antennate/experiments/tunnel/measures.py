@@ -102,8 +102,10 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
     won = [row for row in valid if row.outcome == "success"]
     times = np.array([row.time_s for row in valid])
     limits = np.array([row.limit_s for row in valid])
-    share, share_ends = statistics.mean95(times / limits, 0.0, 1.0)
-    restricted, ends = (None, None) if limit is None else statistics.mean95(times, 0.0, limit)
+    share, share_ends = statistics.mean95(times / limits, 0.0, 1.0, restricted=True)
+    restricted, ends = None, None
+    if limit is not None:
+        restricted, ends = statistics.mean95(times, 0.0, limit, restricted=True)
     progress = sum(row.progress_m for row in valid)
     return {
         "trials": len(rows),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from multiprocessing import parent_process
 from pathlib import Path
@@ -13,7 +14,7 @@ from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.hard import HARD
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.mjcf_file import require_compiles
-from antennate.sim.scenes.scene import FlatScene, Scene
+from antennate.sim.scenes.scene import TIME_LIMIT, FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
 
 TUNNEL = "tunnel"
@@ -27,6 +28,11 @@ _SHIPPED: dict[str, Callable[[], Scene]] = {
 SHIPPED = tuple(_SHIPPED)
 """Scenes that need no file and no code of others."""
 SCENES: Registry[Callable[[], Scene]] = Registry("scene", "antennate.scenes", _SHIPPED)
+
+
+def shared_limit(name: str) -> float:
+    """The time limit that all trials of a scene share [s]; infinite where it may be drawn."""
+    return TIME_LIMIT if name != CORRIDORS and (name in SHIPPED or _is_file(name)) else math.inf
 
 
 def check_name(name: str) -> str:
