@@ -12,8 +12,8 @@ _TERMS = {
     "trials make it wide; where the intervals of two conditions overlap much, their order is not "
     "known.",
     "restricted_mean_time_s": "Restricted mean time: the mean over all valid trials, where one "
-    "that fails counts as the whole time limit. So giving up early does not look fast. Its interval "
-    "also reaches for failures that so few trials may not have met.",
+    "that fails counts as the whole time limit. So giving up early does not look fast. Its "
+    "interval also reaches for failures that so few trials may not have met.",
     "progress_per_time_m_s": "Progress over time: how far all valid trials came together, over "
     "their time together, so that failures count. Speed over successes: the mean of progress over "
     "time of each trial that succeeded.",
