@@ -257,8 +257,8 @@ def main() -> None:
         print("40 trials:")
         print(table([row for row in rows if row["trials"] == 40], "failures"), "\n")
     if not quick:
-        whole = {"seed": SEED, "draws": draws, "limit_s": LIMIT, **found}
-        text = json.dumps(_rounded(whole), indent=1) + "\n"
+        about = {"seed": SEED, "draws": draws, "bootstrap_draws": SOME, "limit_s": LIMIT}
+        text = _lines({**about, **_rounded(found)})
         (SCIENCE / "coverage.json").write_text(text, encoding="utf-8")
 
 
@@ -271,6 +271,17 @@ def _rows(
     counts: tuple[int, ...],
 ) -> list[dict[str, Any]]:
     return list(part(draws, counts))
+
+
+def _lines(whole: dict[str, Any]) -> str:
+    """JSON with one line for each cell."""
+    parts = [
+        f'"{name}": ' + ("[\n" + ",\n".join(map(json.dumps, part)) + "\n]")
+        if isinstance(part, list)
+        else f'"{name}": {json.dumps(part)}'
+        for name, part in whole.items()
+    ]
+    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def _rounded(value: Any) -> Any:
