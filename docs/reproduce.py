@@ -28,7 +28,7 @@ the simulation finds, and a verdict by a rule that is stated with it. The number
 whole run. `wall`, `sweep` and `touch` were run again with the same seed when their rules or
 intervals had changed, and their numbers are those of the second runs. One interval is of the
 program as it was: that of the time by which feedback is faster is a percentile bootstrap. The
-program now gives Student's interval, which is slightly wider.
+program now gives one that also reaches for failures not met ([Statistics](science/statistics.md)).
 
 | verdict | meaning |
 |---|---|

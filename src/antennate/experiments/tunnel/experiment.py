@@ -50,8 +50,8 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             if f"{first}-{second}" in pairs
         },
         two,
-        "McNemar's test is exact; Wilcoxon's takes failures as the limit, and Pratt's ranks; "
-        "both two-sided.",
+        "McNemar's test is exact; Wilcoxon's takes failures as the limit, and zeros by Pratt's "
+        "ranks; both two-sided.",
     )
     return (one_by_one, two_by_two) if pairs else (one_by_one,)
 
