@@ -10,6 +10,7 @@ import numpy as np
 
 from antennate.control.checked import CheckedController
 from antennate.control.loop import run_loop
+from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -45,13 +46,15 @@ Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 
 Bodies = Union[SimRobot, "WarpRobot"]
 """Robots in rows that trials are put into, on the CPU or in a batch on a device."""
+Donors = dict[int, Floats]
+"""Counts of trials, tick by tick, (ticks, 2), by number."""
 MakeBodies = Callable[[int], tuple[Scene, Bodies]]
 """Takes the number of rows; the scene, drawn so that these robots can be put into it, and them."""
 
 
 def run_trials(
     config: TunnelConfig,
-    controller: str,
+    condition: str,
     trials: Sequence[int],
     emit: Emit,
     batch: int = BATCH,
@@ -59,17 +62,40 @@ def run_trials(
     watch: Watch | None = None,
     make: ControllerMaker = make_controller,
     bodies: MakeBodies | None = None,
+    donors: Donors | None = None,
+    read: Donors | None = None,
 ) -> None:
-    """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
+    """Run trials of one condition; emit each as it ends, and keep its log if there is a folder.
 
     A trial in which the controller fails is invalid, and the others go on. Angles that are not
     finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
     exception, or an array of another shape, cannot be told apart by rows: then each trial of the
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too. With robots of another kind, there are no logs and nothing to watch.
+
+    Args:
+        config: What is run.
+        condition: Name of the controller, with its readings if they are not its own.
+        trials: Their numbers.
+        emit: Takes each as it ends.
+        batch: Trials at once.
+        logs: Folder for their logs.
+        watch: Looks at the first row.
+        make: Makes the controller.
+        bodies: Makes the robots; on the CPU if not given.
+        donors: Counts that yoked trials are given, by trial, (ticks, 2); if not given, they are
+            read in trials that are run for it, so many at once.
+        read: Takes what the robot of each trial reads, likewise.
     """
+    if parts_of(condition)[1] == YOKED and donors is None:
+        for first in range(0, len(trials), batch):
+            some = trials[first : first + batch]
+            found = _donors(config, parts_of(condition)[0], some, batch)
+            run_trials(config, condition, some, emit, batch, logs, watch, make, bodies, found)
+        return
     made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch, made)
+    size = min(batch, len(trials))
+    rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read)
     try:
         rows.run(make)
     except Restart:
@@ -81,7 +107,18 @@ def run_trials(
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(config, controller, [trial], emit, logs=logs, make=make, bodies=bodies)
+            run_trials(
+                *(config, condition, [trial], emit, 1, logs, None),
+                *(make, bodies, donors, read),
+            )
+
+
+def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch: int) -> Donors:
+    """What robots with their own readings read in the trials that follow these, by these."""
+    following = {trial: config.following(trial) for trial in trials}
+    read: Donors = {}
+    run_trials(config, controller, [*following.values()], lambda found: None, batch, read=read)
+    return {trial: read[donor] for trial, donor in following.items() if donor in read}
 
 
 def cpu_bodies(config: TunnelConfig) -> MakeBodies:
@@ -108,7 +145,11 @@ class _Rows:
         logs: Path | None,
         watch: Watch | None,
         made: tuple[Scene, Bodies],
+        donors: Donors | None,
+        read: Donors | None,
     ) -> None:
+        self._controller, self._readings = parts_of(name)
+        self._donors, self._read, self._counts = donors or {}, read, list[Floats]()
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
@@ -135,15 +176,21 @@ class _Rows:
         if not self._monitors:
             return
         try:
-            made = make(self._name, config.control, config.robot, self._batch)
+            made = make(self._controller, config.control, config.robot, self._batch)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
         decisions = Decisions(config.robot, made, self._batch)
+        nothing = [np.full((1, 2), np.nan)] * self._batch
+        readings = make_readings(self._readings, config.control, self._batch, nothing)
+        given = Given(control, readings)
         for row, phase in enumerate(phases):
-            self._reset(row, phase, control, decisions)
+            self._reset(row, phase, control, readings, decisions)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+            if self._read is not None:
+                self._counts.append(frame.counts.copy())
+            frame = given.frame or frame
             if self._logs:
                 decided = decisions.take(frame, command)
                 for log in self._logs.values():
@@ -151,10 +198,10 @@ class _Rows:
             if self._looks is not None:
                 self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
-                self._reset(row, self._place(row), control, decisions)
+                self._reset(row, self._place(row), control, readings, decisions)
             return bool(self._monitors)
 
-        run_loop(self._robot, control, config.control.period, go_on)
+        run_loop(self._robot, given, config.control.period, go_on)
 
     def _place(self, row: int) -> float | None:
         """Put the next trial whose scene can be drawn into a row; its gait phase [rad], if any."""
@@ -175,6 +222,9 @@ class _Rows:
             SceneError: The scene cannot be drawn.
         """
         config = self._config
+        if self._readings == YOKED and trial not in self._donors:
+            other = config.following(trial)
+            raise SceneError(f"{YOKED}: expected readings of trial {other}, found none")
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
@@ -190,11 +240,19 @@ class _Rows:
         return start.phase
 
     def _reset(
-        self, row: int, phase: float | None, control: CheckedController, decisions: Decisions
+        self,
+        row: int,
+        phase: float | None,
+        control: CheckedController,
+        readings: Readings,
+        decisions: Decisions,
     ) -> None:
-        """Let the controller, and the log, begin with the trial that was put into a row, if any."""
+        """Let the controller, its readings and the log begin with the trial in a row, if any."""
         if phase is not None:
             control.reset(np.array([row]), phase)
+            if isinstance(readings, Yoked):
+                readings.give(row, self._donors[self._monitors[row].trial])
+            readings.reset(np.array([row]))
             self._log(row, phase, decisions)
 
     def log_of(self, trial: int) -> Path:
@@ -207,7 +265,8 @@ class _Rows:
         if self._folder is None or not isinstance(world, World):
             return
         header = Header(
-            controller=self._name,
+            controller=self._controller,
+            readings=self._readings,
             params=config.control,
             robot=config.robot,
             seed=config.seed,
@@ -266,7 +325,9 @@ class _Rows:
         if (log := self._logs.pop(row, None)) is not None:
             log.close()
         monitor, world = self._monitors.pop(row), self._robot.world(row)
-        del self._begun[row]
+        begun = self._begun.pop(row)
+        if self._read is not None and (ticks := self._counts[begun:]):
+            self._read[monitor.trial] = np.array([counts[row] for counts in ticks])
         path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
         self._emit((monitor.result(world, outcome, reason, self._maneuvers[row]), path))
         self._robot.unload(row)
