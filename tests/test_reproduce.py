@@ -136,13 +136,17 @@ def swept(rarest: list[float | None]) -> dict[str, Any]:
     return {"shapes": {"descending": {"fixed": {"share": share | {"backward": rarest}}}}}
 
 
-def sensed(f1: float | None, lead: list[float] | None) -> dict[str, Any]:
+def sensed(
+    f1: float | None, lead: list[float] | None, wall: list[float] | None = None
+) -> dict[str, Any]:
     """Half of the time is contact, so F1 of a sensor that always says so is 2/3."""
     row = {"contact_share": 0.5, "precision": f1 and 0.9, "recall": 0.5}
     ends = f1 and lead and [f1 - 0.02, f1 + 0.02]
     known = {"f1": f1, "f1_95": ends, "f1_over_always_contact": f1 and f1 - 2 / 3}
     known["f1_over_always_contact_95"] = lead
-    return {"profiles": {"descending": row | known}}
+    flat = row | known | {"profile": "descending", "wall": "flat"}
+    flat["f1_over_always_contact_95"] = wall or lead
+    return {"profiles": {"descending": row | known}, "by_wall": [flat]}
 
 
 @pytest.mark.parametrize(
@@ -223,6 +227,7 @@ def sensed(f1: float | None, lead: list[float] | None) -> dict[str, Any]:
         ("slope", sigmoid(18.0, 9.0, 0.3), "undecided"),
         ("slope", sigmoid(18.0, None, 0.3), "undecided"),
         ("contact", sensed(0.7, [0.01, 0.05]), "conditional"),
+        ("contact", sensed(0.7, [0.01, 0.05], [-0.6, -0.5]), "not_reproduced"),  # at one wall
         ("contact", sensed(0.7, [-0.01, 0.07]), "undecided"),
         ("contact", sensed(0.6, [-0.09, -0.04]), "not_reproduced"),
         ("contact", sensed(0.7, None), "undecided"),  # one trial
