@@ -322,3 +322,13 @@ def test_the_quick_run_judges_every_claim(tmp_path: Path) -> None:
     assert all(set(row) == keys and row["verdict"] in VERDICTS for row in result["claims"])
     assert len(list((tmp_path / "run" / "figures").glob("*.png"))) == len(CLAIMS)
     assert (tmp_path / "run" / "report.html").stat().st_size < 3e6
+
+
+def test_a_claim_without_any_number_has_an_empty_figure() -> None:
+    """As where no robot crosses, so that nothing is known of their ways."""
+    result = tunnel("closed", 0, 0, offset_m=None, offset_95=None)
+    for row in result["controllers"].values():
+        row["offset_m"] = None
+    claim = BY_NAME["centred"]
+    assert claim.verdict(result) == "undecided"
+    assert not draw(claim, claim.judge(result)).axes[0].lines

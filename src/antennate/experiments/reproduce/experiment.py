@@ -16,7 +16,10 @@ from antennate.studies.run_files import REPORT
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """All claims with their verdicts."""
     rows = [
-        (row["claim"], [row["criterion"], row["paper"], row["ours"], VERDICTS[row["verdict"]]])
+        (
+            row["claim"],
+            [row.get("criterion", ""), row["paper"], row["ours"], VERDICTS[row["verdict"]]],
+        )
         for row in result["claims"]
     ]
     note = f"Reasons and figures: {REPORT}. Seed {result['seed']}."

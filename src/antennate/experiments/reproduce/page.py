@@ -1,4 +1,4 @@
-"""The claims as they stand in the report: each with its numbers, its rule and its figure."""
+"""The claims as they stand in the report: each with its criterion, its numbers and its figure."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _verdict(row: Mapping[str, Any]) -> str:
 def _line(row: Mapping[str, Any], name: str) -> str:
     return (
         f'<tr><td><a href="#{name}">{escape(row["claim"])}</a></td>'
-        f"<td class=wide>{escape(row['criterion'])}</td>"
+        f"<td class=wide>{escape(row.get('criterion', ''))}</td>"
         f"<td class=wide>{escape(row['paper'])}</td><td class=wide>{escape(row['ours'])}</td>"
         f"<td>{_verdict(row)}</td></tr>"
     )
@@ -61,15 +61,15 @@ def _line(row: Mapping[str, Any], name: str) -> str:
 
 def _section(row: Mapping[str, Any], name: str, rule: str, figure: str) -> str:
     facts = {
-        "criterion": rule,
-        "paper": row["paper"],
-        "ours": row["ours"],
-        "verdict": VERDICTS[row["verdict"]],
-        "why": row["reason"],
+        "criterion": escape(rule),
+        "paper": escape(row["paper"]),
+        "ours": escape(row["ours"]),
+        "verdict": _verdict(row),
+        "why": escape(row["reason"]),
     }
-    words = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
+    words = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in facts.items())
     return (
         f'<section id="{name}"><h2>{escape(row["claim"])}</h2>'
-        f'<p class="verdict">{_verdict(row)}</p><dl>{words}</dl>'
+        f"<dl>{words}</dl>"
         f"<div>{figure}<p><code>{escape(row['command'])}</code></p></div></section>"
     )
