@@ -1,20 +1,32 @@
 """Write the verdicts of a whole run of `antennate reproduce` into docs.
 
 Reads docs/science/reproduce.json, the result.json of that run, and writes docs/reproduce.md and the
-counts on docs/index.md. With --check only say whether both are true.
+counts on docs/index.md. With --check only say whether both are true. Run directories that are named
+are judged first, in place of a whole run: one of each command that stands beside a claim, whatever
+machine it was run on; their claims are written to docs/science/reproduce.json.
 """
 
 import json
 import sys
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from generated import finish, heads, row
 
-from antennate.experiments.reproduce.run import CLAIMS
+from antennate import experiments
+from antennate.experiments.reproduce.run import (
+    CLAIMS,
+    FULL,
+    ReproduceConfig,
+    ReproduceOutcome,
+    command,
+    settings,
+)
 from antennate.experiments.reproduce.verdict import MEANINGS, VERDICTS
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import RunDirectory
 
 ROOT = Path(__file__).parent
 RESULT = ROOT / "science" / "reproduce.json"
@@ -92,6 +104,27 @@ def result() -> dict[str, Any] | None:
     return found
 
 
+def judge(folders: Sequence[str]) -> None:
+    """Judge runs of all experiments, and keep their claims as those of a whole run.
+
+    Raises:
+        SystemExit: One is missing, or was told something else.
+    """
+    config, runs = ReproduceConfig(), dict[str, Mapping[str, Any]]()
+    for folder in folders:
+        run = RunDirectory.open(folder)
+        name = run.result()["command"]
+        told = experiments.load(name).config
+        if run.config(told) != told.model_validate(settings(name, config)):
+            sys.exit(f"{folder}: expected a run of `{command(name, config)}`, found another")
+        runs[name] = run.result()
+    if missing := [command(name, config) for name in FULL if name not in runs]:
+        sys.exit(f"expected runs of all parts, missing: {'; '.join(missing)}")
+    judged = tuple((claim, claim.judge(runs[claim.experiment])) for claim in CLAIMS)
+    outcome = ReproduceOutcome(config, judged, interrupted=False)
+    RESULT.write_text(to_json(outcome.result()), encoding="utf-8")
+
+
 def counts(found: Mapping[str, Any]) -> str:
     """How many claims have each verdict, in words; verdicts that none has are left out."""
     number = Counter(claim["verdict"] for claim in found["claims"])
@@ -137,6 +170,8 @@ def on_index(index: str, found: Mapping[str, Any] | None) -> str:
 
 def main() -> None:
     """Write both pages, or compare them."""
+    if folders := [word for word in sys.argv[1:] if word != "--check"]:
+        judge(folders)
     found = result()
     meanings = "".join(f"| {VERDICTS[name]} | {text} |\n" for name, text in MEANINGS.items())
     page = (

@@ -40,6 +40,14 @@ def test_distances_are_those_from_the_nearest_piece() -> None:
         assert geometry.distance(line, np.array(where)) == pytest.approx(distance)
 
 
+def test_a_hinge_at_its_stop_bends_its_spring_no_further() -> None:
+    """1.4 rad by default, 21.98 N·mm at the base spring."""
+    bends = np.zeros((3, 12))
+    bends[1, 0] = 2.0
+    row = walked([(0.1, 0.0)], bends)
+    assert row.spring_high_n_m == pytest.approx(0.274e-3 * np.degrees(1.4), rel=1e-6)
+
+
 def test_the_springs_of_both_antennae_are_looked_at() -> None:
     """A base spring of 0.274 N·mm/deg that is bent by 20° twice bears 5.48 N·mm."""
     bends = np.zeros((9, 12))

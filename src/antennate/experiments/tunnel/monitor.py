@@ -173,12 +173,14 @@ class TrialMonitor:
             self._offsets.setdefault(int(progress / _STRETCH), []).append(offset)
 
     def _load(self, world: Watched) -> SpringLoad:
-        """What the springs of the antennae bore."""
+        """What the springs of the antennae bore; beyond a hinge's range its holders meet."""
         hinges = len(world.bends())
         if not hinges:
             return SpringLoad()
+        antenna = world.robot.antenna
         angles = np.frombuffer(self._bends).reshape(-1, hinges)
-        return largest_load(angles, world.robot.antenna.spring_stiffness())
+        held = np.clip(angles, -antenna.range, antenna.range)
+        return largest_load(held, antenna.spring_stiffness())
 
     def result(self, world: Watched, outcome: Outcome, reason: str, ticks: Ints) -> TrialResult:
         """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
