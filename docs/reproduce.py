@@ -1,20 +1,32 @@
 """Write the verdicts of a whole run of `antennate reproduce` into docs.
 
 Reads docs/science/reproduce.json, the result.json of that run, and writes docs/reproduce.md and the
-counts on docs/index.md. With --check only say whether both are true.
+counts on docs/index.md. With --check only say whether both are true. Run directories that are named
+are judged first, in place of a whole run: one of each command that stands beside a claim, whatever
+machine it was run on; their claims are written to docs/science/reproduce.json.
 """
 
 import json
 import sys
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from generated import finish, heads, row
 
-from antennate.experiments.reproduce.run import CLAIMS
-from antennate.experiments.reproduce.verdict import VERDICTS
+from antennate import experiments
+from antennate.experiments.reproduce.run import (
+    CLAIMS,
+    FULL,
+    ReproduceConfig,
+    ReproduceOutcome,
+    command,
+    settings,
+)
+from antennate.experiments.reproduce.verdict import MEANINGS, VERDICTS
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import RunDirectory
 
 ROOT = Path(__file__).parent
 RESULT = ROOT / "science" / "reproduce.json"
@@ -23,42 +35,29 @@ BEGIN, END = "<!-- verdicts: python docs/reproduce.py -->", "<!-- end of verdict
 HEAD = """\
 # The paper, claim by claim
 
-Every claim of the paper ([arXiv:2603.07795](https://arxiv.org/abs/2603.07795)) in our words, what
-the simulation finds, and a verdict by a rule that is stated with it. The numbers are those of one
-whole run. `wall`, `sweep` and `touch` were run again with the same seed when their rules or
-intervals had changed, and their numbers are those of the second runs. One interval is of the
-program as it was: that of the time by which feedback is faster is a percentile bootstrap. The
-program now gives one that also reaches for failures not met ([Statistics](science/statistics.md)).
+Every claim of the paper ([arXiv:2603.07795](https://arxiv.org/abs/2603.07795)) in our words, the
+criterion it has to meet, what the simulation finds, and a verdict. The criterion, the rival that a
+claim is held against and the best that it can be are written down with the claim, in the program,
+and stand before the result here, in the table of the command and in `result.json`.
 
 | verdict | meaning |
 |---|---|
-| reproduced | the rule of the claim holds, and no number that we chose decides it |
-| conditional | it holds under a condition that the paper does not state; the condition is named |
-| not reproduced | it does not hold here; what we find instead is said |
-| undecided | too few trials to say |
+MEANINGS
+A rival is the simplest thing that would meet the claim without its being true: robots that feel
+nothing but escape by a clock, a sensor that always says contact, springs that are all equal. Where
+the paper gives two numbers, the criterion asks for half of its lead: then one run can say no as
+well as yes. A part of a criterion that surely fails decides, whatever the other parts.
 
-We wrote the rules when we knew most results, so judge them too. What they say of intervals came
-after a first whole run, and changed no verdict. After the whole run that is told here, three rules
-changed:
-
-- Springs are judged one by one, also the one beyond the flex sensor, and no longer by their sum.
-  This changed one verdict: *conditional* became *not reproduced*.
-- Shapes are judged without an interval, as the cells of the map were chosen. No verdict changed.
-- Where all robots shall cross, few trials are *undecided*. No verdict changed.
-
+We wrote the criteria when we knew most results, so judge them too. Where a number of ours was
+chosen so that the claim holds, as the corner of the tunnel, the base angle of the boulder wall or
+the coil of the springs, the best is *fitted*; where it was chosen for other reasons, *conditional*.
 Where all robots shall cross, a share of at least 95 % is enough if its interval is at most 10
-points wide, though it may reach below: 10 of 10 are *undecided*, 97 of 100 are not. By the rule of
-the walls, 97 of 100 would be *undecided* too. A number that we chose allows *conditional* at most,
-however clear the result: the base angle of the boulder wall, the lead and the offset of the body
-wave, the corner of the tunnel, the margins of the published rule. So 19 of the 22 rules cannot end
-as *reproduced*: *conditional* is the best that a simulation can say where parts are unpublished. A
-claim without a number in the paper is judged by what it says.
+points wide, though it may reach below: 10 of 10 are *undecided*, 97 of 100 are not.
 
 """
 BEST = (
-    "*Conditional* means that a claim holds under a condition that the paper does not state. For "
-    "most claims we had to choose numbers that the paper does not give. Those claims can only be "
-    "conditional."
+    "*Conditional* means that a claim holds under a condition that the paper does not state, "
+    "*fitted* that a number of ours was chosen so that it holds."
 )
 FOOT = """\
 ## Run it yourself
@@ -105,6 +104,27 @@ def result() -> dict[str, Any] | None:
     return found
 
 
+def judge(folders: Sequence[str]) -> None:
+    """Judge runs of all experiments, and keep their claims as those of a whole run.
+
+    Raises:
+        SystemExit: One is missing, or was told something else.
+    """
+    config, runs = ReproduceConfig(), dict[str, Mapping[str, Any]]()
+    for folder in folders:
+        run = RunDirectory.open(folder)
+        name = run.result()["command"]
+        told = experiments.load(name).config
+        if run.config(told) != told.model_validate(settings(name, config)):
+            sys.exit(f"{folder}: expected a run of `{command(name, config)}`, found another")
+        runs[name] = run.result()
+    if missing := [command(name, config) for name in FULL if name not in runs]:
+        sys.exit(f"expected runs of all parts, missing: {'; '.join(missing)}")
+    judged = tuple((claim, claim.judge(runs[claim.experiment])) for claim in CLAIMS)
+    outcome = ReproduceOutcome(config, judged, interrupted=False)
+    RESULT.write_text(to_json(outcome.result()), encoding="utf-8")
+
+
 def counts(found: Mapping[str, Any]) -> str:
     """How many claims have each verdict, in words; verdicts that none has are left out."""
     number = Counter(claim["verdict"] for claim in found["claims"])
@@ -112,24 +132,26 @@ def counts(found: Mapping[str, Any]) -> str:
 
 
 def verdicts(found: Mapping[str, Any]) -> str:
-    """The table of all claims, then the rule and the reason of each."""
+    """The table of all claims, then the criterion and the reason of each."""
     lines = [
         "## Verdicts",
         "",
         f"Of {len(CLAIMS)} claims: **{counts(found)}** (seed {found['seed']}; intervals are 95 %).",
         "",
-        heads("claim", "paper", "ours", "verdict"),
+        heads("claim", "criterion", "paper", "ours", "verdict"),
     ]
     for claim in found["claims"]:
         words = VERDICTS[claim["verdict"]]
-        lines.append(row(claim["claim"], claim["paper"], claim["ours"], f"**{words}**"))
-    lines += ["", "## Rules and reasons", ""]
+        cells = (claim[name] for name in ("claim", "criterion", "paper", "ours"))
+        lines.append(row(*cells, f"**{words}**"))
+    lines += ["", "## Criteria and reasons", ""]
     for claim, rule in zip(found["claims"], CLAIMS, strict=True):
         lines += [
-            f"**{claim['claim']}**: {VERDICTS[claim['verdict']]}.",
+            f"**{claim['claim']}**",
             "",
-            f"- Rule: {rule.rule}",
-            f"- Why: {claim['reason']}",
+            f"- Criterion: {rule.rule}",
+            f"- Ours: {claim['ours']}",
+            f"- Verdict: {VERDICTS[claim['verdict']]}. {claim['reason']}",
             f"- Run: `{claim['command']}`",
             "",
         ]
@@ -148,8 +170,13 @@ def on_index(index: str, found: Mapping[str, Any] | None) -> str:
 
 def main() -> None:
     """Write both pages, or compare them."""
+    if folders := [word for word in sys.argv[1:] if word != "--check"]:
+        judge(folders)
     found = result()
-    page = HEAD + (NO_RUN if found is None else verdicts(found)) + FOOT
+    meanings = "".join(f"| {VERDICTS[name]} | {text} |\n" for name, text in MEANINGS.items())
+    page = (
+        HEAD.replace("MEANINGS", meanings) + (NO_RUN if found is None else verdicts(found)) + FOOT
+    )
     finish(__file__, page, source="`docs/science/reproduce.json`")
     index = (ROOT / "index.md").read_text(encoding="utf-8")
     finish(__file__, on_index(index, found), "index.md")

@@ -206,7 +206,7 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
     assert "#stiff_jams" in page.references
     assert "b" not in page.tags
     assert "2 < 3" in page.text
-    assert "Conditional if most trials jam" in page.text
+    assert "Over half of the trials jam" in page.text
 
 
 def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:

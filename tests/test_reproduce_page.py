@@ -28,6 +28,7 @@ def pages(tmp_path: Path) -> Path:
     rows = [
         {
             "claim": claim.claim,
+            "criterion": claim.criterion,
             "paper": claim.paper,
             "ours": "1 | 2",
             "verdict": "not_reproduced" if i else "conditional",
@@ -52,8 +53,8 @@ def test_both_pages_tell_what_the_run_found(pages: Path) -> None:
     assert counts in index
     table = [line for line in page.splitlines() if line.endswith("reproduced** |")]
     assert len(table) == len(CLAIMS) - 1
-    assert {line.count(" | ") for line in table} == {3}  # a bar in a cell ends no cell
-    assert all(claim.rule in page for claim in CLAIMS)
+    assert {line.count(" | ") for line in table} == {4}  # a bar in a cell ends no cell
+    assert all(claim.criterion in page for claim in CLAIMS)
     assert run(pages, "--check").returncode == 0
 
 

@@ -60,7 +60,7 @@ def test_every_column_is_explained(where: tuple[str, str]) -> None:
 
 
 def test_a_measure_is_made_of_rows_and_shown_with_its_unit() -> None:
-    rows = [TrialResult(0, k, "open", "success", 10.0 * k, *[k] * 10, "") for k in (1, 2)]
+    rows = [TrialResult(0, k, "open", "success", 10.0 * k, *[k] * 10, reason="") for k in (1, 2)]
     measures = (
         Measure("time_s", "time", "s", mean, ".1f"),
         Measure("share.hold", "hold", "%", mean, ".0f", 100.0),

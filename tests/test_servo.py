@@ -146,6 +146,51 @@ def test_a_replay_of_the_real_servo_shows_that_its_divisor_is_256() -> None:
     assert sheet == pytest.approx(5.2, abs=0.5)
 
 
+@pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not here")
+def test_the_one_real_recording_that_stalls_is_named_with_its_error() -> None:
+    """Its drive is 885 counts, all of it, while its position stays within a tick."""
+    files = sorted(map(str, REAL.glob("*.json")))
+    found = antennate.run("servo", recording=files)
+    rows = {row["name"]: row for row in found.summary["recordings"]}
+    stalls = [name for name, row in rows.items() if row["stalled"] > 0.0]
+    assert stalls == ["2026-01-15_10h29m21.json"]
+    row = rows[stalls[0]]
+    assert row["error_deg"] == max(each["error_deg"] for each in rows.values())
+    assert row["error_stalled_deg"] > 3 * row["error_else_deg"]
+    assert row["lifted_n_m"] > row["weight_stalled_n_m"]
+    said = experiments.load("servo").sentence(found.summary)
+    assert said.count("stalls: ") == 1
+    assert f"{stalls[0]} stalls: " in said
+
+
+def test_stalls_are_times_at_rest_at_full_drive(tmp_path: Path) -> None:
+    """Of 4 s: 1 s at rest with 500 counts, 1 s at rest at full drive, 2 s at full drive moving."""
+    made = []
+    for i in range(1000):
+        t = i / RATE
+        moving = max(0.0, t - 2.0)
+        drive = 500 if t < 1.0 else 885
+        made.append(
+            {
+                "timestamp": t,
+                "position": 0.3 + moving,
+                "goal_position": 1.5 + moving,
+                "load": drive,
+                "input_volts": 5.0,
+                "torque_enable": True,
+            }
+        )
+    still = written(tmp_path / "a.json", made, 400, mass=0.5, length=0.1)
+    free = [entry | {"load": 100} for entry in made]
+    other = written(tmp_path / "b.json", free, 400, mass=0.5, length=0.1)
+    stall, rest = antennate.run("servo", recording=[str(still), str(other)]).summary["recordings"]
+    assert stall["full_drive"] == pytest.approx(0.75, abs=0.01)
+    assert stall["stalled"] == pytest.approx(0.25, abs=0.02)
+    assert stall["supply_stalled_v"] == pytest.approx(5.0)
+    assert stall["weight_stalled_n_m"] == pytest.approx(0.5 * 9.80665 * 0.1 * math.sin(0.3))
+    assert (rest["full_drive"], rest["stalled"]) == (0.0, 0.0)
+
+
 def entries(count: int = 300) -> list[dict[str, Any]]:
     """A shaft that creeps after its goal, a tick a sample."""
     step = 2 * math.pi / 4096

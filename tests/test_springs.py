@@ -103,3 +103,37 @@ def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
 def test_what_cannot_be_wound_is_refused(bad: dict[str, object], word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         run(SpringParams.model_validate(bad))
+
+
+def test_the_fatigue_of_shigleys_stock_spring() -> None:
+    """Example 10-8: music wire of 0.072 in, coil of 0.521 in, 1 to 5 lbf·in; n_f is 1.13."""
+    inch, lbf_in = 25.4, 0.1129848
+    spring = SpringParams(wire="music_wire", wire_mm=0.072 * inch, coil_mm=0.521 * inch)
+    found = springs.endurance(spring, 1.0 * lbf_in, 5.0 * lbf_in)
+    assert found.stress == pytest.approx(152.1e3 * 6894.76, rel=5e-3)
+    assert found.fatigue_factor == pytest.approx(1.13, abs=0.01)
+    assert found.yield_factor == pytest.approx(229.6 / 152.1, rel=5e-3)
+
+
+def test_a_load_at_the_published_limit_bears_a_million_cycles_and_no_more() -> None:
+    """Half of the tensile strength, from 0 (table 10-10)."""
+    spring = SpringParams()
+    most = springs.endurance(spring, 0.0, 1e-3).stress
+    limit = 0.5 * 1867e6 / 0.5**0.146 / most * 1e-3
+    assert springs.endurance(spring, 0.0, limit).fatigue_factor == pytest.approx(1.0, rel=1e-12)
+    assert springs.endurance(spring, -limit, limit).fatigue_factor < 1.0
+    assert math.isnan(springs.endurance(SpringParams(wire="hard_drawn"), 0.0, 1.0).fatigue_factor)
+    with pytest.raises(ConfigError, match="low: expected at most"):
+        springs.endurance(spring, -2.0, 1.0)
+
+
+def test_the_load_is_that_of_the_spring_with_the_largest_torque() -> None:
+    """Ten cycles of the stiff spring, bent to its negative side; the soft one goes further."""
+    t = np.linspace(0.0, 10.0, 2001)
+    stiff, soft = -0.1 * (1.0 - np.cos(2 * np.pi * t)), 0.3 * np.sin(2 * np.pi * 7 * t)
+    ripple = 0.002 * np.sin(2 * np.pi * 31 * t)
+    found = springs.largest_load(np.column_stack([stiff + ripple, soft]), (3.0, 1.0))
+    assert found.high == pytest.approx(0.6, rel=0.03)
+    assert found.low == pytest.approx(0.0, abs=0.01)
+    assert found.cycles == pytest.approx(10, abs=1)
+    assert springs.largest_load(np.zeros((5, 0)), (3.0,)) == springs.SpringLoad()

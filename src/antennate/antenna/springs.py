@@ -5,6 +5,8 @@
 with Young's modulus E, wire diameter d, mean coil diameter D and N active coils. The rate is a
 torque per turn: divide it by 2 pi for a stiffness per radian. Stress at the inside of the coil
 is K_i 32 M / (pi d^3), K_i = (4 C^2 - C - 1) / (4 C (C - 1)), C = D / d (Shigley, section 10-12).
+A spring bears a million cycles where amplitude a and mean m of that stress satisfy Gerber's
+a / S_e + (m / S_ut)^2 < 1 (the same section).
 """
 
 from __future__ import annotations
@@ -105,11 +107,116 @@ def modulus_of(params: SpringParams) -> float:
 
 def yield_angle(params: SpringParams, wire: float, coil: float, coils: float) -> float:
     """Angle [rad] at which a spring of these diameters [m] begins to yield."""
-    kind, index = WIRES[params.wire], coil / wire
-    limit = kind.yield_share * kind.strength / (1e3 * wire) ** kind.exponent
-    factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
+    limit = WIRES[params.wire].yield_share * _strength(params, wire)
     torque = _stiffness(modulus_of(params), wire, coil, coils)
-    return limit / (factor * 32.0 * torque / (math.pi * wire**3))
+    return limit / _stress(wire, coil, torque)
+
+
+def _strength(params: SpringParams, wire: float) -> float:
+    """Tensile strength [Pa] of a wire of this diameter [m]."""
+    kind = WIRES[params.wire]
+    return kind.strength / (1e3 * wire) ** kind.exponent
+
+
+def _stress(wire: float, coil: float, torque: float) -> float:
+    """Bending stress at the inside of the coil [Pa], diameters in m, torque in N·m."""
+    index = coil / wire
+    factor = (4 * index**2 - index - 1) / (4 * index * (index - 1))
+    return factor * 32.0 * torque / (math.pi * wire**3)
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance:
+    """What a spring bears of a load that comes back.
+
+    Attributes:
+        stress: Largest bending stress [Pa].
+        yield_factor: Yield stress over it.
+        fatigue_factor: By how much the load may grow until the spring breaks within a million
+            cycles, by Gerber's line; NaN where no fatigue data of the wire are known.
+    """
+
+    stress: float
+    yield_factor: float
+    fatigue_factor: float
+
+
+def endurance(params: SpringParams, low: float, high: float) -> Endurance:
+    """What a spring of the wire and coil of `params` bears.
+
+    Shigley, Mechanical Engineering Design, section 10-12: S_r of table 10-10 bounds a stress that
+    comes back from 0; S_e = (S_r / 2) / (1 - (S_r / 2 S_ut)^2) follows for a mean of 0.
+
+    Args:
+        params: Kind of wire, and its diameters.
+        low: Smallest torque of a cycle [N·m], negative where the spring is bent the other way.
+        high: Largest torque of a cycle [N·m], at least the size of `low`.
+
+    Raises:
+        ConfigError: `low` is larger than `high` in size, or one is no finite number.
+    """
+    low, high = checks.real("low", low, "N·m"), checks.real("high", high, "N·m")
+    if abs(low) > high:
+        raise ConfigError(f"low: expected at most {high:g} N·m in size, found {low:g}")
+    wire, coil, kind = 1e-3 * params.wire_mm, 1e-3 * params.coil_mm, WIRES[params.wire]
+    strength = _strength(params, wire)
+    most, least = (_stress(wire, coil, torque) for torque in (high, low))
+    if not most:
+        return Endurance(0.0, math.inf, math.inf)
+    yields = kind.yield_share * strength / most
+    if kind.fatigue_share is None:
+        return Endurance(most, yields, math.nan)
+    half = kind.fatigue_share / 2
+    swing = (most - least) / 2 / (half / (1 - half**2) * strength)
+    mean = (most + least) / 2 / strength
+    root = math.sqrt(swing**2 + 4 * mean**2)
+    return Endurance(most, yields, 2.0 / (swing + root))
+
+
+@dataclass(frozen=True, slots=True)
+class SpringLoad:
+    """The load of the spring of a chain that bore the largest torque.
+
+    Attributes:
+        low: Smallest torque [N·m], negative where it was bent the other way too.
+        high: Largest torque [N·m]; it counts as positive.
+        cycles: Load cycles: half of the reversals that are larger than a tenth of its range.
+    """
+
+    low: float = 0.0
+    high: float = 0.0
+    cycles: int = 0
+
+
+def largest_load(angles: Floats, stiffness: Sequence[float]) -> SpringLoad:
+    """The load of the spring that bore the largest torque.
+
+    Args:
+        angles: Angles of all springs over time [rad], shape (t, n); n is a multiple of the next.
+        stiffness: Stiffness of the springs of one chain [N·m/rad].
+    """
+    if not angles.size:
+        return SpringLoad()
+    torque = angles * np.resize(stiffness, angles.shape[1])
+    worst = int(np.abs(torque).max(axis=0).argmax())
+    course = torque[:, worst]
+    course = course * np.sign(course[np.abs(course).argmax()])
+    low, high = float(course.min()), float(course.max())
+    return SpringLoad(low, high, _reversals(course, 0.1 * (high - low)) // 2)
+
+
+def _reversals(course: Floats, least: float) -> int:
+    """Turning points (n,) that the course leaves by more than `least`."""
+    slope = np.sign(np.diff(course))
+    turns = course[1:-1][slope[1:] * slope[:-1] <= 0.0].tolist()
+    found, way, end = 0, 0, float(course[0])
+    for value in [*turns, float(course[-1])]:
+        if way * (value - end) > 0.0:
+            end = value
+        elif abs(value - end) > least:
+            found += way != 0
+            way, end = (1 if value > end else -1), value
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,8 @@ class Wire:
         strength: Tensile strength of a wire of 1 mm [Pa].
         exponent: How it falls with the diameter.
         yield_share: Yield stress in bending over tensile strength.
+        fatigue_share: Largest bending stress over tensile strength that a torsion spring bears a
+            million times from 0, not shot-peened; None where the table has no such wire.
         thinnest: Smallest diameter of the data [m]; `thickest` the largest.
     """
 
@@ -26,18 +28,20 @@ class Wire:
     strength: float
     exponent: float
     yield_share: float
+    fatigue_share: float | None
     thinnest: float
     thickest: float
 
 
 WIRES = {
-    "stainless_302": Wire(193e9, 1867e6, 0.146, 0.61, 0.3e-3, 2.5e-3),
-    "music_wire": Wire(203e9, 2211e6, 0.145, 0.78, 0.1e-3, 6.5e-3),
-    "hard_drawn": Wire(198e9, 1783e6, 0.190, 0.78, 0.7e-3, 12.7e-3),
-    "phosphor_bronze": Wire(103e9, 1000e6, 0.0, 0.61, 0.1e-3, 0.6e-3),
+    "stainless_302": Wire(193e9, 1867e6, 0.146, 0.61, 0.50, 0.3e-3, 2.5e-3),
+    "music_wire": Wire(203e9, 2211e6, 0.145, 0.78, 0.50, 0.1e-3, 6.5e-3),
+    "hard_drawn": Wire(198e9, 1783e6, 0.190, 0.78, None, 0.7e-3, 12.7e-3),
+    "phosphor_bronze": Wire(103e9, 1000e6, 0.0, 0.61, None, 0.1e-3, 0.6e-3),
 }
 """Shigley, Mechanical Engineering Design, 9th edition, tables 10-4 and 10-5; the yield shares are
-those of torsion springs, section 10-12."""
+those of torsion springs, section 10-12, and the fatigue shares those of its table 10-10 (Associated
+Spring) for ASTM A228 and stainless 302."""
 
 RATE_FACTOR = 10.8
 """Rate per turn = E d^4 / (10.8 D N): spring makers' figure; 10.186 = 64 / 2 pi follows from beam

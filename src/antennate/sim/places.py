@@ -25,6 +25,7 @@ class Places:
         root: First coordinate of the head's free joint.
         yaw, legs: Coordinates of these joints, shape (Y,) and (2 L,).
         hinges: Coordinates of the hinges under the flex sensors, shape (2, n).
+        bent: Coordinates of all hinges of the antennae, one antenna after the other, shape (n,).
         bounded: Coordinates of all joints that do not turn without end, shape (n,).
         drives: Actuators of all driven joints in the robot's order, shape (n,).
         driven, turning: Coordinates and degrees of freedom of the same joints, shape (n,).
@@ -47,6 +48,7 @@ class Places:
         self.yaw: Ints = coordinates(list(robot.yaw_names))
         self.legs: Ints = coordinates(list(robot.leg_names))
         sensed = robot.antenna.sensed_hinges
+        self.bent: Ints = bent
         self.hinges: Ints = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, :sensed]
         pitch = coordinates(list(robot.pitch_names))
         self.bounded: Ints = np.concatenate([self.yaw, pitch, bent])

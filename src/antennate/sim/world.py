@@ -276,6 +276,10 @@ class World:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self.places.links, :2]
 
+    def bends(self) -> Floats:
+        """Angles of all hinges of the antennae, one antenna after the other [rad], shape (n,)."""
+        return self._qpos[self.places.bent]
+
     def outlines(self) -> tuple[list[Floats], list[Floats]]:
         """Polygons of all obstacles in plan [m], each (n, 2): those fixed, those that can move."""
         solid = np.flatnonzero(self.places.obstacles & (self.model.geom_type != _PLANE))

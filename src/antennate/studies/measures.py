@@ -108,6 +108,11 @@ def largest(name: str, rows: Sequence[Any]) -> float | None:
     return max((getattr(row, name) for row in rows), default=None)
 
 
+def smallest(name: str, rows: Sequence[Any]) -> float | None:
+    """Smallest value of a column; None without rows."""
+    return min((getattr(row, name) for row in rows), default=None)
+
+
 def total(name: str, rows: Sequence[Any]) -> int:
     """Sum of a column."""
     return sum(getattr(row, name) for row in rows)

@@ -16,11 +16,14 @@ from antennate.studies.run_files import REPORT
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """All claims with their verdicts."""
     rows = [
-        (row["claim"], [row["paper"], row["ours"], VERDICTS[row["verdict"]]])
+        (
+            row["claim"],
+            [row.get("criterion", ""), row["paper"], row["ours"], VERDICTS[row["verdict"]]],
+        )
         for row in result["claims"]
     ]
     note = f"Reasons and figures: {REPORT}. Seed {result['seed']}."
-    return (Table("Claims", ["paper", "ours", "verdict"], rows, note),)
+    return (Table("Claims", ["criterion", "paper", "ours", "verdict"], rows, note),)
 
 
 def sentence(result: Mapping[str, Any]) -> str:

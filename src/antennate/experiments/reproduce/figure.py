@@ -40,7 +40,7 @@ def draw(claim: Claim, finding: Finding) -> Figure:
             ha="center",
         )
     values = np.array([bar.value for bar in bars])
-    if (values > 0).all() and values.max() > _WIDE * values.min():
+    if len(values) and (values > 0).all() and values.max() > _WIDE * values.min():
         panel.set_xscale("log")
     elif (values >= 0).all():
         panel.set_xlim(left=min(0.0, *panel.get_xlim()))

@@ -10,19 +10,23 @@ from typing import Any
 
 from antennate import experiments
 from antennate.experiments.reproduce.bench_claims import ANTENNA
-from antennate.experiments.reproduce.robot_claims import ROBOT
-from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Row
+from antennate.experiments.reproduce.gait_claims import GAIT
+from antennate.experiments.reproduce.tunnel_claims import TUNNEL
+from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Row, verdict
 from antennate.experiments.reproduce.wall_claims import WALL
 from antennate.params.base import Params, number
+from antennate.params.control import ConditioningParams
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, workers_from
 
-CLAIMS: tuple[Claim, ...] = (*ANTENNA, *WALL, *ROBOT)
+CLAIMS: tuple[Claim, ...] = (*ANTENNA, *WALL, *GAIT, *TUNNEL)
 """All claims, in the order of the page."""
+_CALIBRATE = {"averaging_time": ConditioningParams().averaging_time}
+"""The paper averages readings; a controller of ours does it over this time by default."""
 QUICK: Mapping[str, Mapping[str, Any]] = {
     "springs": {},
     "taper": {},
-    "calibrate": {"rig": {"pushes": 4}},
+    "calibrate": _CALIBRATE,
     "force": {"profiles": ("descending",), "traverses": 6},
     "touch": {"profiles": ("descending",), "speeds": (0.1,), "trials": 2},
     "sweep": {"profiles": ("descending",)},
@@ -33,6 +37,7 @@ QUICK: Mapping[str, Mapping[str, Any]] = {
 """What each experiment is told with `quick`."""
 FULL: Mapping[str, Mapping[str, Any]] = {
     **{name: {} for name in QUICK},
+    "calibrate": _CALIBRATE,
     "tunnel": {"trials": 100},
 }
 """What it is told otherwise: its defaults, and more tunnels."""
@@ -62,13 +67,16 @@ class ReproduceOutcome:
     def rows(self) -> list[Row]:
         """One row a claim."""
         return [
-            Row(c.claim, c.paper, f.ours, f.verdict, f.reason, command(c.experiment, self.config))
+            Row(
+                *(c.claim, c.criterion, c.rival, c.paper, f.ours, verdict(f.holds, c.best)),
+                *(f.reason, command(c.experiment, self.config)),
+            )
             for c, f in self.judged
         ]
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        found = Counter(finding.verdict for _, finding in self.judged)
+        found = Counter(row.verdict for row in self.rows)
         return {
             "schema": 1,
             "command": "reproduce",

@@ -1,30 +1,62 @@
-"""A claim of the paper, and what our runs make of it."""
+"""A claim of the paper, what our runs make of it, and the rule that turns both into one word."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from antennate.studies.statistics import wilson95
 
-Verdict = Literal["reproduced", "conditional", "not_reproduced", "undecided"]
+Verdict = Literal["reproduced", "conditional", "fitted", "not_reproduced", "undecided"]
+Best = Literal["reproduced", "conditional", "fitted"]
+"""What a claim can be at best, decided before any result is seen."""
 VERDICTS: Mapping[Verdict, str] = {name: name.replace("_", " ") for name in get_args(Verdict)}
 """Verdicts and what people read."""
+MEANINGS: Mapping[Verdict, str] = {
+    "reproduced": "the criterion is met, and no number that we chose decides it",
+    "conditional": "the criterion is met, with a number of ours that the paper does not state",
+    "fitted": "the criterion is met, but a number of ours was chosen so that it is: nothing is "
+    "shown",
+    "not_reproduced": "the criterion is not met; what we find instead is said",
+    "undecided": "the 95 % interval holds both sides of the criterion, or there are too few trials "
+    "for one",
+}
+"""The rule of the verdicts; `verdict` applies it to every claim."""
+ENOUGH_TO_STAY = 20
+"""Trials from which a largest value that stays below a limit says something: the paper's number."""
+_Z95 = 1.959963984540054
+"""The 97.5 % quantile of the normal distribution."""
+Ends = tuple[float, float]
+"""Lower and upper end of a 95 % interval."""
 
 
-def judged(holds: bool, conditionally: bool = False) -> Verdict:
-    """The verdict on a claim that holds, or holds under a condition."""
-    return "reproduced" if holds else "conditional" if conditionally else "not_reproduced"
+def verdict(holds: bool | None, best: Best) -> Verdict:
+    """The verdict on a claim.
+
+    Args:
+        holds: Whether its criterion is met; None if the trials decide neither.
+        best: What the claim can be at best.
+    """
+    if holds is None:
+        return "undecided"
+    return best if holds else "not_reproduced"
 
 
-def agrees(
-    value: float, interval: tuple[float, float] | None, paper: float, tolerance: float
-) -> Verdict:
-    """The verdict on a number that we could have chosen to meet: `conditional` at most.
+def above(interval: Ends | None, limit: float) -> bool | None:
+    """Whether a number exceeds a limit; None if the limit lies in its interval, or without one."""
+    if interval is None:
+        return None
+    low, high = interval
+    return None if low <= limit < high else low > limit
 
-    Undecided if its interval reaches the paper's number and is wider than what is tolerated to
-    both sides: few trials then decide nothing, for or against the claim. Undecided without one.
+
+def agrees(value: float, interval: Ends | None, paper: float, tolerance: float) -> bool | None:
+    """Whether a number agrees with the paper's.
+
+    None without an interval, and if that reaches the paper's number and is wider than what is
+    tolerated to both sides: few trials then decide nothing.
 
     Args:
         value: Our number.
@@ -33,27 +65,49 @@ def agrees(
         tolerance: Distance from the paper's number that still agrees.
     """
     if interval is None:
-        return "undecided"
+        return None
     low, high = interval
     if high - low > 2 * tolerance and low <= paper + tolerance and high >= paper - tolerance:
-        return "undecided"
-    return judged(False, abs(value - paper) <= tolerance)
+        return None
+    return abs(value - paper) <= tolerance
 
 
-def above(interval: tuple[float, float], limit: float) -> Verdict:
-    """The verdict on a number that shall exceed a limit: `conditional` at most, as for `agrees`.
+def all_of(*parts: bool | None) -> bool | None:
+    """Whether all parts of a criterion are met: one that is not decides, whatever the others."""
+    return False if False in parts else None if None in parts else True
 
-    Undecided if the limit lies within the interval.
+
+def lead(pair: Mapping[str, Any], first_is_ours: bool = True) -> Ends:
+    """95 % interval of the difference of two success shares on the same trials [points].
+
+    Adjusted Wald: Bonett and Price, Journal of Educational and Behavioral Statistics 37 (2012) 479.
 
     Args:
-        interval: Its 95 % interval.
-        limit: What it shall exceed.
+        pair: Trials, and on how many of them only the first or only the second succeeded.
+        first_is_ours: Whether the difference is that of the first less the second.
     """
-    low, high = interval
-    return "undecided" if low <= limit < high else judged(False, low > limit)
+    n = pair["trials"] + 2
+    first, second = (pair["only_first"] + 1) / n, (pair["only_second"] + 1) / n
+    difference = first - second if first_is_ours else second - first
+    half = _Z95 * math.sqrt((first + second - difference**2) / n)
+    return 100 * max(difference - half, -1.0), 100 * min(difference + half, 1.0)
 
 
-def share_of(row: Mapping[str, Any], key: str = "successes") -> tuple[float, tuple[float, float]]:
+def difference(
+    first: float | None, first_95: Ends | None, second: float | None, second_95: Ends | None
+) -> Ends | None:
+    """95 % interval of a difference of two independent numbers; None without their intervals.
+
+    From their own intervals: Zou and Donner, Statistics in Medicine 27 (2008) 1693.
+    """
+    if first is None or second is None or first_95 is None or second_95 is None:
+        return None
+    down = math.hypot(first - first_95[0], second_95[1] - second)
+    up = math.hypot(first_95[1] - first, second - second_95[0])
+    return first - second - down, first - second + up
+
+
+def share_of(row: Mapping[str, Any], key: str = "successes") -> tuple[float, Ends]:
     """Share of valid trials [%] with its 95 % interval."""
     valid = row["trials"] - row["invalid"]
     low, high = wilson95(row[key], valid)
@@ -80,7 +134,7 @@ class Bar:
 
     label: str
     value: float
-    interval: tuple[float, float] | None = None
+    interval: Ends | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +143,13 @@ class Finding:
 
     Attributes:
         ours: Our numbers, in words.
+        holds: Whether the criterion is met; None if the trials decide neither.
         reason: Why, and for `conditional` under which condition.
         bars: The paper's numbers and ours, in the claim's unit; the paper's first.
     """
 
     ours: str
-    verdict: Verdict
+    holds: bool | None
     reason: str
     bars: tuple[Bar, ...]
 
@@ -107,8 +162,10 @@ class Claim:
         name: Short name; file name of its figure.
         claim: What is claimed, in our words.
         paper: The paper's numbers.
-        rule: What has to hold for which verdict; a condition that we chose allows `conditional` at
-            most.
+        criterion: What has to hold, stated before the result.
+        rival: What would meet the claim without being true, and is beaten or told beside it.
+        best: What it can be at best.
+        ceiling: Why it can be no more.
         experiment: Experiment that tests it.
         unit: Unit of the figure's numbers.
         judge: From the results to a finding.
@@ -117,20 +174,41 @@ class Claim:
     name: str
     claim: str
     paper: str
-    rule: str
+    criterion: str
+    rival: str
+    best: Best
+    ceiling: str
     experiment: str
     unit: str
     judge: Callable[[Mapping[str, Any]], Finding]
 
+    def verdict(self, result: Mapping[str, Any]) -> Verdict:
+        """The verdict on a result of its experiment."""
+        return verdict(self.judge(result).holds, self.best)
+
+    @property
+    def rule(self) -> str:
+        """Criterion, rival and what it can be at best, as the page states them."""
+        most = f" At best {VERDICTS[self.best]}: {self.ceiling}." if self.ceiling else ""
+        return f"{self.criterion}. Rival: {self.rival}.{most}"
+
 
 def claim(
-    experiment: str, unit: str, paper: str, rule: str
+    experiment: str,
+    unit: str,
+    *,
+    paper: str,
+    criterion: str,
+    rival: str,
+    best: Best = "conditional",
+    ceiling: str = "",
 ) -> Callable[[Callable[[Mapping[str, Any]], Finding]], Claim]:
     """Make a function that judges the claim which its docstring states; the claim has its name."""
 
     def made(judge: Callable[[Mapping[str, Any]], Finding]) -> Claim:
         text = (judge.__doc__ or "").removesuffix(".")
-        return Claim(judge.__name__, text, paper, rule, experiment, unit, judge)
+        stated = judge.__name__, text, paper, criterion, rival, best, ceiling
+        return Claim(*stated, experiment, unit, judge)
 
     return made
 
@@ -140,6 +218,8 @@ class Row:
     """A judged claim: a row of claims.csv and of `claims` in result.json."""
 
     claim: str
+    criterion: str
+    rival: str
     paper: str
     ours: str
     verdict: Verdict

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antennate.experiments.servo import run as servo
 from antennate.experiments.servo.config import ServoConfig
+from antennate.experiments.servo.stalls import SEEN
 from antennate.robots.servo_model import NAMES
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
@@ -20,10 +22,17 @@ PARAMETERS = (
     Measure("load_friction", "friction of load", form=".3f"),
 )
 ERROR = Measure("error_deg", "mean error", "deg")
+RECORDING = (
+    Measure("p_gain", "gain", form="g"),
+    Measure("error_deg", "error", "deg"),
+    Measure("stalled", "stalls", "%", form=".0f", scale=100.0),
+    Measure("error_stalled_deg", "then", "deg", form=".1f"),
+    Measure("error_else_deg", "else", "deg"),
+)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """The error of every model, and the parameters of the last ones beside the data sheet."""
+    """The error of every model, of every recording, and parameters beside the data sheet."""
     whole = result["models"][-1]
     left = [f"{name} left out" for name in whole["held_out_deg"]]
     rows = [
@@ -32,17 +41,51 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     title = f"Models of {result['servo']}: {ERROR.title}"
     compared = Table(title, ["all", *left], rows, _note(result))
+    each = _recordings(result)
     sheet = result["models"][0]
     columns: dict[str, Any] = {sheet["name"]: sheet}
     if not result["fitted"]:
         columns[whole["name"]] = whole
-        return compared, Table.of("Parameters", columns, PARAMETERS)
+        return compared, each, Table.of("Parameters", columns, PARAMETERS)
     for model in result["models"][-2:]:
         columns[model["name"]] = model
         ends = {name: model["interval_95"].get(name) for name in NAMES}
         columns[f"{model['name']}, 95 %"] = ends
     note = f"Intervals are over {result['interval_over']}."
-    return compared, Table.of("Parameters", columns, PARAMETERS, note)
+    return compared, each, Table.of("Parameters", columns, PARAMETERS, note)
+
+
+def _recordings(result: Mapping[str, Any]) -> Table:
+    """The error of each recording with the last model: a recording in each line."""
+    rows = [
+        (row["name"], [measure.cell(row) for measure in RECORDING]) for row in result["recordings"]
+    ]
+    title = f"Recordings: {result['models'][-1]['name']}"
+    return Table(title, [m.title for m in RECORDING], rows, " ".join(_stalls(result)))
+
+
+def _stalls(result: Mapping[str, Any]) -> list[str]:
+    """What is told of recordings in which a real servo stands still at full drive."""
+    found = [row for row in result["recordings"] if (row["stalled"] or 0.0) >= SEEN]
+    return [_stall(row) for row in found]
+
+
+def _stall(row: Mapping[str, Any]) -> str:
+    """Why a recording differs: what its servo did not lift, at which supply."""
+    volts = row["supply_stalled_v"]
+    supply = "" if volts is None or not math.isfinite(volts) else f", at {volts:.1f} V"
+    lifted = row["lifted_n_m"]
+    more = (
+        f" Weight and supply do not explain it: with drive to spare {lifted:.2f} N·m were held."
+        if lifted > row["weight_stalled_n_m"]
+        else ""
+    )
+    return (
+        f"{row['name']} stalls: for {100 * row['stalled']:.0f} % of its time with torque the drive "
+        f"is full and the shaft rests under {row['weight_stalled_n_m']:.2f} N·m of weight{supply}; "
+        f"the model, whose motor still pulls, is {row['error_stalled_deg']:.1f}° off then and "
+        f"{row['error_else_deg']:.1f}° else.{more}"
+    )
 
 
 def _note(result: Mapping[str, Any]) -> str:
@@ -58,7 +101,24 @@ def _note(result: Mapping[str, Any]) -> str:
 
 
 def sentence(result: Mapping[str, Any]) -> str:
-    """How far the model is from the real servo, on what it was fitted on and on what it was not."""
+    """How far the model is from the real servo, and which recording differs, and why."""
+    return " ".join([_sentence(result), _spread(result), *_stalls(result)])
+
+
+def _spread(result: Mapping[str, Any]) -> str:
+    """The errors of the single recordings, the largest by its name."""
+    rows = sorted(result["recordings"], key=lambda row: row["error_deg"])
+    if len(rows) < 2:
+        return ""
+    *others, worst = rows
+    return (
+        f"By recording: {worst['name']} {worst['error_deg']:.1f}°, the others "
+        f"{others[0]['error_deg']:.1f} to {others[-1]['error_deg']:.1f}°."
+    )
+
+
+def _sentence(result: Mapping[str, Any]) -> str:
+    """The error on what the model was fitted on and on what it was not."""
     model = result["models"][-1]
     if not result["fitted"]:
         return (
@@ -77,7 +137,9 @@ def sentence(result: Mapping[str, Any]) -> str:
 
 
 CAPTIONS = {
-    "servo": "Goals and measured positions of each recording, with those of two models.",
+    "servo": "Goals and measured positions of each recording, with those of two models; shaded: "
+    "full drive while the shaft rests.",
+    "recordings": "Mean error of each recording with the last model, while it stalls and else.",
 }
 
 EXPERIMENT = Experiment.of_folder(

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.servo.run import SHOWN, ServoOutcome
+from antennate.experiments.servo.stalls import stalled
 from antennate.robots.servo_model import STEP
 from antennate.types import Floats
 
@@ -26,7 +27,28 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
         _draw(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    return {"servo": figure}
+    return {"servo": figure, "recordings": by_recording(outcome)}
+
+
+@style.styled
+def by_recording(outcome: ServoOutcome) -> Figure:
+    """The error of each recording: over all, while the shaft stalls, and else."""
+    rows = outcome.rows
+    figure = style.canvas(style.WIDTH, 1.2 + 0.3 * len(rows))
+    panel, places = figure.subplots(), np.arange(len(rows))
+    panel.barh(places, [row.error_deg for row in rows], color=style.FAINT, label="all of its time")
+    for name, colour, label in (
+        ("error_else_deg", style.SERIES[0], "without stalls"),
+        ("error_stalled_deg", style.SERIES[4], "while it stalls"),
+    ):
+        panel.plot([getattr(row, name) for row in rows], places, "o", color=colour, label=label)
+    panel.set_yticks(places, [f"{row.name}, gain {row.p_gain:g}" for row in rows])
+    panel.invert_yaxis()
+    panel.set_xlim(left=0.0)
+    panel.set_xlabel("mean error [deg]")
+    panel.grid(visible=False, axis="y")
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
 
 
 def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:
@@ -38,6 +60,10 @@ def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> Non
     for row, colour in ((0, style.SERIES[4]), (outcome.shown, style.SERIES[0])):
         drawn = traces[inside, row]
         panel.plot(t[inside], drawn, color=colour, linewidth=1.1, label=names[row])
+    ends = np.flatnonzero(np.diff(stalled(recording).astype(int), prepend=0, append=0))
+    for first, last in ends.reshape(-1, 2):
+        begin, end = recording.t[[first, min(last, len(recording.t) - 1)]].tolist()
+        panel.axvspan(begin, end, color=style.SERIES[4], alpha=0.15, linewidth=0)
     off = ~recording.torque
     if off.any():
         first = recording.t[int(np.argmax(off))]

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.experiments.servo import drive_log, fitting
+from antennate.experiments.servo import drive_log, fitting, stalls
 from antennate.experiments.servo.checks import GRAVITY, check_load, check_supply, check_torque
 from antennate.experiments.servo.config import ServoConfig
 from antennate.experiments.servo.fitting import Data
 from antennate.experiments.servo.models import Held, Model, models, splits, told_divisor, with_told
 from antennate.experiments.servo.recording import Recording, data_of, read
+from antennate.experiments.servo.stalls import RecordingRow
 from antennate.robots import servo_model
 from antennate.robots.servo_model import NAMES
 from antennate.studies.experiment import OnStep, Outcome, no_step
@@ -38,6 +39,7 @@ class ServoOutcome(Outcome):
         held: What was left out in turn.
         held_errors: Error of each on what its fit did not see [rad], shape (M, H).
         interval: Ends of their 95 % intervals, shape (M, 2, 6); NaN where there is none.
+        by_recording: The error of each recording, with the last model.
     """
 
     config: ServoConfig
@@ -49,6 +51,12 @@ class ServoOutcome(Outcome):
     held: list[Held]
     held_errors: Floats
     interval: Floats
+    by_recording: list[RecordingRow]
+
+    @property
+    def rows(self) -> list[RecordingRow]:
+        """A row for each recording."""
+        return self.by_recording
 
     @property
     def shown(self) -> int:
@@ -62,7 +70,10 @@ class ServoOutcome(Outcome):
             "command": "servo",
             "servo": self.config.servo,
             "fitted": self.config.fit,
-            "recordings": [_recording(each) for each in self.recordings],
+            "recordings": [
+                _recording(each) | asdict(row)
+                for each, row in zip(self.recordings, self.rows, strict=True)
+            ],
             "interval_over": self._interval_over(),
             "models": [
                 {
@@ -153,7 +164,11 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     ]
     every = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
-    return ServoOutcome(config, recordings, data, rows, fits[0], every, held, held_errors, interval)
+    last = servo_model.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
+    return ServoOutcome(
+        *(config, recordings, data, rows, fits[0], every, held, held_errors, interval),
+        by_recording=stalls.rows(recordings, data, last),
+    )
 
 
 def _read(path: Path, config: ServoConfig) -> Recording:

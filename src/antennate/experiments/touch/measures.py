@@ -72,6 +72,18 @@ class Pool:
             **self._ratio("f1", 2 * hit, 2 * hit + wrong + lost),
             **self._ratio("precision", hit, hit + wrong),
             **self._ratio("recall", hit, truth),
+            **self._lead(hit, truth, 2 * hit + wrong + lost, ticks),
+        }
+
+    def _lead(self, hit: Floats, truth: Floats, called: Floats, ticks: Floats) -> dict[str, Any]:
+        """F1 less that of a sensor that always says contact, a trial left out of both at once."""
+        (one, ones), (two, twos) = (
+            self._left_out(2 * right, whole)
+            for right, whole in ((hit, called), (truth, truth + ticks))
+        )
+        return {
+            "f1_over_always_contact": _finite(one - two),
+            "f1_over_always_contact_95": _interval(one - two, ones - twos, -1.0, 1.0),
         }
 
     def _ticks(self, group: Sequence[Comparison]) -> tuple[Floats, Floats, Floats]:

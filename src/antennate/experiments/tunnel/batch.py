@@ -318,9 +318,11 @@ class _Rows:
         self._ticks += 1
         times, ticks = t.tolist(), self._ticks
         for row, begun in [*self._begun.items()]:
+            world = self._robot.world(row)
+            self._monitors[row].bend(world)
             if (ticks - begun) % LOOK_EVERY and times[row] < self._monitors[row].time_limit:
                 continue
-            world, maneuver = self._robot.world(row), maneuvers.item(row)
+            maneuver = maneuvers.item(row)
             try:
                 outcome, reason = self._monitors[row].look(world, times[row], maneuver), ""
             except SceneError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
@@ -12,7 +13,7 @@ import numpy as np
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies import statistics
-from antennate.studies.measures import Measure, count, largest, mean, summarise, total
+from antennate.studies.measures import Measure, count, largest, mean, smallest, summarise, total
 
 SHARES = {
     "forward": "forward [% of time]",
@@ -44,6 +45,7 @@ CONTROLLER = (
     Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
     Measure("invalid", "invalid", form="d"),
     Measure("speed_m_s", "speed over successes", "m/s", form=".3f"),
+    Measure("speed_95", "  95 %", "m/s", form=".3f"),
     Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),
     *_SECONDS,
     Measure("stuck", "stuck episodes", of=total, form="d", least=0.0),
@@ -51,6 +53,11 @@ CONTROLLER = (
     *(_share(label, name) for name, label in SHARES.items()),
     Measure("force_mean_n", "contact force, mean", "N", of=mean, least=0.0),
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
+    Measure("offset_m", "off the centre line, successes", "m", form=".3f", least=0.0),
+    Measure("offset_95", "  95 %", "m", form=".3f"),
+    Measure("spring_low_n_m", of=smallest),
+    Measure("spring_high_n_m", "torque of a spring, largest", "N·mm", of=largest, scale=1e3),
+    Measure("spring_cycles", "  its load cycles, most", of=largest, form="d", least=0.0),
 )
 TIME = Measure(
     *("time_s", "time, a failure as the limit", "s"), form=".1f", least=0.0, most="time_limit"
@@ -74,6 +81,8 @@ PAIR = (
     Measure("mcnemar_p", "McNemar p", form=".3g"),
     *_SECONDS_APART,
     Measure("wilcoxon_p", "Wilcoxon p", form=".3g"),
+    Measure("offset_difference_m", "off the centre line, both succeeded", "m", form="+.3f"),
+    Measure("offset_difference_95", "  95 %", "m", form="+.3f"),
 )
 
 
@@ -107,6 +116,8 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
     if limit is not None:
         restricted, ends = statistics.mean95(times, 0.0, limit, restricted=True)
     progress = sum(row.progress_m for row in valid)
+    speed, speeds = statistics.mean95(np.array([r.progress_m / r.time_s for r in won]), 0.0)
+    offset, offsets = statistics.mean95(np.array([r.offset_m for r in won]), 0.0)
     return {
         "trials": len(rows),
         "invalid": len(rows) - len(valid),
@@ -114,13 +125,16 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
         **summarise(CONTROLLER, valid),
         "success_share": len(won) / len(valid) if valid else None,
         "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
-        "speed_m_s": float(np.mean([r.progress_m / r.time_s for r in won])) if won else None,
+        "speed_m_s": speed if won else None,
+        "speed_95": speeds,
         "time_over_successes_s": mean("time_s", won),
         "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
         "restricted_mean_time_s": restricted if valid else None,
         "restricted_mean_time_95": ends,
         "restricted_mean_share": share if valid else None,
         "restricted_mean_share_95": share_ends,
+        "offset_m": offset if math.isfinite(offset) else None,
+        "offset_95": offsets if math.isfinite(offset) else None,
     }
 
 
@@ -154,5 +168,13 @@ def paired(
                 found["both_time_s"] = (
                     tuple(all_won.mean(axis=1).tolist()) if all_won.size else None
                 )
-            tests[f"{first}-{second}"] = {"trials": len(both), **found}
+            apart = [ours[k].offset_m - theirs[k].offset_m for k in both]
+            offset, ends = statistics.mean95(np.array(apart)[won.all(axis=0)])
+            known = math.isfinite(offset)
+            tests[f"{first}-{second}"] = {
+                "trials": len(both),
+                **found,
+                "offset_difference_m": offset if known else None,
+                "offset_difference_95": ends if known else None,
+            }
     return tests

@@ -7,12 +7,16 @@ the episode ends, recovered, with the next such gain.
 
 from __future__ import annotations
 
+import math
+from array import array
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Union
 
 import numpy as np
 
+from antennate.antenna.springs import SpringLoad, largest_load
 from antennate.errors import SceneError
+from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.sim.trial import Judge, progress_of
 from antennate.sim.world import World
@@ -27,6 +31,8 @@ STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
 STUCK_TIME = 5.0
 """Time without such a gain after which the robot is stuck [s]."""
+_STRETCH = 0.05
+"""Length of the pieces of a centre line whose mean offsets count alike [m]."""
 
 
 Watched = Union[World, "WarpRow"]
@@ -49,6 +55,12 @@ class TrialResult:
         force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
         force_max_n: Their maximum [N].
         limit_s: Time limit of the trial [s].
+        offset_m: Mean distance of the head from the centre line over the length that it came [m],
+            whatever the time it took; NaN in a scene without one.
+        spring_low_n_m: Smallest torque of the antenna spring that bore the largest one [N·m];
+            negative where it was bent the other way too.
+        spring_high_n_m: That largest torque [N·m], of looks at every tick.
+        spring_cycles: Load cycles of that spring, see `largest_load`.
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -68,6 +80,10 @@ class TrialResult:
     force_mean_n: float = 0.0
     force_max_n: float = 0.0
     limit_s: float = TIME_LIMIT
+    offset_m: float = math.nan
+    spring_low_n_m: float = 0.0
+    spring_high_n_m: float = 0.0
+    spring_cycles: int = 0
     reason: str = ""
 
 
@@ -122,9 +138,15 @@ class TrialMonitor:
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
     _judge: Judge = field(init=False)
+    _bends: array[float] = field(default_factory=lambda: array("d"))
+    _offsets: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
 
     def __post_init__(self) -> None:
         self._judge = Judge(self.scene)
+
+    def bend(self, world: Watched) -> None:
+        """Note how the antennae are bent."""
+        self._bends.frombytes(world.bends().tobytes())
 
     def look(self, world: Watched, t: float, maneuver: int) -> Outcome | None:
         """Look at the world at time t [s]; the outcome once there is one.
@@ -136,7 +158,9 @@ class TrialMonitor:
         x, y = head.tolist()
         self._samples.append((t, x, y, maneuver))
         self._forces.append(world.obstacle_force())
-        self._note_progress(progress_of(self.scene, head), t)
+        progress = progress_of(self.scene, head)
+        self._note_progress(progress, t)
+        self._note_offset(progress, head)
         return self._judge.look(head) or ("timeout" if t >= self.time_limit else None)
 
     def _note_progress(self, progress: float, t: float) -> None:
@@ -148,10 +172,29 @@ class TrialMonitor:
             self._is_stuck = True
             self._stuck += 1
 
+    def _note_offset(self, progress: float, head: Floats) -> None:
+        """Note how far the head is from the centre line, if there is one."""
+        line = getattr(self.scene, "route", None)
+        if line is not None and 0.0 <= progress < self.scene.length:
+            offset = geometry.distance(line, head)
+            self._offsets.setdefault(int(progress / _STRETCH), []).append(offset)
+
+    def _load(self, world: Watched) -> SpringLoad:
+        """What the springs of the antennae bore; beyond a hinge's range its holders meet."""
+        hinges = len(world.bends())
+        if not hinges:
+            return SpringLoad()
+        antenna = world.robot.antenna
+        angles = np.frombuffer(self._bends).reshape(-1, hinges)
+        held = np.clip(angles, -antenna.range, antenna.range)
+        return largest_load(held, antenna.spring_stiffness())
+
     def result(self, world: Watched, outcome: Outcome, reason: str, ticks: Ints) -> TrialResult:
         """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
         share = ticks / max(1, ticks.sum())
         forces = np.array(self._forces) if self._forces else np.zeros(1)
+        offsets = [float(np.mean(piece)) for piece in self._offsets.values()]
+        load = self._load(world)
         try:
             progress = progress_of(self.scene, world.head[:2])
         except SceneError:  # as after a simulation that became invalid
@@ -169,6 +212,10 @@ class TrialMonitor:
             force_mean_n=round(float(forces.mean()), 6),
             force_max_n=round(float(forces.max()), 6),
             limit_s=self.time_limit,
+            offset_m=round(float(np.mean(offsets)), 6) if offsets else math.nan,
+            spring_low_n_m=round(load.low, 9),
+            spring_high_n_m=round(load.high, 9),
+            spring_cycles=load.cycles,
             reason=reason,
         )
 

@@ -142,6 +142,14 @@ def is_simple(polygon: Floats) -> bool:
     return not (across & near.all(axis=1)).any()
 
 
+def distance(points: Floats, where: Floats) -> float:
+    """Distance of a point from a polyline (n, 2), its ends included [m]."""
+    along = np.diff(points, axis=0)
+    from_start = where - points[:-1]
+    part = np.clip((from_start * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(from_start - part[:, None] * along).T).min())
+
+
 def contains(polygon: Floats, where: Floats) -> bool:
     """Whether a point lies inside a closed polygon of corners (n, 2), by counting crossings."""
     x, y = where.tolist()

@@ -53,6 +53,15 @@ class WarpRow:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
         return float(self._batch.forces()[self._row])
 
+    def bends(self) -> Floats:
+        """Angles of all hinges of the antennae, one antenna after the other [rad], shape (n,)."""
+        return self._batch.positions[self._row, self.world.places.bent]
+
+    @property
+    def robot(self) -> RobotSpec:
+        """The robot of this row."""
+        return self.world.robot
+
     def links(self) -> Floats:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         self._follow()
