@@ -41,9 +41,8 @@ ABOUT = {
     "random": "blind: backs off and turns at random times, to random sides, by random angles",
 }
 """What ours do, for who meets them for the first time."""
-RIVAL, BLIND = "timed", "open"
-"""The controller that results are compared with, wherever it was run beside others; the other one
-where only that was."""
+RIVAL = "timed"
+"""The controller that results are compared with, wherever it was run beside others."""
 
 CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
@@ -59,7 +58,7 @@ def about(names: Iterable[str]) -> str:
 def compared(names: Sequence[str]) -> tuple[str, str] | None:
     """The two conditions that a headline compares: the last one named, and its rival.
 
-    The rival is `RIVAL`, else `BLIND`, else the first one; None of fewer than two.
+    The rival is `RIVAL`, else `open`, else the first one; None of fewer than two.
     Conditions with other than their own readings are left out, unless only one is left: then it is
     compared with the last one that has others.
     """
@@ -69,7 +68,7 @@ def compared(names: Sequence[str]) -> tuple[str, str] | None:
     if len(own) == 1:
         return own[0], [name for name in names if name != own[0]][-1]
     names = own or names
-    rival = next((name for name in (RIVAL, BLIND) if name in names), names[0])
+    rival = next((name for name in (RIVAL, "open") if name in names), names[0])
     return [name for name in names if name != rival][-1], rival
 
 
