@@ -43,7 +43,13 @@ def stretches(found: list[int]) -> list[tuple[int, float]]:
     return [(found[a], (b - a) / 100.0) for a, b in itertools.pairwise(cuts)]
 
 
-@pytest.mark.parametrize("name", BLIND)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("timed", "random"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("schedule", "zigzag")),
+    ],
+)
 def test_it_keeps_the_protocol(name: str) -> None:
     check_controller(name)
 
