@@ -18,29 +18,48 @@ _BLOCKED = ("rule.strong", "rule.similar")
 _REPEATED = ("repetition.window_cycles", "repetition.change")
 """When readings repeat."""
 _ESCAPE = (*paths_of(RepetitionParams, "repetition"), *paths_of(EscapeParams, "escape"))
+_MAP = ("escape.reverse_time", "escape.return_time", "escape.turn_offset")
+"""Of an escape what `map` reads."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
     "open": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_ESCAPE),
     "paper": _ESCAPE,
     "closed": ("gait.turn_offset", *_BLOCKED, "rule.hold_time"),
+    "map": (
+        "gait.turn_offset",
+        *_BLOCKED,
+        "rule.hold_time",
+        *paths_of(RepetitionParams, "repetition"),
+        *sorted({*paths_of(EscapeParams, "escape")} - {*_MAP}),
+    ),
     BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED),
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 
 
-def unread(name: str, control: ControlParams) -> set[str]:
+def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[str]:
     """Parameters of the control, dotted, that a controller does not read on any robot.
 
     A controller of one's own may read all.
+
+    Args:
+        name: The controller.
+        control: All numbers of the control.
+        knows: What a simulation tells it; a robot tells nothing.
     """
     by_contact = name == "closed" and control.escape.trigger == "contact"
-    return set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    found = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    if name == "closed" and "jam" in knows:
+        found |= {"escape.trigger", *_REPEATED, *_BLOCKED}
+    return found
 
 
-def unread_by_all(names: Sequence[str], control: ControlParams, robot: RobotSpec) -> dict[str, str]:
+def unread_by_all(
+    names: Sequence[str], control: ControlParams, robot: RobotSpec, knows: Sequence[str] = ()
+) -> dict[str, str]:
     """Parameters that none of these controllers reads, as `control.rule.strong`, and why."""
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
-    paths = set.intersection(*(unread(name, control) for name in names))
+    paths = set.intersection(*(unread(name, control, knows) for name in names))
     found = {f"control.{path}": who for path in sorted(paths)}
     return found | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
 

@@ -23,18 +23,37 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
 }
+PRIVILEGED: dict[str, ControllerFactory] = {"map": controllers.by_map}
+"""Controllers that need what only a simulation knows."""
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
+    "map": "walks along the route, which only a simulation can tell it, to show what that is worth",
 }
 """What ours do, for who meets them for the first time."""
 RIVAL = "open"
 """The controller that results are compared with, wherever it was run beside others."""
 
-CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
+CONTROLLERS: Registry[ControllerFactory] = Registry(
+    "controller", "antennate.controllers", BUILT_IN | PRIVILEGED
+)
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
+
+
+def check_for_robots(name: str) -> str:
+    """Return the name of a controller if a robot may have it; no code of the user runs.
+
+    Raises:
+        ConfigError: There is none of that name, or it needs what only a simulation knows.
+    """
+    if name in PRIVILEGED:
+        raise ConfigError(
+            f"expected a controller that lives on its readings, found {name!r}, which needs what "
+            "only a simulation knows; `antennate tunnel` runs it"
+        )
+    return CONTROLLERS.check(name)
 
 
 def about(names: Iterable[str]) -> str:

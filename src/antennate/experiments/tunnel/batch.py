@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Union
 import numpy as np
 
 from antennate.control.checked import CheckedController
+from antennate.control.knowledge import Kind, given_to
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
@@ -19,6 +20,7 @@ from antennate.experiments.tunnel.monitor import (
     TrialPath,
     TrialResult,
 )
+from antennate.sim.knowledge import Truths
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import SimRobot
@@ -115,6 +117,8 @@ class _Rows:
         self._scene, self._robot = made
         self._monitors: dict[int, TrialMonitor] = {}
         self._every: Ints = np.arange(batch)
+        self._given: tuple[Kind, ...] = ()
+        self._truths: Truths | None = None
         self._ticks, self._begun, self._blocked = 0, dict[int, int](), dict[int, str]()
         self._maneuvers: Ints = np.zeros((batch, len(Maneuver)), np.int64)
 
@@ -136,12 +140,17 @@ class _Rows:
             return
         try:
             made = make(self._name, config.control, config.robot, self._batch)
+            self._given = given_to(made, self._name, config.knows)
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         control = CheckedController(made, config.robot, self._batch)
+        if self._given:
+            cycle = 1.0 / (config.control.gait.frequency * config.control.period)
+            self._truths = Truths(self._given, self._batch, cycle)
         decisions = Decisions(config.robot, made, self._batch)
         for row, phase in enumerate(phases):
             self._reset(row, phase, control, decisions)
+        self._inform(control)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._logs:
@@ -152,6 +161,7 @@ class _Rows:
                 self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
                 self._reset(row, self._place(row), control, decisions)
+            self._inform(control)
             return bool(self._monitors)
 
         run_loop(self._robot, control, config.control.period, go_on)
@@ -195,7 +205,16 @@ class _Rows:
         """Let the controller, and the log, begin with the trial that was put into a row, if any."""
         if phase is not None:
             control.reset(np.array([row]), phase)
+            if self._truths is not None:
+                self._truths.begin(row, self._monitors[row].scene)
             self._log(row, phase, decisions)
+
+    def _inform(self, control: CheckedController) -> None:
+        """Give the controller what it may know of all rows for its next step."""
+        if self._truths is not None:
+            for row in self._monitors:
+                self._truths.look(row, self._robot.world(row), control.maneuver.item(row))
+            control.know(self._truths.knowledge())
 
     def log_of(self, trial: int) -> Path:
         """The log of a trial."""
@@ -213,6 +232,7 @@ class _Rows:
             seed=config.seed,
             trial=monitor.trial,
             phase=phase,
+            knows=self._given,
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it

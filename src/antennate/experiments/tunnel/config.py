@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
+from antennate.control.knowledge import KINDS, Kind
 from antennate.control.readers import unread_by_all
 from antennate.control.registry import BUILT_IN, CONTROLLERS
 from antennate.params.base import number, require_different, require_whole_steps
@@ -31,6 +32,10 @@ class TunnelConfig(TrialConfig):
         examples=["open", "paper", "closed"],
     )
     """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
+    knows: tuple[Kind, ...] = number(
+        (), "1", "assumed: a robot knows nothing but its readings", examples=list(KINDS)
+    )
+    """What the simulation gives to controllers that can use it."""
     time_limit: float = number(
         100.0, "s", "paper: 0.04 m/s without feedback; half of that on 2 m", gt=0, le=3600
     )
@@ -44,12 +49,13 @@ class TunnelConfig(TrialConfig):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
-        control = unread_by_all(self.controllers, self.control, self.robot)
+        control = unread_by_all(self.controllers, self.control, self.robot, self.knows)
         return {**super().unread_here(), **control}
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
+        require_different("knows", self.knows)
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         require_own_curves(self.robot, self.control)
         return self

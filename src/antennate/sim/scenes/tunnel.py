@@ -95,6 +95,11 @@ class Tunnel:
         return self.params.length
 
     @property
+    def route(self) -> Floats:
+        """The centre line [m], shape (n, 2)."""
+        return self.centre
+
+    @property
     def exit(self) -> Floats:
         """The line between the ends of the walls."""
         return np.array([wall[-1] for wall in self.walls])
