@@ -203,7 +203,7 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
         (
             ["tunnel", "--controllers", "zigzag"],
-            ["controllers: expected one of open, paper, closed, or MODULE"],
+            ["controllers: expected one of open, timed, paper, closed, "],
         ),
         (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),
         (["tunnel", "--workers", "0"], ["--workers: expected a number of at least 1, found 0"]),

@@ -62,7 +62,7 @@ def run(name: str, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarr
 
 
 def test_a_name_that_does_not_exist_is_refused_with_the_valid_ones() -> None:
-    with pytest.raises(ConfigError, match=r"open, paper, closed, .*did you mean closed\?"):
+    with pytest.raises(ConfigError, match=r"open, timed, paper, closed, .*did you mean closed\?"):
         make_controller("clsoed", PARAMS)
 
 

@@ -85,7 +85,7 @@ def test_an_installed_package_can_bring_a_controller(
 @pytest.mark.parametrize(
     ("name", "what"),
     [
-        ("clsoed", r"expected one of open, paper, closed, .*did you mean closed\?"),
+        ("clsoed", r"expected one of open, timed, paper, closed, .*did you mean closed\?"),
         ("missing.py:Mine", "no file"),
         ("no_such_module:Mine", "No module named 'no_such_module'"),
         ("antennate.control.controllers:Nobody", "no Nobody in antennate.control.controllers$"),

@@ -238,7 +238,10 @@ def test_a_log_that_was_not_closed_is_no_error(
         (["empty"], "expected a log with ticks, found none"),
         (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["own"], "give --controller with this name if its code may run"),
-        (["own", "--controller", "zigzag"], "controller: expected one of open, paper, closed"),
+        (
+            ["own", "--controller", "sideways"],
+            "controller: expected one of open, timed, paper, closed",
+        ),
     ],
 )
 def test_what_cannot_be_replayed_is_refused_in_one_line(

@@ -31,8 +31,24 @@ WIDTH = 4.5
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
 
-CONTROLLER_COLOURS = {"open": "#8C8C8C", "paper": "#CC79A7", "closed": "#332288"}
-CONTROLLER_LINES = {"open": (0, (4, 1.5)), "paper": (0, (4, 1.5, 1, 1.5)), "closed": "solid"}
+CONTROLLER_COLOURS = {
+    "open": "#8C8C8C",
+    "timed": "#E69F00",
+    "paper": "#CC79A7",
+    "closed": "#332288",
+    "schedule": "#D55E00",
+    "zigzag": "#009E73",
+    "random": "#56B4E9",
+}
+CONTROLLER_LINES = {
+    "open": (0, (4, 1.5)),
+    "timed": (0, (6, 1, 1, 1, 1, 1)),
+    "paper": (0, (4, 1.5, 1, 1.5)),
+    "closed": "solid",
+    "schedule": (0, (5, 1.5)),
+    "zigzag": (0, (1, 1.2)),
+    "random": (0, (2, 2)),
+}
 """A second mark beside the colour, for print in grey."""
 
 PROFILE_LOOKS = {

@@ -15,6 +15,7 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, log_of, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
+from antennate.control.readings import OWN, YOKED, Readings, condition
 from antennate.errors import ConfigError
 from antennate.messages import one_line, short_names, shortened
 from antennate.studies.formats import csv_lines
@@ -22,7 +23,13 @@ from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import Damage, LogReader
-from antennate.telemetry.replay import ReplayConfig, Replayed, recorded_controller, replay
+from antennate.telemetry.replay import (
+    ReplayConfig,
+    Replayed,
+    changed_readings,
+    recorded_controller,
+    replay,
+)
 from antennate.types import Maneuver
 
 DESCRIPTION = """\
@@ -45,6 +52,9 @@ class Options(ViewOptions, ResultOptions):
     """Which log, and what to leave behind."""
 
     log: str = option("", "log, or the folder of a run with one", "RUN|LOG", positional=True)
+    donor: str = option(
+        "", "log, or the folder of a run with one, whose readings are given as yoked", "RUN|LOG"
+    )
     out: Path | None = option(
         None, "folder for result.json, ticks.csv and a figure; none if not given", "FOLDER"
     )
@@ -60,9 +70,15 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
+    if bool(options.donor) != (config.readings == YOKED):
+        raise ConfigError(
+            f"--readings {YOKED}: expected --donor with the log of another trial, found none"
+            if config.readings == YOKED
+            else f"--donor: expected --readings {YOKED} beside it, found {config.readings}"
+        )
     log, found, by_hand = _replayed(path, config, options)
     log.require_ticks()
-    result = _result(log, found, config.controller)
+    result = _result(log, found, config)
     if options.out is not None:
         with folder_for(VIEW, options, config, argv, reads=log.parts) as folder:
             _keep(folder, path, found)
@@ -80,7 +96,8 @@ def _replayed(
     if page is None:
         with LogReader(path) as log:
             controller = recorded_controller(log.header, config.controller)
-            return log, replay(log, controller, log.header), ()
+            readings = _readings(log, config, options)
+            return log, replay(log, controller, log.header, readings=readings), ()
     from antennate.cli.view import arena_of  # these import much, for a page
     from antennate.telemetry.view.pace import Restart
     from antennate.telemetry.view.replayed import ReplayPlayer
@@ -95,8 +112,17 @@ def _replayed(
                 player.state["paused"] = options.view_paused
                 player.tell()
                 ticks = player.ticks(log)
-                found = replay(ticks, player.controller, log.header, player.decided)
+                readings = _readings(log, config, options)
+                found = replay(ticks, player.controller, log.header, player.decided, readings)
                 return log, found, player.by_hand
+
+
+def _readings(log: LogReader, config: ReplayConfig, options: Options) -> Readings:
+    """What the controller is given upon a log."""
+    if not options.donor:
+        return changed_readings(log.header, config.readings, None)
+    with LogReader(log_of(Path(options.donor))) as donor:
+        return changed_readings(log.header, config.readings, donor)
 
 
 def complain(command: str, log: LogReader) -> int:
@@ -125,15 +151,18 @@ def _place(damage: Damage) -> str:
     return f"byte {damage.offset} of {damage.path.name}: {damage.reason}"
 
 
-def _result(log: LogReader, found: Replayed, controller: str | None) -> dict[str, Any]:
+def _result(log: LogReader, found: Replayed, config: ReplayConfig) -> dict[str, Any]:
     header, ticks = log.header, max(1, log.ticks)
+    name = config.controller or header.controller
     first = found.first
     return {
         "log": str(log.path),
         "parts": [part.name for part in log.parts],
         "version": header.version,
-        "recorded_controller": header.controller,
-        "controller": controller or header.controller,
+        "recorded_controller": condition(header.controller, header.readings),
+        "controller": condition(
+            name, header.readings if config.readings == OWN else config.readings
+        ),
         "seed": header.seed,
         "trial": header.trial,
         "ticks": log.ticks,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.control.knowledge import KINDS, Knowledge, aligned
+from antennate.control.knowledge import KNOWABLE, Knowledge, aligned
 from antennate.params.control import EscapeParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
@@ -29,7 +29,7 @@ class Escape:
         knowledge: What a simulation knows of the rows; nothing on a robot.
     """
 
-    knows = KINDS
+    knows = KNOWABLE
 
     def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
         self._params = params

@@ -17,7 +17,7 @@ from antennate.types import Bools, Floats, Ints, Maneuver
 
 Kind = Literal["side", "jam", "facing", "free", "map"]
 """A piece of knowledge."""
-KINDS: tuple[Kind, ...] = get_args(Kind)
+KNOWABLE: tuple[Kind, ...] = get_args(Kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, .
         raise ConfigError(
             f"--knows: expected controllers that use {' or '.join(offered)}, found {name!r}, {what}"
         )
-    return tuple(kind for kind in KINDS if kind in {*used, *needs_of(controller)})
+    return tuple(kind for kind in KNOWABLE if kind in {*used, *needs_of(controller)})
 
 
 def require_own_senses(controller: Any, name: str, where: str) -> None:

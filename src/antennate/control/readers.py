@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antennate.params.base import paths_of
+from antennate.params.blind import RandomParams, ScheduleParams, TimedParams, ZigzagParams
 from antennate.params.control import ControlParams, EscapeParams, RepetitionParams
 from antennate.params.gaits import LiftParams
 from antennate.robots.spec import RobotSpec
@@ -18,21 +19,41 @@ _BLOCKED = ("rule.strong", "rule.similar")
 _REPEATED = ("repetition.window_cycles", "repetition.change")
 """When readings repeat."""
 _ESCAPE = (*paths_of(RepetitionParams, "repetition"), *paths_of(EscapeParams, "escape"))
+_TIMED = paths_of(TimedParams, "timed")
+_SCHEDULE = paths_of(ScheduleParams, "schedule")
+_ZIGZAG = paths_of(ZigzagParams, "zigzag")
+_RANDOM = paths_of(RandomParams, "random")
+_BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
+_TABLE = ("gait.turn_offset", *_BLOCKED, "rule.hold_time")
+"""What the published table reads and a walk or an escape does not."""
+_TURNING = tuple(path for path in _ESCAPE if path != "escape.turn_offset")
+"""All of an escape but how it turns."""
+_FELT = (
+    *paths_of(RepetitionParams, "repetition"),
+    *(f"escape.{name}" for name in ("trigger", "first_turn", "memory_time", "memory_delay")),
+    *("escape.lost_time", "escape.return_time"),
+)
+"""What an escape does not read where nothing is felt."""
+
+
+def _without(read: tuple[str, ...], *others: str) -> tuple[str, ...]:
+    """Parameters of the blind controllers but those that one of them reads, and others."""
+    return (*_TABLE, *(path for path in _BLIND if path not in read), *others)
+
+
 _MAP = ("escape.reverse_time", "escape.return_time", "escape.turn_offset")
 """Of an escape what `map` reads."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
-    "open": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_ESCAPE),
-    "paper": _ESCAPE,
-    "closed": ("gait.turn_offset", *_BLOCKED, "rule.hold_time"),
-    "map": (
-        "gait.turn_offset",
-        *_BLOCKED,
-        "rule.hold_time",
-        *paths_of(RepetitionParams, "repetition"),
-        *sorted({*paths_of(EscapeParams, "escape")} - {*_MAP}),
-    ),
-    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED),
-    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE),
+    "open": (*_TABLE, *_ESCAPE, *_BLIND),
+    "timed": _without(_TIMED, *_FELT),
+    "paper": (*_ESCAPE, *_BLIND),
+    "closed": (*_TABLE, *_BLIND),
+    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_BLIND),
+    "schedule": _without(_SCHEDULE, *_TURNING),
+    "zigzag": _without(_ZIGZAG, *_TURNING),
+    "random": _without(_RANDOM, *_TURNING),
+    "map": (*_TABLE, *_BLIND, *(path for path in _ESCAPE if path not in _MAP)),
+    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_BLIND),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 
@@ -51,6 +72,12 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
     found = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
     if name == "closed" and "jam" in knows:
         found |= {"escape.trigger", *_REPEATED, *_BLOCKED}
+    if name == "timed" and "jam" in knows:
+        found |= set(_TIMED)
+    if name == "timed" and "facing" in knows:
+        found -= {"escape.lost_time", "escape.return_time"}
+    if name == "timed" and "map" in knows:
+        found -= {"escape.return_time"}
     return found
 
 

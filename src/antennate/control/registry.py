@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
-from antennate.control import controllers
+from antennate.control import blind, controllers
+from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
 from antennate.params.control import ControlParams
@@ -20,20 +21,30 @@ ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
 
 BUILT_IN: dict[str, ControllerFactory] = {
     "open": controllers.open_loop,
+    "timed": blind.timed,
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
+    "schedule": blind.schedule,
+    "zigzag": blind.zigzag,
+    "random": blind.RandomController,
 }
+USUAL = ("open", "timed", "paper", "closed")
+"""Those of ours that are run if none is named; the others are further controls without touch."""
 PRIVILEGED: dict[str, ControllerFactory] = {"map": controllers.by_map}
 """Controllers that need what only a simulation knows."""
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
+    "timed": "escapes as closed does, by the clock and whatever it feels: the control of closed",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
+    "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
+    "zigzag": "blind: turns right and left by the clock, always by as much",
+    "random": "blind: backs off and turns at random times, to random sides, by random angles",
     "map": "walks along the route, which only a simulation can tell it, to show what that is worth",
 }
 """What ours do, for who meets them for the first time."""
-RIVAL = "open"
+RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
 CONTROLLERS: Registry[ControllerFactory] = Registry(
@@ -57,17 +68,25 @@ def check_for_robots(name: str) -> str:
 
 
 def about(names: Iterable[str]) -> str:
-    """What the controllers of ours among these do, a line each."""
-    return "\n".join(f"{name}: {ABOUT[name]}" for name in names if name in ABOUT)
+    """What the controllers of ours among these conditions do, a line each, then their readings."""
+    ours = dict.fromkeys(parts_of(name)[0] for name in names)
+    lines = [f"{name}: {ABOUT[name]}" for name in ours if name in ABOUT]
+    return "\n".join([*lines, *about_readings(names)])
 
 
 def compared(names: Sequence[str]) -> tuple[str, str] | None:
     """The two conditions that a headline compares: the last one named, and its rival.
 
     The rival is `RIVAL`, or the first one where that is not among them; None of fewer than two.
+    Conditions with other than their own readings are left out, unless only one is left: then it is
+    compared with the last one that has others.
     """
     if len(names) < 2:
         return None
+    own = [name for name in names if parts_of(name)[1] == OWN]
+    if len(own) == 1:
+        return own[0], [name for name in names if name != own[0]][-1]
+    names = own or names
     rival = RIVAL if RIVAL in names else names[0]
     return [name for name in names if name != rival][-1], rival
 

@@ -11,6 +11,7 @@ from pydantic import model_validator
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
+from antennate.params.blind import RandomParams, ScheduleParams, TimedParams, ZigzagParams
 from antennate.params.gaits import GAITS, LiftParams
 from antennate.params.reading import read_file
 
@@ -233,6 +234,10 @@ class ControlParams(Params):
     rule: RuleParams = RuleParams()
     repetition: RepetitionParams = RepetitionParams()
     escape: EscapeParams = EscapeParams()
+    timed: TimedParams = TimedParams()
+    schedule: ScheduleParams = ScheduleParams()
+    zigzag: ZigzagParams = ZigzagParams()
+    random: RandomParams = RandomParams()
 
     @property
     def period(self) -> float:

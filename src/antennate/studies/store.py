@@ -118,12 +118,13 @@ class Store:
     ) -> None:
         """Go on with more trials, of which each has another place."""
         places = {task: place for place, task in enumerate(new)}
-        if any(task not in places for task in old):
+        if len(new) < len(old):
             raise BadInputError(
                 f"{self.path.parent}: expected no fewer trials than this run has, found {changes}; "
                 "choose another folder for fewer"
             )
-        keys = {key_of(0, i): key_of(0, places[task]) for i, task in enumerate(old)}
+        kept = ((i, places[task]) for i, task in enumerate(old) if task in places)
+        keys = {key_of(0, i): key_of(0, place) for i, place in kept}
         self._append(line({"identity": identity, "keys": keys}))
         self.identity, self.records = identity, _moved(self.records, keys)
 

@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from antennate import __version__
+from antennate.control.readings import OWN
 from antennate.distributions import engines
 from antennate.errors import LogError
 from antennate.params.base import Strict
@@ -57,6 +58,8 @@ class Header(Strict):
 
     Attributes:
         controller: Name of the controller.
+        readings: What the controller was given, `own` for what its robot read; the ticks hold
+            what it was given.
         params: Numbers of the controller.
         robot: The robot.
         seed: Seed of the world, None on a robot.
@@ -71,6 +74,7 @@ class Header(Strict):
     """
 
     controller: str
+    readings: str = OWN
     params: ControlParams
     robot: RobotSpec = RobotSpec()
     seed: int | None = None

@@ -12,6 +12,15 @@ from pydantic import field_validator
 
 from antennate.control.knowledge import require_own_senses
 from antennate.control.loop import run_loop
+from antennate.control.readings import (
+    KINDS,
+    OWN,
+    YOKED,
+    Own,
+    Readings,
+    check_readings,
+    make_readings,
+)
 from antennate.control.registry import BUILT_IN, PRIVILEGED, check_for_robots, make_controller
 from antennate.errors import LogError, raised
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
@@ -26,10 +35,17 @@ from antennate.types import AntennaFrame, Controller, JointCommand
 class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
-    controller: str | None = number(
-        None, "1", "assumed: the one recorded", examples=["open", "paper", "closed"]
-    )
-    """Open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own, in place of the recorded."""
+    controller: str | None = number(None, "1", "assumed: the one recorded", examples=[*BUILT_IN])
+    """Open, timed, paper, closed, schedule, zigzag, random, or MODULE:NAME or FILE.py:NAME of
+    your own, in place of the recorded."""
+
+    readings: str = number(OWN, "1", "assumed: what was recorded", examples=[*KINDS])
+    """What it is given in place of the recorded readings: none, swapped, delayed:S or yoked."""
+
+    @field_validator("readings")
+    @classmethod
+    def _known_readings(cls, name: str) -> str:
+        return check_readings(name)
 
     @field_validator("controller")
     @classmethod
@@ -99,8 +115,11 @@ class _Guarded:
     Its exceptions, and answers of another form, give a command of NaN, as in a session.
     """
 
-    def __init__(self, controller: Controller, log: ReplayRobot, robot: RobotSpec) -> None:
+    def __init__(
+        self, controller: Controller, log: ReplayRobot, robot: RobotSpec, readings: Readings
+    ) -> None:
         self._controller, self._log, self._robot = controller, log, robot
+        self._readings = readings
         self._kept: JointCommand | None = None
         self._refused = self.failures = 0
         self.failure = ""
@@ -108,6 +127,7 @@ class _Guarded:
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """The command of this tick."""
+        frame = self._readings.change(frame)
         tick = self._log.tick
         if tick is not None and self._kept is not None and not tick.asked:
             return self._kept
@@ -204,6 +224,7 @@ def replay(
     controller: Controller,
     header: Header,
     on_tick: Callable[[Tick, Decision], None] = _unseen,
+    readings: Readings | None = None,
 ) -> Replayed:
     """Let a controller that has just begun decide upon all ticks of a log.
 
@@ -212,9 +233,10 @@ def replay(
         controller: The controller.
         header: The header of the log: its period and its robot.
         on_tick: Called with each tick and what was decided now.
+        readings: Change what the controller is given; None for what was recorded.
     """
     log, found = ReplayRobot(ticks), Replayed()
-    control = _Guarded(controller, log, header.robot)
+    control = _Guarded(controller, log, header.robot, readings or Own())
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if log.tick is not None:
@@ -227,6 +249,28 @@ def replay(
             run_loop(log, control, header.params.period, go_on)
     found.failures, found.failure = control.failures, control.failure
     return found
+
+
+def changed_readings(header: Header, name: str, donor: Iterable[Tick] | None) -> Readings:
+    """What a controller is given upon a log.
+
+    Args:
+        header: The header of the log.
+        name: The readings, as `ReplayConfig` has them.
+        donor: The ticks of the log that `yoked` gives, None without one.
+
+    Raises:
+        LogError: The log holds changed readings itself, or the other one no ticks.
+        ConfigError: There are no such readings.
+    """
+    if name != OWN and header.readings != OWN:
+        raise LogError(
+            f"--readings {name}: expected a log of own readings, found one of {header.readings}"
+        )
+    counts = [tick.frame().counts[0] for tick in donor or ()]
+    if name == YOKED and not counts:
+        raise LogError(f"--donor: expected a log with ticks for --readings {YOKED}, found none")
+    return make_readings(name, header.params, donors=[np.array(counts)] if counts else ())
 
 
 def recorded_controller(header: Header, name: str | None = None) -> Controller:

@@ -11,6 +11,7 @@ import numpy as np
 from antennate.control.checked import CheckedController
 from antennate.control.knowledge import Kind, given_to
 from antennate.control.loop import run_loop
+from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.tunnel.config import TunnelConfig
@@ -47,13 +48,15 @@ Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 
 Bodies = Union[SimRobot, "WarpRobot"]
 """Robots in rows that trials are put into, on the CPU or in a batch on a device."""
+Donors = dict[int, Floats]
+"""Counts of trials, tick by tick, (ticks, 2), by number."""
 MakeBodies = Callable[[int], tuple[Scene, Bodies]]
 """Takes the number of rows; the scene, drawn so that these robots can be put into it, and them."""
 
 
 def run_trials(
     config: TunnelConfig,
-    controller: str,
+    condition: str,
     trials: Sequence[int],
     emit: Emit,
     batch: int = BATCH,
@@ -61,17 +64,40 @@ def run_trials(
     watch: Watch | None = None,
     make: ControllerMaker = make_controller,
     bodies: MakeBodies | None = None,
+    donors: Donors | None = None,
+    read: Donors | None = None,
 ) -> None:
-    """Run trials of one controller; emit each as it ends, and keep its log if there is a folder.
+    """Run trials of one condition; emit each as it ends, and keep its log if there is a folder.
 
     A trial in which the controller fails is invalid, and the others go on. Angles that are not
     finite, and a maneuver that does not exist, are faults of one row and end that trial alone. An
     exception, or an array of another shape, cannot be told apart by rows: then each trial of the
     batch that has not ended begins again with a controller of its own, and is invalid if that one
     fails too. With robots of another kind, there are no logs and nothing to watch.
+
+    Args:
+        config: What is run.
+        condition: Name of the controller, with its readings if they are not its own.
+        trials: Their numbers.
+        emit: Takes each as it ends.
+        batch: Trials at once.
+        logs: Folder for their logs.
+        watch: Looks at the first row.
+        make: Makes the controller.
+        bodies: Makes the robots; on the CPU if not given.
+        donors: Counts that yoked trials are given, by trial, (ticks, 2); if not given, they are
+            read in trials that are run for it, so many at once.
+        read: Takes what the robot of each trial reads, likewise.
     """
+    if parts_of(condition)[1] == YOKED and donors is None:
+        for first in range(0, len(trials), batch):
+            some = trials[first : first + batch]
+            found = _donors(config, parts_of(condition)[0], some, batch)
+            run_trials(config, condition, some, emit, batch, logs, watch, make, bodies, found)
+        return
     made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
-    rows = _Rows(config, controller, trials, emit, min(batch, len(trials)), logs, watch, made)
+    size = min(batch, len(trials))
+    rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read)
     try:
         rows.run(make)
     except Restart:
@@ -83,7 +109,18 @@ def run_trials(
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(config, controller, [trial], emit, logs=logs, make=make, bodies=bodies)
+            run_trials(
+                *(config, condition, [trial], emit, 1, logs, None),
+                *(make, bodies, donors, read),
+            )
+
+
+def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch: int) -> Donors:
+    """What robots with their own readings read in the trials that follow these, by these."""
+    following = {trial: config.following(trial) for trial in trials}
+    read: Donors = {}
+    run_trials(config, controller, [*following.values()], lambda found: None, batch, read=read)
+    return {trial: read[donor] for trial, donor in following.items() if donor in read}
 
 
 def cpu_bodies(config: TunnelConfig) -> MakeBodies:
@@ -110,14 +147,18 @@ class _Rows:
         logs: Path | None,
         watch: Watch | None,
         made: tuple[Scene, Bodies],
+        donors: Donors | None,
+        read: Donors | None,
     ) -> None:
+        self._controller, self._readings = parts_of(name)
+        self._donors, self._read, self._counts = donors or {}, read, list[Floats]()
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
         self._scene, self._robot = made
         self._monitors: dict[int, TrialMonitor] = {}
         self._every: Ints = np.arange(batch)
-        self._given: tuple[Kind, ...] = ()
+        self._known: tuple[Kind, ...] = ()
         self._truths: Truths | None = None
         self._ticks, self._begun, self._blocked = 0, dict[int, int](), dict[int, str]()
         self._maneuvers: Ints = np.zeros((batch, len(Maneuver)), np.int64)
@@ -138,21 +179,20 @@ class _Rows:
         phases = [self._place(row) for row in range(self._batch)]
         if not self._monitors:
             return
-        try:
-            made = make(self._name, config.control, config.robot, self._batch)
-            self._given = given_to(made, self._name, config.knows)
-        except ConfigError as error:
-            raise ControllerError(str(error)) from error
+        made = self._make(make)
         control = CheckedController(made, config.robot, self._batch)
-        if self._given:
-            cycle = 1.0 / (config.control.gait.frequency * config.control.period)
-            self._truths = Truths(self._given, self._batch, cycle)
         decisions = Decisions(config.robot, made, self._batch)
+        nothing = [np.full((1, 2), np.nan)] * self._batch
+        readings = make_readings(self._readings, config.control, self._batch, nothing)
+        given = Given(control, readings)
         for row, phase in enumerate(phases):
-            self._reset(row, phase, control, decisions)
+            self._reset(row, phase, control, readings, decisions)
         self._inform(control)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
+            if self._read is not None:
+                self._counts.append(frame.counts.copy())
+            frame = given.frame or frame
             if self._logs:
                 decided = decisions.take(frame, command)
                 for log in self._logs.values():
@@ -160,11 +200,28 @@ class _Rows:
             if self._looks is not None:
                 self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
-                self._reset(row, self._place(row), control, decisions)
+                self._reset(row, self._place(row), control, readings, decisions)
             self._inform(control)
             return bool(self._monitors)
 
-        run_loop(self._robot, control, config.control.period, go_on)
+        run_loop(self._robot, given, config.control.period, go_on)
+
+    def _make(self, make: ControllerMaker) -> Controller:
+        """The controller, and what is to be known of its rows.
+
+        Raises:
+            ControllerError: It cannot be made.
+        """
+        config = self._config
+        try:
+            made = make(self._controller, config.control, config.robot, self._batch)
+            self._known = given_to(made, self._controller, config.knows)
+        except ConfigError as error:
+            raise ControllerError(str(error)) from error
+        if self._known:
+            cycle = 1.0 / (config.control.gait.frequency * config.control.period)
+            self._truths = Truths(self._known, self._batch, cycle)
+        return made
 
     def _place(self, row: int) -> float | None:
         """Put the next trial whose scene can be drawn into a row; its gait phase [rad], if any."""
@@ -185,6 +242,9 @@ class _Rows:
             SceneError: The scene cannot be drawn.
         """
         config = self._config
+        if self._readings == YOKED and trial not in self._donors:
+            other = config.following(trial)
+            raise SceneError(f"{YOKED}: expected readings of trial {other}, found none")
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
         self._robot.load(row, start.world, start.chance)
@@ -200,11 +260,19 @@ class _Rows:
         return start.phase
 
     def _reset(
-        self, row: int, phase: float | None, control: CheckedController, decisions: Decisions
+        self,
+        row: int,
+        phase: float | None,
+        control: CheckedController,
+        readings: Readings,
+        decisions: Decisions,
     ) -> None:
-        """Let the controller, and the log, begin with the trial that was put into a row, if any."""
+        """Let the controller, its readings and the log begin with the trial in a row, if any."""
         if phase is not None:
             control.reset(np.array([row]), phase)
+            if isinstance(readings, Yoked):
+                readings.give(row, self._donors[self._monitors[row].trial])
+            readings.reset(np.array([row]))
             if self._truths is not None:
                 self._truths.begin(row, self._monitors[row].scene)
             self._log(row, phase, decisions)
@@ -226,13 +294,14 @@ class _Rows:
         if self._folder is None or not isinstance(world, World):
             return
         header = Header(
-            controller=self._name,
+            controller=self._controller,
+            readings=self._readings,
             params=config.control,
             robot=config.robot,
             seed=config.seed,
             trial=monitor.trial,
             phase=phase,
-            knows=self._given,
+            knows=self._known,
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it
@@ -284,7 +353,9 @@ class _Rows:
         if (log := self._logs.pop(row, None)) is not None:
             log.close()
         monitor, world = self._monitors.pop(row), self._robot.world(row)
-        del self._begun[row]
+        begun = self._begun.pop(row)
+        if self._read is not None and (ticks := self._counts[begun:]):
+            self._read[monitor.trial] = np.array([counts[row] for counts in ticks])
         path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
         self._emit((monitor.result(world, outcome, reason, self._maneuvers[row]), path))
         self._robot.unload(row)

@@ -7,9 +7,10 @@ from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
-from antennate.control.knowledge import KINDS, Kind
+from antennate.control.knowledge import KNOWABLE, Kind
 from antennate.control.readers import unread_by_all
-from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.control.readings import KINDS, OWN, YOKED, check_readings, condition
+from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.readers import HARDWARE_ALONE
@@ -25,15 +26,20 @@ class TunnelConfig(TrialConfig):
     )
     """Trials of every controller."""
     controllers: tuple[str, ...] = number(
-        tuple(BUILT_IN),
+        USUAL,
         "1",
-        "assumed: all of ours",
+        "assumed: without touch, with the published rule and with ours",
         min_length=1,
-        examples=["open", "paper", "closed"],
+        examples=[*BUILT_IN],
     )
-    """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
+    """Controllers to run: open, timed, paper, closed, schedule, zigzag, random, map, or MODULE:NAME
+    or FILE.py:NAME of your own."""
+    readings: tuple[str, ...] = number(
+        (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
+    )
+    """What each controller is given to read: own, none, swapped, delayed:S or yoked."""
     knows: tuple[Kind, ...] = number(
-        (), "1", "assumed: a robot knows nothing but its readings", examples=list(KINDS)
+        (), "1", "assumed: a robot knows nothing but its readings", examples=list(KNOWABLE)
     )
     """What the simulation gives to controllers that can use it."""
     time_limit: float = number(
@@ -47,6 +53,20 @@ class TunnelConfig(TrialConfig):
     def _names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(map(CONTROLLERS.check, names))
 
+    @field_validator("readings")
+    @classmethod
+    def _known_readings(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(check_readings, names))
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Each controller with each of the readings, by name."""
+        return tuple(condition(name, given) for name in self.controllers for given in self.readings)
+
+    def following(self, trial: int) -> int:
+        """The trial after one; the first after the last."""
+        return (trial + 1) % self.trials
+
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
         control = unread_by_all(self.controllers, self.control, self.robot, self.knows)
@@ -56,6 +76,12 @@ class TunnelConfig(TrialConfig):
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
         require_different("knows", self.knows)
+        require_different("readings", self.readings)
+        if YOKED in self.readings and self.trials < 2:
+            raise ValueError(
+                f"readings {YOKED} are those of the next trial: expected trials of at least 2, "
+                f"found {self.trials}"
+            )
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         require_own_curves(self.robot, self.control)
         return self

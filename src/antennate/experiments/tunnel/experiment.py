@@ -137,6 +137,7 @@ EXPERIMENT = Experiment.of_folder(
     trials=Trials(
         *("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult, tunnel.run_on_device)
     ),
+    tasks=tunnel.tasks,
     measures=measures.COLUMNS,
     viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
         config, 1, on_step, on_row, logs, view

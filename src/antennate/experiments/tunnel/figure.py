@@ -47,7 +47,7 @@ def figures(outcome: TunnelOutcome) -> dict[str, Figure]:
     """Both figures of a run."""
     config, trials = outcome.config, range(min(SHOWN_TRIALS, outcome.config.trials))
     return {
-        "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
+        "trajectories": trajectories(outcome.paths, config.conditions, outcome.rows, trials),
         "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
     }
 

@@ -22,7 +22,7 @@ def films(config: TunnelConfig, trial: int) -> dict[str, Callable[[], Film]]:
     """A film of each controller."""
     return {
         label: partial(record, config, name, trial, label)
-        for name, label in short_names(config.controllers).items()
+        for name, label in short_names(config.conditions).items()
     }
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.control.knowledge import Kind, given_to
+from antennate.control.readings import YOKED, parts_of
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
@@ -42,8 +43,7 @@ class TunnelOutcome:
         """The content of result.json."""
         config = self.config
         by_name = {
-            name: [row for row in self.rows if row.controller == name]
-            for name in config.controllers
+            name: [row for row in self.rows if row.controller == name] for name in config.conditions
         }
         return {
             "schema": 2,
@@ -87,8 +87,19 @@ def check(config: TunnelConfig) -> None:
 
 
 def every(config: TunnelConfig) -> list[Trial]:
-    """All trials, controller by controller."""
-    return [(name, trial) for name in config.controllers for trial in range(config.trials)]
+    """All trials, condition by condition."""
+    return [(name, trial) for name in config.conditions for trial in range(config.trials)]
+
+
+def tasks(config: TunnelConfig) -> list[tuple[str, int, int]]:
+    """What each task is: its condition, its trial, and that whose readings it is given.
+
+    With more trials the one that was last is followed by another, so its yoked run is a new task.
+    """
+    return [
+        (name, trial, config.following(trial) if parts_of(name)[1] == YOKED else trial)
+        for name, trial in every(config)
+    ]
 
 
 def run_rows(
@@ -147,6 +158,8 @@ def _run_batched(
 
     if tasks[0][3] is not None:
         raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
+    if YOKED in tasks[0][0].readings:
+        raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
     _run(tasks, emit, functools.partial(run_trials_on_warp, device=device))
 
 
@@ -218,7 +231,7 @@ def run(
                 on_step(done, len(trials))
     except KeyboardInterrupt:
         interrupted = True
-    order = {name: i for i, name in enumerate(config.controllers)}
+    order = {name: i for i, name in enumerate(config.conditions)}
     found.sort(key=lambda item: (order[item[0].controller], item[0].trial))
     return TunnelOutcome(
         config=config,

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.readers import unread_by_all
-from antennate.control.registry import check_for_robots
+from antennate.control.registry import BUILT_IN, check_for_robots
 from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety import deadlines
 from antennate.params.base import number
@@ -23,10 +23,9 @@ class DriveConfig(RobotConfig):
 
     unread: ClassVar[tuple[str, ...]] = UNDRIVEN
 
-    controller: str = number(
-        "closed", "1", "assumed: our best", examples=["open", "paper", "closed"]
-    )
-    """Open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
+    controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
+    """Open, timed, paper, closed, schedule, zigzag, random, or MODULE:NAME or FILE.py:NAME of
+    your own."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
