@@ -70,6 +70,9 @@ def test_the_rival_is_one_named_controller() -> None:
     assert compared(["closed", RIVAL]) == ("closed", RIVAL)
     assert compared(["paper", "closed"]) == ("closed", "paper")
     assert compared(["closed"]) is None
+    assert compared([RIVAL, "closed", "closed@yoked"]) == ("closed", RIVAL)
+    assert compared(["closed", "closed@none", "closed@yoked"]) == ("closed", "closed@yoked")
+    assert compared(["closed@none", "closed@yoked"]) == ("closed@yoked", "closed@none")
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4])
