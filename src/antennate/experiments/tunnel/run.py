@@ -13,12 +13,12 @@ from antennate.control.readings import YOKED, parts_of
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import BATCH, Emit, run_trials
+from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.knowledge import require_route
-from antennate.sim.scenes.registry import TUNNEL, make_scene
-from antennate.sim.trial import check_start, draw_scene
+from antennate.sim.scenes.registry import TUNNEL
+from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import Workers, chunk_of, gather
@@ -42,6 +42,7 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
+        shared = measures.limit_of(self.rows, config.time_limit)
         by_name = {
             name: [row for row in self.rows if row.controller == name] for name in config.conditions
         }
@@ -51,13 +52,11 @@ class TunnelOutcome:
             "seed": config.seed,
             "scene": config.scene,
             "knows": list(config.knows),
-            "time_limit_s": config.time_limit,
+            "time_limit_s": shared,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
-            "controllers": {
-                name: measures.summary(rows, config.time_limit) for name, rows in by_name.items()
-            },
-            "paired": measures.paired(by_name, config.time_limit),
+            "controllers": {name: measures.summary(rows, shared) for name, rows in by_name.items()},
+            "paired": measures.paired(by_name, shared),
         }
 
 
@@ -82,8 +81,7 @@ def check(config: TunnelConfig) -> None:
             f"{', '.join(unused)}"
         )
     if given:
-        scene = make_scene(config.scene, config.tunnel)
-        require_route(config.scene, draw_scene(config, scene, 0), list(given))
+        require_route(config.scene, draw_scene(config, scene_of(config), 0), list(given))
 
 
 def every(config: TunnelConfig) -> list[Trial]:
@@ -169,7 +167,7 @@ def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
         raise failure.raised()
     name, number = trial
     key = config.seed, number, name
-    return TrialResult(*key, "invalid", config.time_limit, reason=failure.reason), None
+    return lost_row(key, config, failure.reason), None
 
 
 def _run_viewed(
