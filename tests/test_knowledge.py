@@ -49,7 +49,7 @@ class Pathless:
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Any:
         plain = FlatScene().draw(robot, rng)
-        names = ("start", "length", "exit", "build", "progress", "succeeded", "left")
+        names = ("start", "length", "exit", "build", "progress", "left")
         return type("Bare", (), {name: getattr(plain, name) for name in names})()
 
 
