@@ -22,13 +22,17 @@ from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
 from antennate.control.knowledge import Knowledge
 from antennate.params.blind import RandomParams, ScheduleParams, ZigzagParams
-from antennate.params.control import ControlParams
+from antennate.params.control import ControlParams, EscapeParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 
 Plan = Callable[[Ints, Ints], tuple[Floats, Floats, Floats]]
 """Takes rows and the numbers of their rounds, from 0, both (n,); times to walk, to back off and to
 turn in that round [s], each (n,), a turn to the right positive."""
+
+
+_BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn", "retry_time")
+"""What an escape depends on where nothing was touched before."""
 
 
 class TimedRule:
@@ -39,7 +43,8 @@ class TimedRule:
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._ticks = max(1, round(control.timed.walk_time / control.period))
-        self._escape = Escape(control.escape, batch, control.period)
+        read = {name: getattr(control.escape, name) for name in _BLIND_ESCAPE}
+        self._escape = Escape(EscapeParams(**read), batch, control.period)
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:

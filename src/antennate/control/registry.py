@@ -77,7 +77,7 @@ def about(names: Iterable[str]) -> str:
 def compared(names: Sequence[str]) -> tuple[str, str] | None:
     """The two conditions that a headline compares: the last one named, and its rival.
 
-    The rival is `RIVAL`, or the first one where that is not among them; None of fewer than two.
+    The rival is `RIVAL`, else `open`, else the first one; None of fewer than two.
     Conditions with other than their own readings are left out, unless only one is left: then it is
     compared with the last one that has others.
     """
@@ -87,7 +87,7 @@ def compared(names: Sequence[str]) -> tuple[str, str] | None:
     if len(own) == 1:
         return own[0], [name for name in names if name != own[0]][-1]
     names = own or names
-    rival = RIVAL if RIVAL in names else names[0]
+    rival = next((name for name in (RIVAL, "open") if name in names), names[0])
     return [name for name in names if name != rival][-1], rival
 
 
