@@ -20,6 +20,7 @@ import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
+from antennate.control.knowledge import Knowledge
 from antennate.params.blind import RandomParams, ScheduleParams, ZigzagParams
 from antennate.params.control import ControlParams, EscapeParams
 from antennate.robots.spec import RobotSpec
@@ -37,6 +38,8 @@ _BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn", "retry
 class TimedRule:
     """Walks for a time, then the escape of `closed` with nothing touched, again and again."""
 
+    knows = Escape.knows
+
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._ticks = max(1, round(control.timed.walk_time / control.period))
@@ -48,6 +51,10 @@ class TimedRule:
         """Some rows begin anew, walking."""
         self._escape.reset(rows)
         self._walked[rows] = 0
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what a simulation knows, for the escape."""
+        self._escape.knowledge = knowledge
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`; of the readings it only matters whether they can be used."""
