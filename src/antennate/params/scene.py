@@ -116,7 +116,7 @@ class CorridorsParams(Params):
     )
     """Straight pieces, fewest and most."""
     length: tuple[float, float] = number(
-        (0.5, 3.0), "m", "assumed: from less than the robot's body to four times it"
+        (0.5, 3.0), "m", "assumed: from less than the robot's 0.72 m to four times that"
     )
     """Length of a piece, shortest and longest."""
     largest_turn: float = number(

@@ -23,7 +23,7 @@ from antennate.robots.readers import unused
 from antennate.robots.sensor import require_own_curve
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.geometry import crossing
-from antennate.sim.scenes.registry import CORRIDORS, TUNNEL, check_name, make_scene
+from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
@@ -42,8 +42,9 @@ class TrialConfig(Params):
 
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
-    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=["tunnel", "flat"])
-    """A scene by name, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
+    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
+    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, a MJCF file.xml,
+    MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
     robot: RobotSpec = RobotSpec()
