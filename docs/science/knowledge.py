@@ -26,6 +26,8 @@ from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import cpu_bodies, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
+from antennate.sim.knowledge import side_ahead
+from antennate.sim.trial import draw_scene, scene_of
 from antennate.studies.statistics import compare
 from antennate.types import AntennaFrame
 
@@ -158,8 +160,9 @@ def trials(folder: Path, rounds: int, workers: int) -> None:
     tasks = [
         (folder, scene, condition, AT_ONCE * number)
         for number in range(rounds)
+        for some in (("nothing", "side", "map"), ("jam", "facing", "free", "closed"))
         for scene in SCENES
-        for condition in CONDITIONS
+        for condition in some
     ]
     with ProcessPoolExecutor(workers) as pool:
         for done in pool.map(run_task, *zip(*tasks, strict=True)):
@@ -356,15 +359,21 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
             continue
         with np.load(path) as file:
             samples = file["samples"]
+        config = config_of(scene, 1)
+        drawn = scene_of(config)
         for row in np.unique(samples[:, 0]).tolist():
             trial = samples[samples[:, 0] == row]
             if len(trial) < 4 * CYCLE:
                 continue
             rng = np.random.default_rng([SEED, int(row), len(groups)])
             some = slice(2 * CYCLE, None, 10)
+            route = draw_scene(config, drawn, int(row)).route
+            place = [SIGNALS.index(name) for name in ("x", "y", "heading")]
+            side = [side_ahead(route, p[:2], p[2]) for p in trial[some][:, place].astype(float)]
+            truths.setdefault("side", []).append(np.array(side))
             for name, values in features(trial, rng).items():
                 parts.setdefault(name, []).append(values[some])
-            for kind in ("side", "jam", "facing", "free", "maneuver"):
+            for kind in ("jam", "facing", "free", "maneuver"):
                 truths.setdefault(kind, []).append(trial[some, SIGNALS.index(kind)])
             count = len(trial[some])
             scenes.append(np.full(count, scene))
