@@ -19,7 +19,7 @@ from antennate.experiments.tunnel.run import check, run
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.knowledge import Truths, angle_ahead, is_facing, is_free
+from antennate.sim.knowledge import Truths, angle_ahead, is_facing, is_free, side_ahead
 from antennate.sim.scenes.registry import SCENES
 from antennate.sim.scenes.scene import FlatScene, Route, SceneInstance
 from antennate.sim.trial import make_world, place_at_start
@@ -99,6 +99,15 @@ def test_the_point_ahead_lies_0_3_m_on_along_the_route() -> None:
     )
     # past the end it goes on straight
     assert angle_ahead(CORNER, np.array([1.0, 1.5]), math.pi / 2) == pytest.approx(0.0)
+
+
+def test_the_side_is_that_of_the_corner_ahead() -> None:
+    head = np.array([0.7, 0.0])  # the corner is 0.3 m ahead, as far as `map` looks
+    assert angle_ahead(CORNER, head, 0.0) == pytest.approx(0.0)
+    assert side_ahead(CORNER, head, 0.0) == 1
+    assert side_ahead(CORNER * [1, -1], head, 0.0) == -1
+    assert side_ahead(CORNER, head, math.pi / 2) == -1  # turned too far
+    assert side_ahead(CORNER, np.array([0.2, 0.0]), 0.0) == 0
 
 
 @pytest.mark.parametrize(

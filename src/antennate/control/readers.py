@@ -74,10 +74,6 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
         found |= {"escape.trigger", *_REPEATED, *_BLOCKED}
     if name == "timed" and "jam" in knows:
         found |= set(_TIMED)
-    if name == "timed" and "facing" in knows:
-        found -= {"escape.lost_time", "escape.return_time"}
-    if name == "timed" and "map" in knows:
-        found -= {"escape.return_time"}
     return found
 
 

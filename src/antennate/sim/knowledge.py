@@ -22,9 +22,11 @@ from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
 AHEAD = 0.3
-"""How far ahead on the route the point is that `side` and `map` lead to [m]: half the robot."""
+"""How far ahead on the route the point is that `map` leads to [m]: half the robot."""
+SIDE_AHEAD = 0.6
+"""The same of `side` [m]: the robot, so that a corner is still seen after it has backed off."""
 STRAIGHT = math.radians(10.0)
-"""Largest angle to that point that counts as straight ahead [rad]."""
+"""Largest angle to a point that counts as straight ahead [rad]."""
 JAM_GAIN = 0.02
 """The head of a jammed robot gets on by less than this in a gait cycle [m]: a seventh of what a
 free one walks in it, and the gain that the tables call stuck."""
@@ -95,9 +97,8 @@ class Truths:
             self._free[row] = is_free(world)
         route = self._routes[row]
         if route is not None:
-            angle = angle_ahead(route, head, heading)
-            self._map[row] = angle
-            self._side[row] = 0 if abs(angle) < STRAIGHT else int(math.copysign(1, angle))
+            self._map[row] = angle_ahead(route, head, heading)
+            self._side[row] = side_ahead(route, head, heading)
             self._facing[row] = is_facing(route, head, heading)
 
     def _is_jammed(self, row: int, head: Floats, maneuver: int) -> bool:
@@ -109,8 +110,14 @@ class Truths:
         return len(walked) > self._looks and math.dist(walked[0], head) < JAM_GAIN
 
 
-def angle_ahead(route: Floats, head: Floats, heading: float) -> float:
-    """Angle from a heading [rad] to the point AHEAD on the route, within -pi and pi [rad].
+def side_ahead(route: Floats, head: Floats, heading: float) -> int:
+    """Side of the point SIDE_AHEAD on the route: +1 left, -1 right, 0 straight ahead."""
+    angle = angle_ahead(route, head, heading, SIDE_AHEAD)
+    return 0 if abs(angle) < STRAIGHT else int(math.copysign(1, angle))
+
+
+def angle_ahead(route: Floats, head: Floats, heading: float, ahead: float = AHEAD) -> float:
+    """Angle from a heading [rad] to a point ahead on the route, within -pi and pi [rad].
 
     The route goes on straight past its end.
 
@@ -118,8 +125,9 @@ def angle_ahead(route: Floats, head: Floats, heading: float) -> float:
         route: Its corners [m], shape (n, 2).
         head: Where the head is [m], shape (2,).
         heading: Its direction [rad].
+        ahead: How far ahead along the route the point is [m].
     """
-    x, y = (_place(route, geometry.progress(route, head) + AHEAD)[0] - head).tolist()
+    x, y = (_place(route, geometry.progress(route, head) + ahead)[0] - head).tolist()
     return _wrapped(math.atan2(y, x) - heading)
 
 
