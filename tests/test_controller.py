@@ -12,6 +12,8 @@ from antennate.errors import ConfigError
 from antennate.params.control import ControlParams
 from antennate.types import AntennaFrame, Maneuver
 
+FEELING = ("open", "paper", "closed")
+"""Controllers that do what they feel, `open` among them: where nothing touches, all walk."""
 PARAMS = ControlParams()
 PERIOD = PARAMS.period
 STRAIGHT, BENT = 1872.0, 1399.0
@@ -66,7 +68,7 @@ def test_a_name_that_does_not_exist_is_refused_with_the_valid_ones() -> None:
         make_controller("clsoed", PARAMS)
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", FEELING)
 def test_a_robot_that_touches_nothing_walks_forward(name: str) -> None:
     said = run(name, np.full((800, 1, 2), STRAIGHT))
     assert (said["maneuver"] == Maneuver.FORWARD).all()
@@ -136,7 +138,7 @@ def test_the_streams_of_the_batch_test_make_controllers_act() -> None:
     assert set(np.unique(run("paper", counts)["maneuver"])) == set(Maneuver)
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", FEELING)
 def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -> None:
     counts = streams(LONG, 5)
     here = run(name, counts)

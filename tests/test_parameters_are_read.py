@@ -17,6 +17,7 @@ from servo_recordings import of_twin
 
 from antennate import experiments
 from antennate.cli import main
+from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import loads
 from antennate.experiments.force import run as force
 from antennate.experiments.reproduce import run as reproduce
@@ -80,6 +81,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {
             "trials": 1,
             "time_limit": 0.1,
+            "controllers": list(BUILT_IN),
             "control": {"rate": 25.0},
             "robot": {
                 "yaw": {"servo": "xl330_m288"},

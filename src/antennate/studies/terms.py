@@ -12,7 +12,8 @@ _TERMS = {
     "trials make it wide; where the intervals of two conditions overlap much, their order is not "
     "known.",
     "restricted_mean_time_s": "Restricted mean time: the mean over all valid trials, where one "
-    "that fails counts as the whole time limit. So giving up early does not look fast.",
+    "that fails counts as the whole time limit. So giving up early does not look fast. Its "
+    "interval also reaches for failures that so few trials may not have met.",
     "progress_per_time_m_s": "Progress over time: how far all valid trials came together, over "
     "their time together, so that failures count. Speed over successes: the mean of progress over "
     "time of each trial that succeeded.",
@@ -23,7 +24,7 @@ _TERMS = {
     "one of them passes and the other does not. p is how often chance alone would split these so "
     "unevenly or more; below 0.05 is usually taken for a difference.",
     "wilcoxon_p": "Wilcoxon: the same question for how long the trials took, by the ranks of the "
-    "differences trial by trial.",
+    "differences trial by trial, with those of zero among the ranks (Pratt).",
 }
 """Sentences by the names of numbers in a result."""
 

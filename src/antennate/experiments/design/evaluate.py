@@ -160,15 +160,15 @@ class Evaluator:
                 where += f"evaluate.{self.label}: "
             raise ConfigError(f"{where}{error}") from None
 
-    def bounds(self, point: Point) -> dict[str, tuple[float, float]]:
-        """Between which values those of each objective lie, by its name."""
+    def bounds(self, point: Point) -> dict[str, tuple[float, float, bool]]:
+        """Between which values those of each objective lie, and whether the upper is a failure."""
         values = dict(self.configured(point))
-        return {
-            objective.name: labels.bounds(
-                labels.measure_of(self.name, objective.column), self.name, values
-            )
-            for objective in self._asked.objectives(self.label)
-        }
+        found: dict[str, tuple[float, float, bool]] = {}
+        for objective in self._asked.objectives(self.label):
+            of = labels.measure_of(self.name, objective.column)
+            least, most, failure = labels.bounds(of, self.name, values)
+            found[objective.name] = (least, most, failure and not objective.of_successes)
+        return found
 
     def check(self, point: Point) -> None:
         """Find what cannot be run.

@@ -34,7 +34,7 @@ def worth(
     rows: Sequence[Mapping[str, Any]],
     objectives: Sequence[Objective],
     least_ok: float,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[float, float, bool]] | None = None,
 ) -> dict[str, Value] | None:
     """The value of each objective, by name; None if too few trials are ok.
 
@@ -42,7 +42,8 @@ def worth(
         rows: Rows of all trials of a design, each with its `evaluation`.
         objectives: What is told.
         least_ok: Least share of the trials of each evaluation that must be ok.
-        bounds: Between which values those of an objective lie, by its name; any if not given.
+        bounds: Between which values those of an objective lie, and whether the upper one stands
+            for a failure, by its name; any if not given.
     """
     found: dict[str, Value] = {}
     for objective in objectives:
@@ -55,7 +56,7 @@ def worth(
         if objective.of_successes:
             known = [r for r in known if r[OUTCOME] == "success" and r.get(column) is not None]
         values = [row[column] for row in known]
-        between = (bounds or {}).get(objective.name, (-math.inf, math.inf))
+        between = (bounds or {}).get(objective.name, (-math.inf, math.inf, False))
         found[objective.name] = _share(values) if column == OUTCOME else _mean(values, between)
     return found
 
@@ -66,7 +67,7 @@ def _share(outcomes: Sequence[str]) -> Value:
     return {"value": won / len(outcomes), "value95": interval, "trials": len(outcomes)}
 
 
-def _mean(values: Sequence[float], bounds: tuple[float, float]) -> Value:
+def _mean(values: Sequence[float], bounds: tuple[float, float, bool]) -> Value:
     if not values:
         return {"value": None, "value95": None, "trials": 0}
     mean, interval = statistics.mean95(np.array(values, float), *bounds)

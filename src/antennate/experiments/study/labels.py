@@ -9,6 +9,7 @@ from typing import Any
 from antennate import experiments
 from antennate.experiments.study.effects import SUCCESS
 from antennate.params.base import Params
+from antennate.sim.scenes.registry import TUNNEL, shared_limit
 from antennate.studies.measures import Measure, shown
 
 _SHARE = Measure(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
@@ -46,8 +47,10 @@ def measure_of(experiment: str, column: str) -> Measure:
     return Measure(column, words, _UNITS.get(end, ""), form=".3g")
 
 
-def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float]:
-    """What no value of a measure lies below, and what none exceeds.
+def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float, bool]:
+    """What no value of a measure lies below, what none exceeds, and whether that is a failure.
+
+    A measure that ends at a parameter, as a time at its limit, is that limit where a trial fails.
 
     Args:
         of: The measure.
@@ -55,10 +58,13 @@ def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[flo
         values: Parameters that are not at their defaults, by name.
     """
     if not isinstance(of.most, str):
-        return of.least, of.most
+        return of.least, of.most, False
     known = _experiment(experiment)
     default = known.config.model_fields[of.most].default if known else math.inf
-    return of.least, float(values.get(of.most, default))
+    most = values.get(of.most, default)
+    if most is None:  # that of the scene
+        most = shared_limit(str(values.get("scene", TUNNEL)))
+    return of.least, float(most), True
 
 
 def cell(of: Measure, number: Any, interval: Any = None) -> str:

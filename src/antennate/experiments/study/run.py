@@ -152,10 +152,14 @@ def _require_response(config: StudyConfig, columns: Columns) -> None:
         )
 
 
-def every(config: StudyConfig) -> list[_Name]:
+def every(config: StudyConfig) -> list[tuple[Any, ...]]:
     """What each task is: all trials, point by point."""
     subject = find(config.experiment)
-    return [_name(task) for task in _tasks(config, subject, configurations(config, subject))]
+    return [
+        (number, *task)
+        for number, (_, configured) in enumerate(configurations(config, subject))
+        for task in subject.tasks(configured)
+    ]
 
 
 def _tasks(

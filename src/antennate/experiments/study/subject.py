@@ -186,6 +186,11 @@ class _OfExperiment:
     def every(self, config: Any) -> Sequence[Trial]:
         return self._trials.every(config) if self._trials else [("", 0)]
 
+    def tasks(self, config: Any) -> Sequence[Any]:
+        """What each trial is, whatever the number of trials."""
+        named = self._experiment.tasks if self._trials else None
+        return named(config) if named else self.every(config)
+
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         """Run some trials; emit the index and the rows of each."""
         if self._trials is not None:
@@ -227,6 +232,9 @@ class _OfFunction:
 
     def every(self, config: Any) -> Sequence[Trial]:
         return [("", seed) for seed in range(config.get("trials", 1))]
+
+    def tasks(self, config: Any) -> Sequence[Any]:
+        return self.every(config)
 
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         given = {name: value for name, value in config.items() if name != "trials"}

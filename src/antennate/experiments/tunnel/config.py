@@ -37,10 +37,10 @@ class TunnelConfig(TrialConfig):
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )
     """What each controller is given to read: own, none, swapped, delayed:S or yoked."""
-    time_limit: float = number(
-        100.0, "s", "paper: 0.04 m/s without feedback; half of that on 2 m", gt=0, le=3600
+    time_limit: float | None = number(
+        None, "s", "paper: 0.04 m/s without feedback; half of that on 2 m, 100 s", gt=0, le=3600
     )
-    """Time after which a trial has failed."""
+    """Time after which a trial has failed; that of its scene if not given."""
     control: ControlParams = ControlParams()
 
     @field_validator("controllers")

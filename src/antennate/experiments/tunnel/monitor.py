@@ -17,8 +17,8 @@ import numpy as np
 from antennate.antenna.springs import SpringLoad, largest_load
 from antennate.errors import SceneError
 from antennate.sim.scenes import geometry
-from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import end_of, progress_of
+from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
+from antennate.sim.trial import Judge, progress_of
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -46,7 +46,8 @@ class TrialResult:
     Attributes:
         seed: Seed of the run; with `trial` it decides all chance.
         controller: Name of the controller.
-        outcome: success (the head passed the exit), timeout, left (out another way) or invalid.
+        outcome: success (the head crossed the exit from inside), timeout, left (out another way)
+            or invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: How far the head came, within 0 and the length of the scene [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
@@ -59,6 +60,7 @@ class TrialResult:
             negative where it was bent the other way too.
         spring_high_n_m: That largest torque [N·m], of looks at every tick.
         spring_cycles: Load cycles of that spring, see `largest_load`.
+        limit_s: Time limit of the trial [s].
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -81,6 +83,7 @@ class TrialResult:
     spring_low_n_m: float = 0.0
     spring_high_n_m: float = 0.0
     spring_cycles: int = 0
+    limit_s: float = TIME_LIMIT
     reason: str = ""
 
 
@@ -136,6 +139,10 @@ class TrialMonitor:
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
     _bends: array[float] = field(default_factory=lambda: array("d"))
     _offsets: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
+    _judge: Judge = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._judge = Judge(self.scene)
 
     def bend(self, world: Watched) -> None:
         """Note how the antennae are bent."""
@@ -154,7 +161,7 @@ class TrialMonitor:
         progress = progress_of(self.scene, head)
         self._note_progress(progress, t)
         self._note_offset(progress, head)
-        return end_of(self.scene, head) or ("timeout" if t >= self.time_limit else None)
+        return self._judge.look(head) or ("timeout" if t >= self.time_limit else None)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
@@ -167,7 +174,7 @@ class TrialMonitor:
 
     def _note_offset(self, progress: float, head: Floats) -> None:
         """Note how far the head is from the centre line, if there is one."""
-        line = getattr(self.scene, "route", getattr(self.scene, "centre", None))
+        line = getattr(self.scene, "route", None)
         if line is None or np.shape(line)[1:] != (2,):
             return
         if 0.0 <= progress < self.scene.length:
@@ -210,6 +217,7 @@ class TrialMonitor:
             spring_low_n_m=round(load.low, 9),
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,
+            limit_s=self.time_limit,
             reason=reason,
         )
 
