@@ -11,7 +11,7 @@ from recorded import act, leaves, press, recorded
 
 from antennate.cli import main
 from antennate.control.readers import BY_CONTACT, TELEOP, UNREAD, unread_by_all
-from antennate.control.registry import BUILT_IN
+from antennate.control.registry import BUILT_IN, PRIVILEGED
 from antennate.experiments import load
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.study import run as study
@@ -33,7 +33,7 @@ def by_keys(control: ControlParams, robot: RobotSpec) -> None:
 
 
 ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
-    **{name: lambda c, r, name=name: act(name, c, r) for name in BUILT_IN},
+    **{name: lambda c, r, name=name: act(name, c, r) for name in (*BUILT_IN, *PRIVILEGED)},
     TELEOP: by_keys,
 }
 

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antennate import simulate
 from antennate.cli import main
+from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, SceneError
 from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.params.control import ControlParams
 from antennate.params.scene import CorridorsParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes import geometry
@@ -24,7 +27,7 @@ from antennate.sim.scenes.registry import SHIPPED, make_scene
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.trial import TrialConfig, draw_trial, scene_of, time_limit_of, variation_of
 from antennate.testing import check_scene
-from antennate.types import Floats
+from antennate.types import AntennaFrame, Floats, Maneuver
 
 ROBOT = RobotSpec()
 DRAWS = 60
@@ -237,8 +240,18 @@ def test_what_cannot_be_drawn_is_said() -> None:
 def test_a_run_shows_shares_of_each_limit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["tunnel", "--scene", "corridors", "--trials", "5", "--controllers", "open", "closed"]
-    words += ["--corridors.pace", "0.2", "--no-figures", "--workers", "1"]
+    words = ["tunnel", "--scene", "corridors", "--trials", "3", "--controllers", "open", "closed"]
+    words += [
+        "--corridors.room-share",
+        "0",
+        "--corridors.pieces",
+        "1",
+        "1",
+        "--corridors.length",
+        "0.5",
+        "1.5",
+    ]
+    words += ["--corridors.pace", "0.3", "--no-figures", "--workers", "1"]
     assert main([*words, "--out", str(tmp_path / "run")]) == 0
     printed = capsys.readouterr().out
     assert "% of limit" in printed
@@ -272,3 +285,25 @@ def test_shares_are_of_the_limit_of_each_trial() -> None:
     pair = measures.paired({"slow": slow, "fast": fast}, None)["slow-fast"]
     assert pair["share_difference"] == pytest.approx((0.4 + 0.7) / 2)
     assert (pair["both"], pair["both_time_s"]) == (1, (80.0, 40.0))
+
+
+@pytest.mark.parametrize("controller", ["open", "paper", "closed"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_robot_with_an_open_wire_stands_in_simulation_too(controller: str, side: str) -> None:
+    """An open flex sensor is the upper half of a divider: its pin reads 0, which says nothing."""
+    made = make_controller(controller, ControlParams(), ROBOT, 2)
+    made.reset(np.arange(2), 0.0)
+    counts = np.full((2, 2), 1800.0)
+    counts[1, ["left", "right"].index(side)] = 0.0
+    for tick in range(300):
+        command = made.step(AntennaFrame(np.full(2, 0.01 * tick), counts))
+    assert made.maneuver.tolist() == [Maneuver.FORWARD, Maneuver.HOLD]  # type: ignore[attr-defined]
+    assert np.abs(np.diff(command.leg, axis=0)).max() > 1.0, "only the first has walked"
+
+
+def test_no_trial_is_crossed_on_open_wires() -> None:
+    """A flex sensor of 1 GOhm is as good as none."""
+    robot = {"antenna": {"sensor": {"flat_resistance": 1e9}}}
+    series = simulate("closed", robot=robot, time_limit=6.0)
+    assert set(series.maneuver.tolist()) == {Maneuver.HOLD}
+    assert series.meta["outcome"] == "timeout"

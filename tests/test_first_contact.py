@@ -76,6 +76,8 @@ def test_the_rival_is_one_named_controller() -> None:
     assert RIVAL in BUILT_IN
     assert compared(["paper", RIVAL, "closed", "mine.py:Mine"]) == ("mine.py:Mine", RIVAL)
     assert compared(["closed", RIVAL]) == ("closed", RIVAL)
+    assert compared(["open", RIVAL, "paper", "closed"]) == ("closed", RIVAL)
+    assert compared(["closed", "open"]) == ("closed", "open")
     assert compared(["paper", "closed"]) == ("closed", "paper")
     assert compared(["closed"]) is None
     assert compared([RIVAL, "closed", "closed@yoked"]) == ("closed", RIVAL)

@@ -92,7 +92,7 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
     """Of trials that end at different times, on one worker and on two, and replayed."""
     monkeypatch.chdir(tmp_path)
     words = ["tunnel", *NARROW, "--trials", "3", "--controllers", "closed"]
-    more = ["--readings", "own", "yoked", "--no-figures", "--quiet"]
+    more = ["--readings", "own", "yoked", "--no-figures"]
     assert main([*words, *more, "--workers", "1", "--out", "one", "--log"]) == 0
     assert main([*words, *more, "--workers", "2", "--out", "two"]) == 0
     assert Path("one/trials.csv").read_text() == Path("two/trials.csv").read_text()
@@ -109,8 +109,8 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
         assert main(["replay", str(path)]) == 0
         assert "decided as recorded in all" in capsys.readouterr().out
     log, other = "one/logs/closed-0.mcap", "one/logs/closed-1.mcap"
-    out = ["--out", "again", "--no-figures"]
-    assert main(["replay", log, "--readings", "yoked", "--donor", other, *out]) == 0
+    words = ["replay", log, "--readings", "yoked", "--donor", other]
+    assert main([*words, "--out", "again"]) == 0
     assert json.loads(Path("again/result.json").read_text())["controller"] == "closed@yoked"
 
 

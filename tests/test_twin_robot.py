@@ -162,7 +162,11 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "trial", "robot", "limit", "end"),
-    [("closed", 1, ROBOT, 100.0, "success"), ("paper", 0, MIRRORED, 10.0, "timeout")],
+    [
+        ("closed", 1, ROBOT, 100.0, "success"),
+        ("paper", 0, MIRRORED, 10.0, "timeout"),
+        ("timed", 0, ROBOT, 8.0, "timeout"),
+    ],
 )
 def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
     name: str, trial: int, robot: RobotSpec, limit: float, end: str

@@ -17,6 +17,7 @@ from antennate.cli.options import option
 from antennate.cli.progress import progress, stop_signals
 from antennate.cli.replay import complain, say_unguarded
 from antennate.cli.results import ResultOptions, log_of, tell
+from antennate.control.readings import condition
 from antennate.errors import ConfigError, MissingPackageError, OutputError, reason
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import extra, one_line, shortened, typed
@@ -225,7 +226,7 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
         "command": "log",
         "log": str(log.path),
         "parts": [part.name for part in log.parts],
-        "controller": header.controller,
+        "controller": condition(header.controller, header.readings),
         "joints": list(header.robot.joint_names),
         "seed": header.seed,
         "trial": header.trial,

@@ -314,6 +314,7 @@ def require_text(flag: str, text: str) -> None:
 
 
 _ELSEWHERE = {
+    "--knows": "only tunnel takes it: no robot knows what a simulation does",
     "--log": "tunnel, gait and twin take it; drive and teleop always keep a log",
     "--video": "tunnel, gait, wall, touch, sweep, ringdown, calibrate, force and twin take it; "
     "`antennate log film` makes a film of any log",

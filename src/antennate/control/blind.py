@@ -20,8 +20,9 @@ import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
+from antennate.control.knowledge import Knowledge
 from antennate.params.blind import RandomParams, ScheduleParams, ZigzagParams
-from antennate.params.control import ControlParams
+from antennate.params.control import ControlParams, EscapeParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 
@@ -30,19 +31,30 @@ Plan = Callable[[Ints, Ints], tuple[Floats, Floats, Floats]]
 turn in that round [s], each (n,), a turn to the right positive."""
 
 
+_BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn", "retry_time")
+"""What an escape depends on where nothing was touched before."""
+
+
 class TimedRule:
     """Walks for a time, then the escape of `closed` with nothing touched, again and again."""
+
+    knows = Escape.knows
 
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._ticks = max(1, round(control.timed.walk_time / control.period))
-        self._escape = Escape(control.escape, batch, control.period)
+        read = {name: getattr(control.escape, name) for name in _BLIND_ESCAPE}
+        self._escape = Escape(EscapeParams(**read), batch, control.period)
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking."""
         self._escape.reset(rows)
         self._walked[rows] = 0
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what a simulation knows, for the escape."""
+        self._escape.knowledge = knowledge
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`; of the readings it only matters whether they can be used."""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from antennate.control.knowledge import Knowing, Knowledge
 from antennate.errors import ControllerError, is_ctrl_c, raised
 from antennate.robots.spec import RobotSpec
 from antennate.types import (
@@ -64,6 +65,20 @@ class CheckedController:
             if is_ctrl_c(error):
                 raise
             raise ControllerError(f"reset raised {raised(error)}") from error
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Give it what a simulation knows, if it can use any.
+
+        Raises:
+            ControllerError: The controller raised an exception.
+        """
+        if isinstance(self._controller, Knowing):
+            try:
+                self._controller.know(knowledge)
+            except BaseException as error:
+                if is_ctrl_c(error):
+                    raise
+                raise ControllerError(f"know raised {raised(error)}") from error
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period of all rows.

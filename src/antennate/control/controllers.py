@@ -4,12 +4,13 @@ Conditioning, contact and gait are the same in all. The rule that chooses the ma
 
 - `open` always walks FORWARD;
 - `paper` follows the published table and holds each maneuver for a time;
-- `closed` walks FORWARD until its readings repeat, then escapes.
+- `closed` walks FORWARD until its readings repeat, then escapes;
+- `map` walks along the route, which only a simulation can tell it.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from antennate.control.conditioning import RunningMean, curves, level_and_fracti
 from antennate.control.contact import ContactState
 from antennate.control.escape import Escape
 from antennate.control.gait import Gait
+from antennate.control.knowledge import Kind, Knowledge
 from antennate.control.maneuver import Hold, decide
+from antennate.control.map_rule import MapRule
 from antennate.control.repetition import RepetitionDetector
 from antennate.params.control import ControlParams
 from antennate.robots.sides import LEFT, RIGHT
@@ -86,6 +89,8 @@ class _PaperRule:
 class _ClosedRule:
     """FORWARD until readings repeat, or the published table says REVERSE; then escape."""
 
+    knows = Escape.knows
+
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._control = control
@@ -100,6 +105,9 @@ class _ClosedRule:
         if self._detector is not None:
             self._detector.reset(rows)
         self._escape.reset(rows)
+
+    def know(self, knowledge: Knowledge) -> None:
+        self._escape.knowledge = knowledge
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         stuck = self._stuck(level, contact, flex)
@@ -131,6 +139,8 @@ class RuleController:
         contact: `Contact` of the last step, shape (B, 2).
         maneuver: `Maneuver` of the last step, shape (B,).
         gait: The gait and its phase.
+        knows: Kinds of knowledge that its rule can use, as of `Knowing`.
+        needs: Those that it needs.
     """
 
     def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
@@ -138,7 +148,9 @@ class RuleController:
         self._curves = curves(control)
         self._mean = RunningMean(control.conditioning, batch, control.period)
         self._contact = ContactState(control.rule, batch)
-        self._rule = rule
+        self._rule: Any = rule
+        self.knows: tuple[Kind, ...] = getattr(rule, "knows", ())
+        self.needs: tuple[Kind, ...] = getattr(rule, "needs", ())
         self.gait = Gait(control.gait, robot, batch, control.period)
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
@@ -155,6 +167,10 @@ class RuleController:
         self._contact.reset(rows)
         self._rule.reset(rows)
         self.gait.reset(rows, phase)
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what a simulation knows now; its rule can use some of it."""
+        self._rule.know(knowledge)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period: the command for this frame, both with B rows."""
@@ -178,3 +194,8 @@ def paper(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControlle
 def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`closed`: walks FORWARD until its readings repeat, then escapes."""
     return RuleController(_ClosedRule(control, batch), control, robot, batch)
+
+
+def by_map(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`map`: walks along the route, which a simulation tells it."""
+    return RuleController(MapRule(control, batch), control, robot, batch)

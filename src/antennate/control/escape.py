@@ -6,19 +6,30 @@ of a robot that is stuck say little about where the passage goes on. If it is st
 
 A wrong turn can lead the robot back out of a passage, where its antennae touch no wall. So a robot
 that has turned and then touches nothing for `lost_time` turns round, back towards the walls.
+
+In a study a simulation may tell it what it knows: the side to turn to, whether the robot is jammed
+(in place of the rule that calls it stuck), whether it faces the entrance (then it turns round),
+whether the way ahead is free (then it does not escape), or the angle by which to turn.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from antennate.control.knowledge import KNOWABLE, Knowledge, aligned
 from antennate.params.control import EscapeParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
 
 
 class Escape:
-    """The escape of each row: its maneuver, when that ends, and the side of the last turn."""
+    """The escape of each row: its maneuver, when that ends, and the side of the last turn.
+
+    Attributes:
+        knowledge: What a simulation knows of the rows; nothing on a robot.
+    """
+
+    knows = KNOWABLE
 
     def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
         self._params = params
@@ -34,12 +45,14 @@ class Escape:
         self._past: Floats = np.zeros((delay, batch, 2))
         self._ticks = 0
         self.touch: Floats = np.zeros((batch, 2))
+        self.knowledge = Knowledge()
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
         self.maneuver[rows] = Maneuver.FORWARD
         self._ended[rows] = -np.inf
-        self._turned[rows] = False
+        self._until[rows] = 0.0
+        self._right[rows] = self._turned[rows] = False
         self._past[:, rows] = 0.0
         self.touch[rows] = 0.0
 
@@ -60,15 +73,18 @@ class Escape:
         self.touch += np.where(walking[:, None], level - self.touch, 0.0) * self._memory_gain
         before = self._remember()
         self._felt = np.where(walking & ~pressed, self._felt, t)
-        over = known & ~walking & (t >= self._until)
+        over = known & ~walking & ((t >= self._until) | self._aligned())
         if np.count_nonzero(over):
             backed = over & (self.maneuver == int(Maneuver.REVERSE))
             self._to(over & ~backed, int(Maneuver.FORWARD), t)
             self._turn(backed, t)
-        stuck = walking & stuck
+        stuck = walking & self._really(stuck)
         if np.count_nonzero(stuck):
             self._back_off(stuck, before, t)
         lost = walking & self._turned & (t - self._felt > self._params.lost_time)
+        if self.knowledge.facing is not None:
+            walked = t - self._until > self._params.lost_time
+            lost = lost | (walking & ~stuck & self.knowledge.facing & walked)
         if np.count_nonzero(lost):
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
@@ -96,16 +112,39 @@ class Escape:
         self._to(rows, int(Maneuver.REVERSE), t + params.reverse_time)
 
     def _turn(self, rows: Bools, t: Floats) -> None:
-        until = t + self._params.turn_time * np.where(self._again, self._params.second_turn, 1.0)
+        params = self._params
+        until = t + params.turn_time * np.where(self._again, params.second_turn, 1.0)
+        if self.knowledge.map is not None:
+            until = t + params.return_time
+        self._right = np.where(rows, self._known_side(self._right), self._right)
         self._to(rows, _turn_to(self._right), until)
         self._ended = np.where(rows, until, self._ended)
         self._turned |= rows
 
     def _return(self, rows: Bools, t: Floats) -> None:
         """Turn back, opposite to the last turn, and forget that turn."""
-        self._to(rows, _turn_to(~self._right), t + self._params.return_time)
+        right = self._known_side(~self._right)
+        self._to(rows, _turn_to(right), t + self._params.return_time)
         self._ended = np.where(rows, -np.inf, self._ended)
         self._turned &= ~rows
+
+    def _really(self, stuck: Bools) -> Bools:
+        """Rows that are stuck, by what is known where it is, else by the rule."""
+        known = self.knowledge
+        stuck = stuck if known.jam is None else known.jam
+        return stuck if known.free is None else stuck & ~known.free
+
+    def _known_side(self, right: Bools) -> Bools:
+        """Whether to turn right: as is known, else as given."""
+        known = self.knowledge
+        side = known.side if known.map is None else known.map
+        return right if side is None else np.where(side == 0, right, side < 0)
+
+    def _aligned(self) -> Bools:
+        """Rows that turn, and have turned far enough by what is known."""
+        if self.knowledge.map is None:
+            return np.zeros(len(self.maneuver), dtype=bool)
+        return aligned(self.maneuver, self.knowledge.map)
 
 
 def _turn_to(right: Bools) -> Ints:

@@ -41,6 +41,8 @@ def _without(read: tuple[str, ...], *others: str) -> tuple[str, ...]:
     return (*_TABLE, *(path for path in _BLIND if path not in read), *others)
 
 
+_MAP = ("escape.reverse_time", "escape.return_time", "escape.turn_offset")
+"""Of an escape what `map` reads."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
     "open": (*_TABLE, *_ESCAPE, *_BLIND),
     "timed": _without(_TIMED, *_FELT),
@@ -50,24 +52,41 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "schedule": _without(_SCHEDULE, *_TURNING),
     "zigzag": _without(_ZIGZAG, *_TURNING),
     "random": _without(_RANDOM, *_TURNING),
+    "map": (*_TABLE, *_BLIND, *(path for path in _ESCAPE if path not in _MAP)),
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_BLIND),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 
 
-def unread(name: str, control: ControlParams) -> set[str]:
+def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[str]:
     """Parameters of the control, dotted, that a controller does not read on any robot.
 
     A controller of one's own may read all.
+
+    Args:
+        name: The controller.
+        control: All numbers of the control.
+        knows: What a simulation tells it; a robot tells nothing.
     """
     by_contact = name == "closed" and control.escape.trigger == "contact"
-    return set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    found = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    if name == "closed" and "jam" in knows:
+        found |= {"escape.trigger", *_REPEATED, *_BLOCKED}
+    if name == "timed" and "jam" in knows:
+        found |= set(_TIMED)
+    if name == "timed" and "facing" in knows:
+        found -= {"escape.lost_time", "escape.return_time"}
+    if name == "timed" and "map" in knows:
+        found -= {"escape.return_time"}
+    return found
 
 
-def unread_by_all(names: Sequence[str], control: ControlParams, robot: RobotSpec) -> dict[str, str]:
+def unread_by_all(
+    names: Sequence[str], control: ControlParams, robot: RobotSpec, knows: Sequence[str] = ()
+) -> dict[str, str]:
     """Parameters that none of these controllers reads, as `control.rule.strong`, and why."""
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
-    paths = set.intersection(*(unread(name, control) for name in names))
+    paths = set.intersection(*(unread(name, control, knows) for name in names))
     found = {f"control.{path}": who for path in sorted(paths)}
     return found | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
 

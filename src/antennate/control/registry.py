@@ -30,6 +30,8 @@ BUILT_IN: dict[str, ControllerFactory] = {
 }
 USUAL = ("open", "timed", "paper", "closed")
 """Those of ours that are run if none is named; the others are further controls without touch."""
+PRIVILEGED: dict[str, ControllerFactory] = {"map": controllers.by_map}
+"""Controllers that need what only a simulation knows."""
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
@@ -39,13 +41,30 @@ ABOUT = {
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",
+    "map": "walks along the route, which only a simulation can tell it, to show what that is worth",
 }
 """What ours do, for who meets them for the first time."""
 RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
-CONTROLLERS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
+CONTROLLERS: Registry[ControllerFactory] = Registry(
+    "controller", "antennate.controllers", BUILT_IN | PRIVILEGED
+)
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
+
+
+def check_for_robots(name: str) -> str:
+    """Return the name of a controller if a robot may have it; no code of the user runs.
+
+    Raises:
+        ConfigError: There is none of that name, or it needs what only a simulation knows.
+    """
+    if name in PRIVILEGED:
+        raise ConfigError(
+            f"expected a controller that lives on its readings, found {name!r}, which needs what "
+            "only a simulation knows; `antennate tunnel` runs it"
+        )
+    return CONTROLLERS.check(name)
 
 
 def about(names: Iterable[str]) -> str:
@@ -58,7 +77,7 @@ def about(names: Iterable[str]) -> str:
 def compared(names: Sequence[str]) -> tuple[str, str] | None:
     """The two conditions that a headline compares: the last one named, and its rival.
 
-    The rival is `RIVAL`, or the first one where that is not among them; None of fewer than two.
+    The rival is `RIVAL`, else `open`, else the first one; None of fewer than two.
     Conditions with other than their own readings are left out, unless only one is left: then it is
     compared with the last one that has others.
     """
@@ -68,7 +87,7 @@ def compared(names: Sequence[str]) -> tuple[str, str] | None:
     if len(own) == 1:
         return own[0], [name for name in names if name != own[0]][-1]
     names = own or names
-    rival = RIVAL if RIVAL in names else names[0]
+    rival = next((name for name in (RIVAL, "open") if name in names), names[0])
     return [name for name in names if name != rival][-1], rival
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.control.knowledge import Kind, Knowing, Knowledge
 from antennate.params.control import ControlParams
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
 
@@ -58,6 +59,21 @@ class Retunable:
     def phase(self) -> Floats | None:
         """Gait phase [rad], shape (1,); None if the controller tells none."""
         return getattr(self._made, "phase", None)
+
+    @property
+    def knows(self) -> tuple[Kind, ...]:
+        """As of `Knowing`; none of a controller that is none."""
+        return self._made.knows if isinstance(self._made, Knowing) else ()
+
+    @property
+    def needs(self) -> tuple[Kind, ...]:
+        """As of `Knowing`; none of a controller that is none."""
+        return self._made.needs if isinstance(self._made, Knowing) else ()
+
+    def know(self, knowledge: Knowledge) -> None:
+        """As of `Knowing`."""
+        if isinstance(self._made, Knowing):
+            self._made.know(knowledge)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """As of a `Controller`."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from antennate import checks
 from antennate.control.checked import CheckedController
+from antennate.control.knowledge import require_own_senses
 from antennate.control.loop import run_loop
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import ConfigError, ControllerError
@@ -80,6 +81,7 @@ def simulate(
     start = draw_trial(config, scene, trial, control.gait, control.period)
     require_room(start.world)
     controlling = make_controller(controller, control, config.robot, 1)
+    require_own_senses(controlling, str(controller), "simulate")
     robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)

@@ -68,6 +68,7 @@ class Header(Strict):
         start: Unix time at which the loop's time was 0 [ns]; 0 where time is simulated.
         arena: Settings of the trial that tell its scene, as `TrialConfig` has them without the
             robot; empty where its run tells, or where it was no simulation.
+        knows: What a simulation gave to the controller beside its readings; not in the log.
         calibration: The calibration file of the antennae, as text; empty without one.
         versions: Versions of what wrote it, by name.
     """
@@ -81,6 +82,7 @@ class Header(Strict):
     phase: float = 0.0
     start: int = Field(default=0, ge=0, lt=1 << 62)
     arena: Mapping[str, Any] = Field(default_factory=dict)
+    knows: tuple[str, ...] = ()
     calibration: str = ""
     versions: Mapping[str, str] = Field(default_factory=versions)
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import field_validator
 
+from antennate.control.knowledge import require_own_senses
 from antennate.control.loop import run_loop
 from antennate.control.readings import (
     KINDS,
@@ -20,7 +21,7 @@ from antennate.control.readings import (
     check_readings,
     make_readings,
 )
-from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
+from antennate.control.registry import BUILT_IN, PRIVILEGED, check_for_robots, make_controller
 from antennate.errors import LogError, raised
 from antennate.hardware.driving.decision import Decision, decision_of, no_command
 from antennate.messages import shortened
@@ -49,7 +50,7 @@ class ReplayConfig(Params):
     @field_validator("controller")
     @classmethod
     def _known(cls, name: str | None) -> str | None:
-        return None if name is None else CONTROLLERS.check(name)
+        return None if name is None else check_for_robots(name)
 
 
 class ReplayRobot:
@@ -276,17 +277,25 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
     """The controller of a log as it began, or one of another name with the same numbers.
 
     Raises:
-        LogError: It is code outside this package, and only the log names it.
+        LogError: It is code outside this package, and only the log names it; or it decided upon
+            what a simulation knew.
         ConfigError: There is none of that name.
     """
     wanted = header.controller if name is None else name
-    if name is None and wanted not in BUILT_IN:
+    if name is None and wanted not in {*BUILT_IN, *PRIVILEGED}:
         more = "closed, for example" if wanted == TWIN else "with this name if its code may run"
         found = shortened(repr(wanted))
         raise LogError(
             f"expected one of {', '.join(BUILT_IN)} in the log, found {found}; give "
             f"--controller {more}"
         )
+    if name is None and header.knows:
+        raise LogError(
+            f"expected a log of readings alone, found one of a controller that a simulation told "
+            f"{', '.join(header.knows)}, which is not in the log; give --controller NAME for one "
+            "that decides upon the readings"
+        )
     made = make_controller(wanted, header.params, header.robot)
+    require_own_senses(made, wanted, "a replay")
     made.reset(np.array([0]), header.phase)
     return made

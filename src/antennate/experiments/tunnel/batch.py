@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Union
 import numpy as np
 
 from antennate.control.checked import CheckedController
+from antennate.control.knowledge import Kind, given_to
 from antennate.control.loop import run_loop
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
@@ -20,6 +21,7 @@ from antennate.experiments.tunnel.monitor import (
     TrialPath,
     TrialResult,
 )
+from antennate.sim.knowledge import Truths
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
@@ -167,6 +169,8 @@ class _Rows:
         self._scene, self._robot = made
         self._monitors: dict[int, TrialMonitor] = {}
         self._every: Ints = np.arange(batch)
+        self._known: tuple[Kind, ...] = ()
+        self._truths: Truths | None = None
         self._ticks, self._begun, self._blocked = 0, dict[int, int](), dict[int, str]()
         self._maneuvers: Ints = np.zeros((batch, len(Maneuver)), np.int64)
 
@@ -186,10 +190,7 @@ class _Rows:
         phases = [self._place(row) for row in range(self._batch)]
         if not self._monitors:
             return
-        try:
-            made = make(self._controller, config.control, config.robot, self._batch)
-        except ConfigError as error:
-            raise ControllerError(str(error)) from error
+        made = self._make(make)
         control = CheckedController(made, config.robot, self._batch)
         decisions = Decisions(config.robot, made, self._batch)
         nothing = [np.full((1, 2), np.nan)] * self._batch
@@ -197,6 +198,7 @@ class _Rows:
         given = Given(control, readings)
         for row, phase in enumerate(phases):
             self._reset(row, phase, control, readings, decisions)
+        self._inform(control)
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             if self._read is not None:
@@ -210,9 +212,27 @@ class _Rows:
                 self._look(self._looks, frame, made)
             for row in self._watch(frame.t, control):
                 self._reset(row, self._place(row), control, readings, decisions)
+            self._inform(control)
             return bool(self._monitors)
 
         run_loop(self._robot, given, config.control.period, go_on)
+
+    def _make(self, make: ControllerMaker) -> Controller:
+        """The controller, and what is to be known of its rows.
+
+        Raises:
+            ControllerError: It cannot be made.
+        """
+        config = self._config
+        try:
+            made = make(self._controller, config.control, config.robot, self._batch)
+            self._known = given_to(made, self._controller, config.knows)
+        except ConfigError as error:
+            raise ControllerError(str(error)) from error
+        if self._known:
+            cycle = 1.0 / (config.control.gait.frequency * config.control.period)
+            self._truths = Truths(self._known, self._batch, cycle)
+        return made
 
     def _place(self, row: int) -> float | None:
         """Put the next trial whose scene can be drawn into a row; its gait phase [rad], if any."""
@@ -265,7 +285,16 @@ class _Rows:
             if isinstance(readings, Yoked):
                 readings.give(row, self._donors[self._monitors[row].trial])
             readings.reset(np.array([row]))
+            if self._truths is not None:
+                self._truths.begin(row, self._monitors[row].scene)
             self._log(row, phase, decisions)
+
+    def _inform(self, control: CheckedController) -> None:
+        """Give the controller what it may know of all rows for its next step."""
+        if self._truths is not None:
+            for row in self._monitors:
+                self._truths.look(row, self._robot.world(row), control.maneuver.item(row))
+            control.know(self._truths.knowledge())
 
     def log_of(self, trial: int) -> Path:
         """The log of a trial."""
@@ -284,6 +313,7 @@ class _Rows:
             seed=config.seed,
             trial=monitor.trial,
             phase=phase,
+            knows=self._known,
         )
         path = self.log_of(monitor.trial)
         path.unlink(missing_ok=True)  # what a killed worker left of it

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
+from antennate.control.knowledge import KNOWABLE, Kind
 from antennate.control.readers import unread_by_all
 from antennate.control.readings import KINDS, OWN, YOKED, check_readings, condition
 from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
@@ -31,12 +32,16 @@ class TunnelConfig(TrialConfig):
         min_length=1,
         examples=[*BUILT_IN],
     )
-    """Controllers to run: open, timed, paper, closed, schedule, zigzag, random, or MODULE:NAME or
-    FILE.py:NAME of your own."""
+    """Controllers to run: open, timed, paper, closed, schedule, zigzag, random, map, or MODULE:NAME
+    or FILE.py:NAME of your own."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )
     """What each controller is given to read: own, none, swapped, delayed:S or yoked."""
+    knows: tuple[Kind, ...] = number(
+        (), "1", "assumed: a robot knows nothing but its readings", examples=list(KNOWABLE)
+    )
+    """What the simulation gives to controllers that can use it."""
     time_limit: float | None = number(
         None, "s", "paper: 0.04 m/s without feedback; half of that on 2 m, 100 s", gt=0, le=3600
     )
@@ -64,12 +69,13 @@ class TunnelConfig(TrialConfig):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
-        control = unread_by_all(self.controllers, self.control, self.robot)
+        control = unread_by_all(self.controllers, self.control, self.robot, self.knows)
         return {**super().unread_here(), **control}
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
+        require_different("knows", self.knows)
         require_different("readings", self.readings)
         if YOKED in self.readings and self.trials < 2:
             raise ValueError(

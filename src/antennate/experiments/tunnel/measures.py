@@ -131,10 +131,10 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
         "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
         "restricted_mean_time_s": restricted if valid else None,
         "restricted_mean_time_95": ends,
-        "offset_m": offset if math.isfinite(offset) else None,
-        "offset_95": offsets if math.isfinite(offset) else None,
         "restricted_mean_share": share if valid else None,
         "restricted_mean_share_95": share_ends,
+        "offset_m": offset if math.isfinite(offset) else None,
+        "offset_95": offsets if math.isfinite(offset) else None,
     }
 
 
@@ -154,31 +154,24 @@ def paired(
         both = sorted(ours.keys() & theirs.keys())
         if both:
             times = np.array([[rows[k].time_s for k in both] for rows in (ours, theirs)])
-            won = np.array(
-                [[rows[k].outcome == "success" for k in both] for rows in (ours, theirs)]
-            )
+            ends = np.array([[rows[k].outcome for k in both] for rows in (ours, theirs)])
+            won = ends == "success"
             units = np.array([ours[k].limit_s for k in both]) if limit is None else 1.0
-            restricted = times / units
-            test = statistics.compare(won[0], won[1], restricted[0], restricted[1], limit or 1.0)
+            first_t, second_t = times / units
+            test = statistics.compare(won[0], won[1], first_t, second_t, limit or 1.0)
             found = asdict(test)
             if limit is None:
                 found["share_difference"] = found.pop("time_difference_s")
                 found["share_difference_95"] = found.pop("time_difference_95")
-                all_won = times[:, won.all(axis=0)]
-                found["both_time_s"] = (
-                    tuple(all_won.mean(axis=1).tolist()) if all_won.size else None
-                )
-            apart = [
-                ours[k].offset_m - theirs[k].offset_m
-                for k in both
-                if ours[k].outcome == theirs[k].outcome == "success"
-            ]
-            offset, ends = statistics.mean95(np.array(apart))
+                means = times[:, won.all(axis=0)].mean(axis=1).tolist() if test.both else None
+                found["both_time_s"] = means and tuple(means)
+            apart = np.array([ours[k].offset_m - theirs[k].offset_m for k in both])
+            offset, offsets = statistics.mean95(apart[won.all(axis=0)])
             known = math.isfinite(offset)
             tests[f"{first}-{second}"] = {
                 "trials": len(both),
                 **found,
                 "offset_difference_m": offset if known else None,
-                "offset_difference_95": ends if known else None,
+                "offset_difference_95": offsets if known else None,
             }
     return tests

@@ -54,13 +54,13 @@ class TrialResult:
         share_forward: Share of ticks in each maneuver.
         force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
         force_max_n: Their maximum [N].
+        limit_s: Time limit of the trial [s].
         offset_m: Mean distance of the head from the centre line over the length that it came [m],
             whatever the time it took; NaN in a scene without one.
         spring_low_n_m: Smallest torque of the antenna spring that bore the largest one [N·m];
             negative where it was bent the other way too.
         spring_high_n_m: That largest torque [N·m], of looks at every tick.
         spring_cycles: Load cycles of that spring, see `largest_load`.
-        limit_s: Time limit of the trial [s].
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -79,11 +79,11 @@ class TrialResult:
     share_hold: float = 0.0
     force_mean_n: float = 0.0
     force_max_n: float = 0.0
+    limit_s: float = TIME_LIMIT
     offset_m: float = math.nan
     spring_low_n_m: float = 0.0
     spring_high_n_m: float = 0.0
     spring_cycles: int = 0
-    limit_s: float = TIME_LIMIT
     reason: str = ""
 
 
@@ -137,9 +137,9 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
+    _judge: Judge = field(init=False)
     _bends: array[float] = field(default_factory=lambda: array("d"))
     _offsets: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
-    _judge: Judge = field(init=False)
 
     def __post_init__(self) -> None:
         self._judge = Judge(self.scene)
@@ -213,11 +213,11 @@ class TrialMonitor:
             **{f"share_{m.name.lower()}": round(float(share[m]), 6) for m in Maneuver},
             force_mean_n=round(float(forces.mean()), 6),
             force_max_n=round(float(forces.max()), 6),
+            limit_s=self.time_limit,
             offset_m=round(float(np.mean(offsets)), 6) if offsets else math.nan,
             spring_low_n_m=round(load.low, 9),
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,
-            limit_s=self.time_limit,
             reason=reason,
         )
 

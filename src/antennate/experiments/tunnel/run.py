@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
@@ -15,8 +16,9 @@ from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
+from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
-from antennate.sim.trial import check_start
+from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import Workers, chunk_of, gather
@@ -49,6 +51,7 @@ class TunnelOutcome:
             "command": "tunnel",
             "seed": config.seed,
             "scene": config.scene,
+            "knows": list(config.knows),
             "time_limit_s": shared,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
@@ -65,11 +68,20 @@ def check(config: TunnelConfig) -> None:
         SceneError: The scene cannot be built, or the robot does not fit at its start.
     """
     check_start(config)
+    given: dict[Kind, None] = {}
     for name in config.controllers:
         try:
-            make_controller(name, config.control, config.robot)
+            made = make_controller(name, config.control, config.robot)
         except ConfigError as error:
             raise ConfigError(f"--controllers: {error}") from error
+        given |= dict.fromkeys(given_to(made, name, config.knows))
+    if unused := [kind for kind in config.knows if kind not in given]:
+        raise ConfigError(
+            f"--knows: expected what one of {', '.join(config.controllers)} can use, found "
+            f"{', '.join(unused)}"
+        )
+    if given:
+        require_route(config.scene, draw_scene(config, scene_of(config), 0), list(given))
 
 
 def every(config: TunnelConfig) -> list[Trial]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.readers import unread_by_all
-from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.control.registry import BUILT_IN, check_for_robots
 from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety import deadlines
 from antennate.params.base import number
@@ -61,7 +61,7 @@ class DriveConfig(RobotConfig):
     @field_validator("controller")
     @classmethod
     def _known(cls, name: str) -> str:
-        return CONTROLLERS.check(name)
+        return check_for_robots(name)
 
     @model_validator(mode="after")
     def _in_order(self) -> DriveConfig:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from antennate.control.knowledge import require_own_senses
 from antennate.control.registry import make_controller
 from antennate.errors import BadInputError
 from antennate.hardware import settings
@@ -62,6 +63,7 @@ def connect(
         BringUpError: The servos are not those expected.
     """
     controller = make_controller(config.controller, config.control, config.robot)
+    require_own_senses(controller, config.controller, "a drive")
     with contextlib.ExitStack() as stack:
         ports = ("--esp32", esp32, BOARD_BAUD), ("--bus", bus, config.robot.baud)
         board, servos = (

@@ -100,14 +100,6 @@ def progress(points: Floats, where: Floats) -> float:
     return best
 
 
-def distance(points: Floats, where: Floats) -> float:
-    """Distance of a point from a polyline (n, 2), its ends included [m]."""
-    along = np.diff(points, axis=0)
-    from_start = where - points[:-1]
-    part = np.clip((from_start * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-    return float(np.hypot(*(from_start - part[:, None] * along).T).min())
-
-
 def crossing(line: Floats, before: Floats, after: Floats) -> int:
     """Whether a step crosses a line between its ends.
 
@@ -148,6 +140,14 @@ def is_simple(polygon: Floats) -> bool:
     near = np.minimum(a, b) <= np.maximum(c, d)  # or else they may be parts of one line
     near &= np.minimum(c, d) <= np.maximum(a, b)
     return not (across & near.all(axis=1)).any()
+
+
+def distance(points: Floats, where: Floats) -> float:
+    """Distance of a point from a polyline (n, 2), its ends included [m]."""
+    along = np.diff(points, axis=0)
+    from_start = where - points[:-1]
+    part = np.clip((from_start * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(from_start - part[:, None] * along).T).min())
 
 
 def contains(polygon: Floats, where: Floats) -> bool:

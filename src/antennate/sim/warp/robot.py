@@ -49,6 +49,12 @@ class WarpRow:
         root = self.world.places.root
         return self._batch.positions[self._row, root : root + 3]
 
+    @property
+    def on_cpu(self) -> World:
+        """The world on the CPU, in the state of now; speeds and contacts are not brought there."""
+        self._follow()
+        return self.world
+
     def obstacle_force(self) -> float:
         """Sum of the normal forces between robot and obstacles [N] in the last physics step."""
         return float(self._batch.forces()[self._row])

@@ -1,0 +1,114 @@
+"""What a simulation knows and a robot does not: privileged input of a controller, for studies.
+
+It shows how much a sense would be worth that nobody has built yet. On a robot there is none of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
+
+import numpy as np
+
+from antennate.errors import ConfigError
+from antennate.types import Bools, Floats, Ints, Maneuver
+
+Kind = Literal["side", "jam", "facing", "free", "map"]
+"""A piece of knowledge."""
+KNOWABLE: tuple[Kind, ...] = get_args(Kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """The truth about B robots; a part that is not given is None.
+
+    Attributes:
+        side: Side on which the route goes on from the head: +1 left, -1 right, 0 straight ahead,
+            shape (B,).
+        jam: Whether the robot walks and does not get on, shape (B,).
+        facing: Whether the head faces the entrance, against the route, shape (B,).
+        free: Whether nothing is within reach ahead of the head, shape (B,).
+        map: Angle from the head's direction to a point ahead on the route [rad], positive to the
+            left, within -pi and pi, shape (B,).
+    """
+
+    side: Ints | None = None
+    jam: Bools | None = None
+    facing: Bools | None = None
+    free: Bools | None = None
+    map: Floats | None = None
+
+
+ALIGNED = math.radians(10.0)
+"""Angle to a point ahead on the route at which a turn ends, where that angle is known [rad]."""
+
+
+def aligned(maneuver: Ints, angle: Floats) -> Bools:
+    """Rows that turn and have come to a point ahead, or past it, shape (B,).
+
+    Args:
+        maneuver: One `Maneuver` a row, shape (B,).
+        angle: Angle to the point ahead [rad], positive to the left, shape (B,).
+    """
+    left, right = maneuver == Maneuver.TURN_L, maneuver == Maneuver.TURN_R
+    still = np.where(left, angle, -angle)  # to be turned
+    return (left | right) & (still < ALIGNED) & (still > -math.pi / 2)
+
+
+@runtime_checkable
+class Knowing(Protocol):
+    """A controller that can use knowledge.
+
+    Attributes:
+        knows: The kinds that it can use.
+        needs: Those of them without which it cannot walk.
+    """
+
+    knows: tuple[Kind, ...]
+    needs: tuple[Kind, ...]
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what holds in the next step."""
+        ...
+
+
+def needs_of(controller: Any) -> tuple[Kind, ...]:
+    """Kinds without which a controller cannot walk."""
+    return tuple(controller.needs) if isinstance(controller, Knowing) else ()
+
+
+def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, ...]:
+    """Kinds that a simulation gives to a controller: what it needs, and what of `knows` it can use.
+
+    Args:
+        controller: The controller.
+        name: Its name, for messages.
+        knows: What is offered.
+
+    Raises:
+        ConfigError: Something is offered, and it uses none of it.
+    """
+    offered = tuple(knows)
+    usable = tuple(controller.knows) if isinstance(controller, Knowing) else ()
+    used = [kind for kind in offered if kind in usable]
+    if offered and not used:
+        what = f"one that uses {', '.join(usable)}" if usable else "one that uses no knowledge"
+        raise ConfigError(
+            f"--knows: expected controllers that use {' or '.join(offered)}, found {name!r}, {what}"
+        )
+    return tuple(kind for kind in KNOWABLE if kind in {*used, *needs_of(controller)})
+
+
+def require_own_senses(controller: Any, name: str, where: str) -> None:
+    """Refuse a controller that needs what only a simulation knows.
+
+    Raises:
+        ConfigError: It does.
+    """
+    if needs := needs_of(controller):
+        raise ConfigError(
+            f"controller: expected one that lives on its readings for {where}, found {name!r}, "
+            f"which needs to know {', '.join(needs)}; only a simulation knows that"
+        )
