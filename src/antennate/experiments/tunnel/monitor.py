@@ -175,8 +175,10 @@ class TrialMonitor:
     def _note_offset(self, progress: float, head: Floats) -> None:
         """Note how far the head is from the centre line, if there is one."""
         line = getattr(self.scene, "route", None)
-        if line is not None and 0.0 <= progress < self.scene.length:
-            offset = geometry.distance(line, head)
+        if line is None or np.shape(line)[1:] != (2,):
+            return
+        if 0.0 <= progress < self.scene.length:
+            offset = geometry.distance(np.asarray(line, float), head)
             self._offsets.setdefault(int(progress / _STRETCH), []).append(offset)
 
     def _load(self, world: Watched) -> SpringLoad:
