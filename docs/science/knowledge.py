@@ -207,8 +207,8 @@ def worth(folder: Path) -> None:
     (HERE / "knowledge.json").write_text(json.dumps(result, indent=1) + "\n")
     (HERE / "knowledge.png").write_bytes(render(_figure(scenes))["png"])
     lines = [
-        f"Seed {SEED}, trials of at most {LIMIT:g} s; a failure counts as {LIMIT:g} s. Time saved is "
-        "against `timed` that knows nothing, on the same trials, with 95 % intervals."
+        f"Seed {SEED}, trials of at most {LIMIT:g} s; a failure counts as {LIMIT:g} s. Time is "
+        "saved against `timed` that knows nothing, on the same trials, with 95 % intervals."
     ]
     lines += ["", row("scene", "knows", "trials", "crossed", "mean time [s]", "saved [s]")]
     lines += [row(*["---"] * 6)]
