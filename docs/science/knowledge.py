@@ -406,7 +406,7 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
                 continue
             rng = np.random.default_rng([SEED, int(row), len(groups)])
             some = slice(2 * CYCLE, None, 10)
-            route = draw_scene(config, drawn, int(row)).route
+            route: Any = getattr(draw_scene(config, drawn, int(row)), "route")  # noqa: B009
             place = [SIGNALS.index(name) for name in ("x", "y", "heading")]
             side = [side_ahead(route, p[:2], p[2]) for p in trial[some][:, place].astype(float)]
             truths.setdefault("side", []).append(np.array(side))
@@ -460,8 +460,8 @@ def readings(folder: Path) -> None:
                     StandardScaler(), LogisticRegression(max_iter=300, C=0.1)
                 ),
                 "boosting": HistGradientBoostingClassifier(
-                    max_iter=120,
-                    learning_rate=0.06,
+                    max_iter=60,
+                    learning_rate=0.1,
                     max_leaf_nodes=15,
                     min_samples_leaf=60,
                     random_state=0,
