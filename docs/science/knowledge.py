@@ -415,6 +415,7 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
             for kind in ("jam", "facing", "free", "maneuver"):
                 truths.setdefault(kind, []).append(trial[some, SIGNALS.index(kind)])
             count = len(trial[some])
+            truths.setdefault("known", []).append(np.full(count, condition))
             scenes.append(np.full(count, scene))
             groups.append(np.full(count, f"{scene}-{int(row)}"))
     return (
@@ -450,6 +451,7 @@ def readings(folder: Path) -> None:
     }
     result: dict[str, Any] = {"samples": {}, "auc": {}}
     for kind, (truth, chosen) in asked.items():
+        chosen = chosen & (truths["known"] != kind)  # its commands would give the truth away
         result["samples"][kind] = [int((truth & chosen).sum()), int((~truth & chosen).sum())]
         result["auc"][kind] = {}
         for name, wanted in SETS.items():
@@ -511,7 +513,8 @@ def _left_out(model: Any, x: Any, truth: Any, scenes: Any, groups: Any) -> dict[
             drawn = np.concatenate([places[g] for g in rng.choice(names[scene], len(names[scene]))])
             if 0 < truth[drawn].sum() < len(drawn):
                 areas.append(_auc(scores[drawn], truth[drawn]))
-        means.append(float(np.mean(areas)))
+        if areas:
+            means.append(float(np.mean(areas)))
     ends = np.percentile(means, [2.5, 97.5]).round(3).tolist()
     mean = round(float(np.mean(list(by_scene.values()))), 3)
     return {
