@@ -434,7 +434,7 @@ def _auc(score: Any, truth: Any) -> float:
     return float((ranks[truth].sum() - ones * (ones + 1) / 2) / (ones * rest))
 
 
-def readings(folder: Path) -> None:
+def readings(folder: Path, kinds: list[str]) -> None:
     """How well what a robot has tells side, jam, facing and free, on scenes left out."""
     from sklearn.ensemble import HistGradientBoostingClassifier
     from sklearn.linear_model import LogisticRegression
@@ -448,10 +448,16 @@ def readings(folder: Path) -> None:
         "jam": (truths["jam"] > 0, walking),
         "facing": (truths["facing"] > 0, walking),
         "free": (truths["free"] > 0, walking),
+        "side when jammed": (truths["side"] > 0, (truths["jam"] > 0) & (truths["side"] != 0)),
     }
+    path = HERE / "readings.json"
     result: dict[str, Any] = {"samples": {}, "auc": {}}
-    for kind, (truth, chosen) in asked.items():
-        chosen = chosen & (truths["known"] != kind)  # its commands would give the truth away
+    if kinds and path.exists():
+        result = json.loads(path.read_text())
+    for kind in kinds or asked:
+        truth, chosen = asked[kind]
+        told = truths["known"] == kind.split()[0]  # whose commands would give the truth away
+        chosen = chosen & ~told
         result["samples"][kind] = [int((truth & chosen).sum()), int((~truth & chosen).sum())]
         result["auc"][kind] = {}
         for name, wanted in SETS.items():
@@ -474,7 +480,7 @@ def readings(folder: Path) -> None:
                 for label, model in models.items()
             }
             print(kind, name, result["auc"][kind][name], flush=True)
-    (HERE / "readings.json").write_text(json.dumps(result, indent=1) + "\n")
+    path.write_text(json.dumps(result, indent=1) + "\n")
     lines = ["AUC with 95 % interval; in brackets the samples that are so, and that are not."]
     for kind, sets in result["auc"].items():
         counts = " and ".join(f"{count}" for count in result["samples"][kind])
@@ -530,11 +536,14 @@ def main(argv: list[str]) -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--kinds", nargs="*", default=[], help="of readings: those to fit anew")
     asked = parser.parse_args(argv)
     if asked.part == "trials":
         trials(asked.folder, asked.rounds, asked.workers)
+    elif asked.part == "worth":
+        worth(asked.folder)
     else:
-        {"worth": worth, "readings": readings}[asked.part](asked.folder)
+        readings(asked.folder, asked.kinds)
 
 
 if __name__ == "__main__":
