@@ -12,11 +12,12 @@ import pytest
 from antennate.cli import main
 from antennate.control.knowledge import Knowledge
 from antennate.control.registry import make_controller
+from antennate.control.retunable import Retunable
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import check, run
-from antennate.params.control import GaitParams
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.knowledge import Truths, angle_ahead, is_facing, is_free, side_ahead
@@ -234,6 +235,15 @@ def test_a_controller_of_ones_own_gets_what_it_asks_for() -> None:
         assert known.side is not None
         assert known.side.shape == (2,)
         assert known.map is None
+
+
+def test_numbers_that_a_page_changes_leave_a_controller_its_knowledge() -> None:
+    by_map = Retunable(lambda values: make_controller("map", values), ControlParams())
+    assert by_map.needs == by_map.knows == ("jam", "map")
+    by_map.know(Knowledge(jam=np.array([False]), map=np.array([1.0])))
+    by_map.step(AntennaFrame(np.array([0.0]), np.full((1, 2), 1872.0)))
+    assert by_map.maneuver[0] == Maneuver.TURN_L
+    assert Retunable(lambda values: make_controller("open", values), ControlParams()).knows == ()
 
 
 @pytest.mark.parametrize("knows", [("side", "jam"), ("map", "free")])

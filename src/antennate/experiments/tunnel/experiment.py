@@ -69,6 +69,8 @@ def sentence(result: Mapping[str, Any]) -> str:
     why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
     scene = result["scene"]
     what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
+    if known := result.get("knows"):  # results of older versions have none
+        what += f", knowing {' and '.join(known)}"
     text = f"{what} (95 % interval): {found}{test}." if found else ""
     text += f" {so_few}" if found and so_few else ""
     for name, reason in none_valid.items():
