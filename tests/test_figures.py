@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from antennate import figures as style
-from antennate.control.registry import BUILT_IN
+from antennate.control.registry import BUILT_IN, USUAL
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.taper import figure as taper
 from antennate.experiments.taper.experiment import TaperConfig
@@ -89,7 +89,7 @@ def summaries() -> dict[str, dict]:
     return dict.fromkeys(BUILT_IN, one)
 
 
-def trajectories(names=tuple(BUILT_IN), trials=range(4)):
+def trajectories(names=USUAL, trials=range(4)):
     found = rows()
     paths = {(row.controller, row.trial): path(2.0) for row in found}
     paths["open", 3] = path(-40.0)  # far out of the entrance
@@ -193,8 +193,8 @@ def test_axes_have_units():
 def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     figure = trajectories()
     titles = [panel.get_title(loc="left") for panel in figure.axes]
-    assert len(titles) == len(BUILT_IN) * 4
-    assert titles[:: len(BUILT_IN)] == [
+    assert len(titles) == len(USUAL) * 4
+    assert titles[:: len(USUAL)] == [
         "trial 0: out after 10.0 s",
         "trial 1: out after 20.0 s",
         "trial 2: out of time, 50 s",
@@ -202,7 +202,7 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     ]
     assert len(figure.legends) == 1
     named = [text.get_text() for panel in figure.axes for text in panel.texts]
-    assert named == list(BUILT_IN)
+    assert named == list(USUAL)
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4])

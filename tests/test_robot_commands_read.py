@@ -215,7 +215,7 @@ def run_replay(patch: Patch, config: ReplayConfig, tmp_path: Path) -> None:
 def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
     patch.setattr(twin, "parse_robot", lambda *_, **__: (config, twin.Places()))
     twin.command([])
-    if config.factory or config.scene == "flat":
+    if config.factory or config.scene != "tunnel":
         return
     robot = watched(config)[0]
     clock = LockstepClock(robot)
@@ -308,6 +308,20 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 },
             },
             {"duration": 0.05, "factory": True},
+            {
+                "duration": 0.05,
+                "seed": 2,
+                "trial": 1,
+                "scene": "corridors",
+                "corridors": {"pieces": [2, 2], "room_share": 0.5, "arm_share": 0.5},
+            },
+            {
+                "duration": 0.05,
+                "seed": 2,
+                "trial": 2,
+                "scene": "corridors",
+                "corridors": {"pieces": [2, 2], "room_share": 0.5, "arm_share": 0.5},
+            },
         ],
     ),
 }

@@ -277,7 +277,12 @@ def test_a_leg_turns_at_a_speed_in_velocity_mode_and_by_a_drive_in_pwm_mode() ->
 OF_A_ROBOT = (
     "--mains=60",
     *("--scene=flat", "--seed=3", "--trial=2", "--robot.mass=3", "--robot=hexapod"),
-    *("--tunnel.strewn=1", "--physics.timestep=0.001", "--variation.slip-time=2"),
+    *(
+        "--tunnel.strewn=1",
+        "--corridors.pace=60",
+        "--physics.timestep=0.001",
+        "--variation.slip-time=2",
+    ),
     *("--control.rate=50", "--control.gait.amplitude=0.1", "--battery.voltage=10"),
     *("--factory", "--touch=left@2s", "--pace=lockstep", "--udp=0", "--passed=gone"),
     *("--log=a.mcap", "--video=a.mp4", "--view", "--foxglove"),

@@ -63,7 +63,8 @@ def trajectories(
 ) -> Figure:
     """Trials from above: a row for each trial, a column for each controller.
 
-    Of a single trial the panels are larger and stand below one another.
+    Of a single trial the panels are larger and stand below one another. More than three
+    controllers stand in lines of two, or nobody could read their letters on a phone.
 
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
@@ -91,9 +92,16 @@ def trajectories(
         _name_column(panels[0, i], label)
     for panel in panels[-1]:
         panel.set_xlabel("x [m]")
-    for panel in panels[:, 0] if len(trials) > 1 else panels[0]:
+    for panel in panels[:, :: _in_a_line(len(controllers), len(trials))].flat:
         panel.set_ylabel("y [m]")
     return figure
+
+
+def _in_a_line(columns: int, trials: int) -> int:
+    """How many panels of one trial stand beside one another."""
+    if trials == 1:
+        return 1
+    return columns if columns <= 3 else 2
 
 
 def _panels(
@@ -104,21 +112,22 @@ def _panels(
     Every place is known, so nothing is left to a layout engine: with panels of a fixed aspect it
     puts titles on the letters above them.
     """
-    room = style.WIDTH - _LEFT - _RIGHT - (columns - 1) * _BETWEEN
-    alone = len(sides) == 1
-    width = style.WIDTH - _LEFT - _RIGHT if alone else max(_NARROWEST, room / columns)
+    beside = _in_a_line(columns, len(sides))
+    lines = math.ceil(columns / beside)
+    room = style.WIDTH - _LEFT - _RIGHT - (beside - 1) * _BETWEEN
+    width = max(_NARROWEST, room / beside)
     sizes = [side * width / max(side[0] for side in sides) for side in sides]
-    across = style.WIDTH if alone else style.WIDTH - room + columns * width
+    across = style.WIDTH - room + beside * width
     in_line = max(1, int(across // 2))
     low = _AXIS + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
-    down = [size[1] for size in sizes] * (columns if alone else 1)
-    gap = _AXIS + _HEAD if alone else _TICKS + _TITLE
+    down = [size[1] for size in sizes for _ in range(lines)]
+    gap = _AXIS + _HEAD if lines > 1 else _TICKS + _TITLE
     high = low + sum(down) + (len(down) - 1) * gap + _HEAD
     figure = Figure(figsize=(across, high))
     panels = np.empty((len(sides), columns), object)
     for j, i in np.ndindex(panels.shape):
-        line = i if alone else j
-        left = _LEFT + (0 if alone else i * (width + _BETWEEN))
+        line = j * lines + i // beside
+        left = _LEFT + i % beside * (width + _BETWEEN)
         base = high - _HEAD - sum(down[: line + 1]) - line * gap
         shape = left / across, base / high, sizes[j][0] / across, sizes[j][1] / high
         panels[j, i] = panel = figure.add_axes(shape)

@@ -56,8 +56,8 @@ CONTROLLER = (
     Measure("offset_m", "off the middle, successes", "m", form=".3f", least=0.0),
     Measure("offset_95", "  95 %", "m", form=".3f"),
     Measure("spring_low_n_m", of=smallest),
-    Measure("spring_high_n_m", "torque of a spring, largest", "N·mm", of=largest, scale=1e3),
-    Measure("spring_cycles", "  its load cycles, most", of=largest, form="d", least=0.0),
+    Measure("spring_high_n_m", "spring torque, most", "N·mm", of=largest, scale=1e3),
+    Measure("spring_cycles", "  load cycles, most", of=largest, form="d", least=0.0),
 )
 TIME = Measure(
     *("time_s", "time, a failure as the limit", "s"), form=".1f", least=0.0, most="time_limit"
