@@ -205,7 +205,7 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
         (
-            ["tunnel", "--controllers", "zigzag"],
+            ["tunnel", "--controllers", "dance"],
             ["controllers: expected one of open, timed, paper, closed, "],
         ),
         (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),

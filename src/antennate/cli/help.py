@@ -23,6 +23,7 @@ SHORT_LINES = 46
 
 _LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--key")
 _LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
+_LATER += ("--readings", "--knows")
 """Options that nobody uses first: they come last on the short page."""
 
 

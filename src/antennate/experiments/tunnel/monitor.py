@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Literal, Union
 
 import numpy as np
 
-from antennate.antenna.springs import SpringLoad, largest_load
 from antennate.errors import SceneError
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
@@ -23,6 +22,7 @@ from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
 if TYPE_CHECKING:
+    from antennate.antenna.springs import SpringLoad
     from antennate.sim.warp.robot import WarpRow
 
 Outcome = Literal["success", "timeout", "left", "invalid"]
@@ -183,6 +183,8 @@ class TrialMonitor:
 
     def _load(self, world: Watched) -> SpringLoad:
         """What the springs of the antennae bore; beyond a hinge's range its holders meet."""
+        from antennate.antenna.springs import SpringLoad, largest_load  # not for a bad flag
+
         hinges = len(world.bends())
         if not hinges:
             return SpringLoad()
