@@ -279,7 +279,6 @@ OF_A_ROBOT = (
     *("--scene=flat", "--seed=3", "--trial=2", "--robot.mass=3", "--robot=hexapod"),
     *(
         "--tunnel.strewn=1",
-        "--corridors.pace=60",
         "--physics.timestep=0.001",
         "--variation.slip-time=2",
     ),
