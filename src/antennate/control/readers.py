@@ -5,25 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antennate.params.base import paths_of
-from antennate.params.control import ControlParams, EscapeParams, RepetitionParams
+from antennate.params.control import ControlParams, EscapeParams, RepetitionParams, SearchParams
 from antennate.params.gaits import LiftParams
 from antennate.robots.spec import RobotSpec
 
 TELEOP = "keys of teleop"
 """Stands for the controller of `teleop`, which has no name."""
-BY_CONTACT = "closed by contact"
-"""Stands for `closed` with `escape.trigger` `contact`."""
+BY_CONTACT = "closed-1 by contact"
+"""Stands for `closed-1` with `escape.trigger` `contact`."""
 _BLOCKED = ("rule.strong", "rule.similar")
 """When the published table backs off."""
 _REPEATED = ("repetition.window_cycles", "repetition.change")
 """When readings repeat."""
 _ESCAPE = (*paths_of(RepetitionParams, "repetition"), *paths_of(EscapeParams, "escape"))
+_SEARCH = paths_of(SearchParams, "search")
+_OTHER_ESCAPE = tuple(
+    path for path in paths_of(EscapeParams, "escape") if path != "escape.turn_offset"
+)
+"""What the search has in place of an escape: all but how fast it turns."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
-    "open": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_ESCAPE),
-    "paper": _ESCAPE,
-    "closed": ("gait.turn_offset", *_BLOCKED, "rule.hold_time"),
-    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED),
-    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE),
+    "open": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_ESCAPE, *_SEARCH),
+    "paper": (*_ESCAPE, *_SEARCH),
+    "closed": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_OTHER_ESCAPE),
+    "closed-1": ("gait.turn_offset", *_BLOCKED, "rule.hold_time", *_SEARCH),
+    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_SEARCH),
+    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_SEARCH),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 
@@ -33,7 +39,7 @@ def unread(name: str, control: ControlParams) -> set[str]:
 
     A controller of one's own may read all.
     """
-    by_contact = name == "closed" and control.escape.trigger == "contact"
+    by_contact = name == "closed-1" and control.escape.trigger == "contact"
     return set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
 
 

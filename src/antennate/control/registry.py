@@ -22,12 +22,16 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "open": controllers.open_loop,
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
+    "closed-1": controllers.closed_1,
 }
+USUAL = ("open", "paper", "closed")
+"""Those of ours that are run if none is named."""
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
-    "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
+    "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
+    "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
 }
 """What ours do, for who meets them for the first time."""
 RIVAL = "open"

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.readers import unread_by_all
-from antennate.control.registry import BUILT_IN, CONTROLLERS
+from antennate.control.registry import CONTROLLERS, USUAL
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.readers import HARDWARE_ALONE
@@ -24,7 +24,7 @@ class TunnelConfig(TrialConfig):
     )
     """Trials of every controller."""
     controllers: tuple[str, ...] = number(
-        tuple(BUILT_IN),
+        USUAL,
         "1",
         "assumed: all of ours",
         min_length=1,
