@@ -180,7 +180,7 @@ class EscapeParams(Params):
     )
     """Time to back off."""
     turn_time: float = number(
-        2.2, "s", "fitted: `closed-1` on 60 tuning tunnels; about 50 deg at turn_offset", gt=0, le=30
+        2.2, "s", "fitted: `closed-1` on 60 tuning tunnels; about 50 deg", gt=0, le=30
     )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
