@@ -20,15 +20,17 @@ PARAMS = SearchParams(
     reverse_most=3.0,
     turn_time=2.0,
     growth=2.0,
+    feel_time=0.5,
+    wrong_side=0.4,
     free_time=1.0,
     proof_time=9.0,
-    memory_time=4.0,
     lost_time=4.0,
     return_time=12.0,
 )
 FORWARD, TURN_L, TURN_R = Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R
 REVERSE, HOLD = Maneuver.REVERSE, Maneuver.HOLD
-LEFT, RIGHT = (0.9, 0.2), (0.2, 0.9)
+LEFT, RIGHT, BOTH = (0.9, 0.2), (0.2, 0.9), (0.5, 0.5)
+"""Flex of both antennae, as a share of the range."""
 Story = list[tuple[Maneuver, float]]
 
 
@@ -36,24 +38,43 @@ def story(
     until: float,
     stuck: Callable[[float], bool] = lambda t: True,
     feels: Callable[[float], bool] = lambda t: True,
-    level: Callable[[float], tuple[float, float]] = lambda t: LEFT,
+    flex: Callable[[float], tuple[float, float]] = lambda t: BOTH,
     params: SearchParams = PARAMS,
 ) -> Story:
     """Maneuvers and how long each lasted [s]."""
     search, said = Search(params, 1, PERIOD), list[Maneuver]()
     for i in range(round(until / PERIOD)):
         t = i * PERIOD
-        rows = (np.array([level(t)]), np.array([stuck(t)]), np.array([feels(t)]))
+        rows = (np.array([flex(t)]), np.array([stuck(t)]), np.array([feels(t)]))
         said.append(Maneuver(int(search.step(np.array([t]), *rows)[0])))
     return [(m, len(list(run)) * PERIOD) for m, run in itertools.groupby(said)]
 
 
-@pytest.mark.parametrize(("touched", "away"), [(LEFT, TURN_R), (RIGHT, TURN_L)])
-def test_it_backs_off_and_turns_away_from_the_side_that_touched(
-    touched: tuple[float, float], away: Maneuver
+@pytest.mark.parametrize(("bent", "away"), [(LEFT, TURN_R), (RIGHT, TURN_L)])
+def test_it_turns_away_from_the_antenna_that_stays_bent_while_it_backs_off(
+    bent: tuple[float, float], away: Maneuver
 ) -> None:
-    said = story(10.0, lambda t: t == 4.0, level=lambda t: touched)
+    """Whatever was felt before."""
+    before = LEFT if bent == RIGHT else RIGHT
+
+    def flex(t: float) -> tuple[float, float]:
+        return before if t < 4.0 else bent if t < 5.0 else BOTH
+
+    said = story(10.0, lambda t: t == 4.0, flex=flex)
     assert said == [(FORWARD, 4.0), (REVERSE, 1.0), (away, 2.0), (FORWARD, 3.0)]
+
+
+def test_it_turns_back_at_once_where_the_opposite_antenna_is_bent_at_the_end_of_a_turn() -> None:
+    """From 2 s of turning right to 4 s left of the first heading; then it walks in any case."""
+    said = story(20.0, lambda t: t == 4.0, flex=lambda t: LEFT if 5.0 <= t < 7.0 else RIGHT)
+    assert said[1:4] == [(REVERSE, 1.0), (TURN_L, 2.0), (FORWARD, 13.0)]
+    said = story(20.0, lambda t: t == 4.0, flex=lambda t: LEFT)
+    assert said[1:] == [(REVERSE, 1.0), (TURN_R, 2.0), (TURN_L, 6.0), (FORWARD, 7.0)]
+
+
+def test_what_is_bent_on_the_side_of_the_turn_says_nothing() -> None:
+    said = story(10.0, lambda t: t == 4.0, flex=lambda t: LEFT if t < 5.0 else RIGHT)
+    assert said[1:] == [(REVERSE, 1.0), (TURN_R, 2.0), (FORWARD, 3.0)]
 
 
 def test_it_walks_for_its_patience_before_each_escape() -> None:
@@ -108,9 +129,9 @@ def test_without_a_turn_before_it_walks_on_where_nothing_is_felt() -> None:
 
 
 def test_it_holds_while_a_reading_is_not_known_and_goes_on_then() -> None:
-    def level(t: float) -> tuple[float, float]:
-        return (math.nan, 0.2) if 4.5 <= t < 5.5 else LEFT
+    def flex(t: float) -> tuple[float, float]:
+        return (math.nan, 0.5) if 4.5 <= t < 5.5 else BOTH
 
-    said = story(8.0, lambda t: t == 4.0, level=level)
+    said = story(8.0, lambda t: t == 4.0, flex=flex)
     held = [(FORWARD, 4.0), (REVERSE, 0.5), (HOLD, 1.0), (TURN_R, 2.0), (FORWARD, 0.5)]
     assert said == held

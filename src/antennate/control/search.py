@@ -1,12 +1,15 @@
 """The search of `closed`: walk with patience, back off when stuck, and look for the way on.
 
-Turns are counted from the heading in which the robot got stuck first. They go to both sides in
-turn, each farther than the last, and the robot backs off for longer each time, so that no try
-repeats another. What it feels while it walks ends the search: nothing for `free_time`, or a walk of
-`proof_time` that was not stuck, proves that the robot gets on. The next jam is then a new one.
+Touch says when: the robot escapes once its readings repeat, though not before `patience`, since an
+escape that comes too early repeats itself. Touch says where to: the first turn goes away from the
+antenna that stays bent while the robot backs off, when the wall ahead is left behind and only the
+walls beside it are felt. At the end of a turn the opposite antenna is bent where the robot has
+turned to the wrong side; then it turns to the other side at once. And touch says when a search is
+over: nothing felt for `free_time`, or a walk of `proof_time` that was not stuck, proves that the
+robot gets on, and the next jam is a new one.
 
-The robot looks at its readings only after `patience`, since it needs a while to get away from where
-it was, and an escape that comes too early repeats itself.
+Until then turns go to both sides by turns, each farther from the heading in which the robot was
+stuck first, and it backs off for longer each time, so that no try repeats another.
 """
 
 from __future__ import annotations
@@ -25,57 +28,56 @@ _FORWARD, _REVERSE = int(Maneuver.FORWARD), int(Maneuver.REVERSE)
 class Search:
     """The search of each row.
 
+    Args:
+        params: Times and sizes.
+        batch: Number of rows B.
+        period: Control period [s].
+
     Attributes:
         maneuver: `Maneuver` of each row, shape (B,).
-        touch: Mean bending levels while walking, shape (B, 2).
-        tries: Turns since the last proof of getting on, shape (B,).
+        tries: Turns since the last proof that it gets on, shape (B,).
     """
 
     def __init__(self, params: SearchParams, batch: int, period: float) -> None:
-        self._params = params
-        self._gain = period / params.memory_time
+        self._params, self._period = params, period
+        self._gain = min(1.0, period / params.feel_time)
         self.maneuver: Ints = np.full(batch, _FORWARD)
-        self.touch: Floats = np.zeros((batch, 2))
         self.tries: Ints = np.zeros(batch, dtype=np.int64)
         self._begun: Floats = np.full(batch, np.nan)
         self._until: Floats = np.zeros(batch)
         self._felt: Floats = np.zeros(batch)
-        self._right: Bools = np.zeros(batch, dtype=bool)
+        self._lean: Floats = np.zeros(batch)
         self._turned: Floats = np.zeros(batch)
-        self._searching: Bools = np.zeros(batch, dtype=bool)
+        self._right, self._at_once, self._searching = np.zeros((3, batch), dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
         self.maneuver[rows] = _FORWARD
-        self.touch[rows] = 0.0
         self.tries[rows] = 0
         self._begun[rows] = np.nan
-        self._turned[rows] = 0.0
         self._searching[rows] = False
 
-    def step(self, t: Floats, level: Floats, stuck: Bools, pressed: Bools) -> Ints:
+    def step(self, t: Floats, flex: Floats, stuck: Bools, pressed: Bools) -> Ints:
         """The maneuver of every row.
 
         Args:
             t: Time [s], shape (B,).
-            level: Bending levels, shape (B, 2); a row with NaN holds and keeps its state.
+            flex: 0 straight, 1 fully bent, shape (B, 2); a row with NaN holds and keeps its state.
             stuck: Rows found stuck, shape (B,).
             pressed: Rows with at least one pressed antenna, shape (B,).
 
         Returns:
             One `Maneuver` a row, shape (B,).
         """
-        params = self._params
-        known = ~np.isnan(level[:, LEFT] + level[:, RIGHT])
+        params, lean = self._params, flex[:, LEFT] - flex[:, RIGHT]
+        known = ~np.isnan(lean)
         walking = known & (self.maneuver == _FORWARD)
-        self.touch += np.where(walking[:, None], level - self.touch, 0.0) * self._gain
-        self._felt = np.where(walking & ~pressed, self._felt, t)
         self._begun = np.where(np.isnan(self._begun), t, self._begun)
-        over = known & ~walking & (t >= self._until)
-        if np.count_nonzero(over):
-            backed = over & (self.maneuver == _REVERSE)
-            self._walk(over & ~backed, t)
-            self._turn(backed, t)
+        self._felt = np.where(walking & ~pressed, self._felt, t)
+        escaping = known & ~walking
+        if np.count_nonzero(escaping):
+            self._feel(escaping, lean)
+            self._go_on(escaping & (t >= self._until), t)
         walked, free = t - self._begun, t - self._felt
         proved = walking & ((free >= params.free_time) | (walked >= params.proof_time))
         self.tries = np.where(proved, 0, self.tries)
@@ -87,16 +89,31 @@ class Search:
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
 
-    def _walk(self, rows: Bools, t: Floats) -> None:
-        self.maneuver = np.where(rows, _FORWARD, self.maneuver)
-        self._begun = np.where(rows, t, self._begun)
+    def _feel(self, rows: Bools, lean: Floats) -> None:
+        """Left minus right flex: its integral while backing off, its mean while turning."""
+        backing = self.maneuver == _REVERSE
+        change = np.where(backing, lean * self._period, (lean - self._lean) * self._gain)
+        self._lean += np.where(rows, change, 0.0)
+
+    def _go_on(self, over: Bools, t: Floats) -> None:
+        """What comes after a maneuver that is over."""
+        backed = over & (self.maneuver == _REVERSE)
+        against = np.where(self._right, self._lean, -self._lean)
+        tried = over & ~backed & (self.tries > 0)
+        wrong = tried & ~self._at_once & (against > self._params.wrong_side)
+        walks = over & ~backed & ~wrong
+        self.maneuver = np.where(walks, _FORWARD, self.maneuver)
+        self._begun = np.where(walks, t, self._begun)
+        first = backed & (self.tries == 0)
+        self._right = np.where(first, self._lean >= 0.0, self._right ^ (wrong | (backed & ~first)))
+        self._at_once = (self._at_once & ~backed) | wrong
+        if np.count_nonzero(backed | wrong):
+            self._turn(backed | wrong, t)
 
     def _back_off(self, rows: Bools, t: Floats) -> None:
-        """Back off, and choose the side to turn to then."""
-        params, first = self._params, rows & (self.tries == 0)
-        away = self.touch[:, LEFT] >= self.touch[:, RIGHT]
-        self._right = np.where(rows, np.where(first, away, ~self._right), self._right)
-        self._turned = np.where(first, 0.0, self._turned)
+        params = self._params
+        self._turned = np.where(rows & (self.tries == 0), 0.0, self._turned)
+        self._lean = np.where(rows, 0.0, self._lean)
         time = np.minimum(params.reverse_time * params.growth**self.tries, params.reverse_most)
         self.maneuver = np.where(rows, _REVERSE, self.maneuver)
         self._until = np.where(rows, t + time, self._until)
@@ -108,7 +125,8 @@ class Search:
         turn = np.where(self._right, size, -size) - self._turned
         self._turn_by(rows, turn, t)
         self._turned += np.where(rows, turn, 0.0)
-        self.tries += rows
+        self._lean = np.where(rows, 0.0, self._lean)
+        self.tries = self.tries + rows
         self._searching |= rows
 
     def _return(self, rows: Bools, t: Floats) -> None:
@@ -120,7 +138,7 @@ class Search:
 
     def _turn_by(self, rows: Bools, turn: Floats, t: Floats) -> None:
         """Turn for a time [s], to the right if it is positive."""
-        side = np.where(turn > 0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
+        side = np.where(turn > 0.0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
         self.maneuver = np.where(rows, side, self.maneuver)
         self._until = np.where(rows, t + np.abs(turn), self._until)
 
@@ -143,7 +161,7 @@ class SearchRule:
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""
-        unknown = np.isnan(level[:, LEFT] + level[:, RIGHT])
+        unknown = np.isnan(flex[:, LEFT] + flex[:, RIGHT])
         walking = (self._search.maneuver == _FORWARD) & ~unknown
         left, right = (flex > self._pressure).T
-        return self._search.step(t, level, self._detector.step(flex, walking), left | right)
+        return self._search.step(t, flex, self._detector.step(flex, walking), left | right)

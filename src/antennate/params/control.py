@@ -224,31 +224,43 @@ class EscapeParams(Params):
 class SearchParams(Params):
     """How `closed` looks for the way on when stuck: with patience, and with turns that grow.
 
-    Fitted on tuning draws alone (seeds 410001 to 410004, docs/science/tunnel.md).
+    Fitted on tuning draws alone (seed 410001, docs/science/tunnel.md).
     """
 
-    patience: float = number(3.0, "s", "fitted: tuning draws", ge=0, le=60)
+    patience: float = number(
+        3.0, "s", "fitted: tuning draws; an escape that comes too early repeats itself", ge=0, le=60
+    )
     """Shortest walk between two escapes."""
-    reverse_time: float = number(2.2, "s", "fitted: as escape.reverse_time", gt=0, le=30)
+    reverse_time: float = number(2.2, "s", "assumed: as escape.reverse_time", gt=0, le=30)
     """Time to back off at first."""
     reverse_most: float = number(5.0, "s", "assumed: more than the body", gt=0, le=30)
     """Longest time to back off."""
-    turn_time: float = number(2.4, "s", "fitted: tuning draws; about 55 deg free", gt=0, le=30)
+    turn_time: float = number(2.6, "s", "assumed: about 60 deg in free space", gt=0, le=30)
     """Time of the first turn."""
-    growth: float = number(1.3, "1", "fitted: tuning draws", ge=1, le=3)
+    growth: float = number(
+        1.2, "1", "assumed: the fifth turn is twice the first from the first heading", ge=1, le=3
+    )
     """Factor of each further turn from the first heading, and of backing off."""
+    feel_time: float = number(
+        0.5, "s", "fitted: 86 turns of tuning draws; 0.3 to 1 s tell as much", gt=0, le=10
+    )
+    """Time constant of what is felt while turning."""
+    wrong_side: float = number(
+        0.4, "1", "fitted: 86 turns of tuning draws; 49 % of wrong ones, 13 % of others", gt=0, le=2
+    )
+    """Flex of the opposite antenna above that of the side turned to: a turn to the wrong side."""
     free_time: float = number(
-        1.0, "s", "fitted: nothing felt for so long means free with 95 %", gt=0, le=60
+        1.0, "s", "fitted: after such a time the way is free with 95 %", gt=0, le=60
     )
     """Nothing felt for so long proves that the robot gets on."""
-    proof_time: float = number(8.0, "s", "fitted: tuning draws", gt=0, le=300)
+    proof_time: float = number(8.0, "s", "assumed: five gait cycles", gt=0, le=300)
     """A walk of so long proves that the robot gets on."""
-    memory_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=300)
-    """Time constant of the memory of touch."""
-    lost_time: float = number(4.0, "s", "fitted: tuning draws", gt=0, le=3600)
+    lost_time: float = number(
+        4.0, "s", "fitted: tuning draws; with 2 s it turns round in wide corridors", gt=0, le=3600
+    )
     """Nothing felt for so long after a turn means that the walls are lost."""
-    return_time: float = number(7.5, "s", "assumed: about 180 deg at the offset", gt=0, le=60)
-    """Time to turn round; no turn is longer from the first heading."""
+    return_time: float = number(7.5, "s", "assumed: about 180 deg in free space", gt=0, le=60)
+    """Time to turn round; no heading is farther than that from the first one."""
 
 
 class ControlParams(Params):
