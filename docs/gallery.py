@@ -27,7 +27,12 @@ FIGURES = {
     "study.png": "map.png",
 }
 """Names in the run where they are not those of the picture."""
-SCRIPTS = {"tunnel.webp": "film.py", "replay.png": "replay.py"}
+SCRIPTS = {
+    "tunnel.webp": "film.py",
+    "replay.png": "replay.py",
+    "corridors.png": "scenes.py",
+    "hard.png": "scenes.py",
+}
 """What draws the pictures that no single command draws."""
 FEW = {
     "force": "--profiles descending --speeds 0.15 --place-step 0.1",
@@ -108,8 +113,8 @@ def main() -> None:
         elif not options.quick:
             if figures:
                 draw([name, *rest], figures, IMAGES)
-            for picture in by_script:
-                subprocess.run([sys.executable, ROOT / SCRIPTS[picture]], check=True)
+            for script in dict.fromkeys(SCRIPTS[picture] for picture in by_script):
+                subprocess.run([sys.executable, ROOT / script], check=True)
 
 
 if __name__ == "__main__":

@@ -258,8 +258,7 @@ def test_progress_follows_the_sites_on_the_way(tmp_path):
     assert instance.length == pytest.approx(2.0 + 3.0 + 1.0)
     assert instance.start == pytest.approx((1.0, 1.0, math.pi / 2))
     assert instance.progress(np.array([2.0, 3.2])) == pytest.approx(3.0)
-    assert instance.succeeded(np.array([4.1, 1.9]))
-    assert not instance.succeeded(np.array([4.6, 1.9])), "beside the exit, 0.5 m from its middle"
+    assert instance.exit == pytest.approx(np.array([[4.5, 2.0], [3.5, 2.0]])), "left, then right"
     assert not instance.left(np.array([4.7, 3.7]))
     assert instance.left(np.array([4.9, 3.0])), "farther than 0.8 m from the route"
 

@@ -26,6 +26,7 @@ from antennate.antenna.curves import (
 from antennate.antenna.plateau import SHARE, plateau_of
 from antennate.antenna.rivals import MOST_GROUPS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.control.conditioning import usable
 from antennate.errors import CalibrationError
 from antennate.jackknife import jackknife95
 from antennate.types import Floats, Ints
@@ -39,8 +40,6 @@ _FOLDS = 10
 """Folds of the cross-validation."""
 _FARTHEST = 10.0
 """Largest level, which is 0 to 1 but for errors."""
-_RAILS = (0.0, 4090.0)
-"""Readings at or beyond these say nothing about the level [counts]."""
 
 
 def check(samples: Samples) -> None:
@@ -55,7 +54,7 @@ def check(samples: Samples) -> None:
             f"row {samples.row[-1] if len(counts) else 1}: expected at least {FEWEST} readings, "
             f"found {len(counts)}; record longer"
         )
-    railed = (counts <= _RAILS[0]) | (counts >= _RAILS[1])
+    railed = ~usable(counts)
     if railed.mean() > SHARE:
         first = int(np.argmax(railed))
         raise CalibrationError(

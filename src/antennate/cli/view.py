@@ -19,8 +19,8 @@ from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, ConfigError
 from antennate.params.base import Params
 from antennate.params.reading import from_values
-from antennate.sim.scenes.registry import SHIPPED, make_scene
-from antennate.sim.trial import TrialConfig, draw_trial
+from antennate.sim.scenes.registry import SHIPPED
+from antennate.sim.trial import TrialConfig, draw_trial, scene_of
 from antennate.sim.world import World
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
@@ -97,7 +97,7 @@ def arena_of(path: Path, header: Header) -> World | None:
         gait, period = header.params.gait, header.params.period
         seed = config.seed if header.seed is None else header.seed
         config = config.model_copy(update={"seed": seed})
-        scene = make_scene(config.scene, config.tunnel)
+        scene = scene_of(config)
         return draw_trial(config, scene, header.trial, gait, period).world
     except AntennateError:
         return None  # the log is shown all the same, on a bare floor

@@ -1,7 +1,8 @@
 """Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
 
-A sample that is not finite makes the level of its side NaN as long as it is in the window of the
-mean. `contact.py` turns NaN into UNKNOWN.
+A sample that cannot be used, one that is missing or at a rail of the converter, makes the level of
+its side NaN as long as it is in the window of the mean. `contact.py` turns NaN into UNKNOWN. So a
+broken wire is UNKNOWN in simulation, too; on a robot the diagnosis of each channel finds more.
 """
 
 from __future__ import annotations
@@ -12,6 +13,19 @@ import numpy as np
 
 from antennate.params.control import ConditioningParams, ControlParams, CurveParams
 from antennate.types import Bools, Floats, Ints
+
+LOW_RAIL = 5.0
+"""Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
+HIGH_RAIL = 4090.0
+"""Readings from this on are at the upper rail [counts]: two sigma below full scale (assumed)."""
+
+
+def usable(counts: Floats) -> Bools:
+    """Whether readings [counts] are finite and between the rails, same shape.
+
+    A wire that is open at the flex sensor or shorted reads a rail, whatever the antenna does.
+    """
+    return (counts > LOW_RAIL) & (counts < HIGH_RAIL)
 
 
 def sigmoid(z: Floats) -> Floats:
@@ -91,7 +105,7 @@ class RunningMean:
 
     def step(self, counts: Floats) -> Floats:
         """Take one reading, shape (B, 2) [counts], and return the mean, same shape."""
-        self._ring[self._next] = np.where(np.isfinite(counts), counts, np.nan)
+        self._ring[self._next] = np.where(usable(counts), counts, np.nan)
         self._next = (self._next + 1) % self.length
         total = np.add.reduce(self._ring, axis=0)
         if not self._short:

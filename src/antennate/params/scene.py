@@ -96,6 +96,107 @@ class VariationParams(Params):
     """Standard deviation of the logarithm of a leg's friction factor."""
     slip_time: float = number(2.5, "s", "assumed: a few steps", gt=0)
     """Time after which a leg's friction is drawn anew."""
+    reading_noise: float = number(1.0, "1", "assumed: as the flex sensor has it", ge=0, le=100)
+    """Factor on the noise of all readings."""
+    broken: Literal["none", "left", "right", "random"] = number(
+        "none", "1", "assumed: both are whole"
+    )
+    """Antenna that is broken off: its flex sensor stays straight."""
+
+
+class CorridorsParams(Params):
+    """A distribution of corridors: how many pieces, how long, how wide, with what in them.
+
+    From low to high all are uniform, but the mass: its logarithm is. What cannot stand, as a
+    corridor that runs into itself, is drawn anew.
+    """
+
+    pieces: tuple[int, int] = number(
+        (1, 4), "1", "assumed: from no corner to three, one more than a U-turn"
+    )
+    """Straight pieces, fewest and most."""
+    length: tuple[float, float] = number(
+        (0.5, 3.0), "m", "assumed: from less than the robot's 0.72 m to four times that"
+    )
+    """Length of a piece, shortest and longest."""
+    largest_turn: float = number(
+        120.0, "deg", "assumed: beyond, the way back is nearer than the way on", ge=0, le=120
+    )
+    """Largest turn between two pieces, to either side."""
+    straight_share: float = number(
+        0.2, "1", "assumed: a way that goes straight on must not be turned out of", ge=0, le=1
+    )
+    """Share of turns that are none."""
+    free_width: tuple[float, float] = number(
+        (0.36, 0.60), "m", "paper: twice the robot's width is 0.4 m; assumed: to three times it"
+    )
+    """Free width between the linings, narrowest and widest."""
+    mass: tuple[float, float] = number(
+        (0.05, 0.5), "kg", "assumed: half of our paper tube, to what the robot hardly pushes"
+    )
+    """Mass of the cylinders of one draw, least and most."""
+    strewn: tuple[float, float] = number((0.0, 3.0), "1/m", "assumed: the tunnel has 2 on a metre")
+    """Cylinders that stand in the way, on a metre, fewest and most."""
+    room_share: float = number(0.2, "1", "assumed: sometimes", ge=0, le=1)
+    """Share of draws with a room."""
+    room_length: tuple[float, float] = number(
+        (0.8, 1.2), "m", "assumed: about the room of the scene `room`, 1 m"
+    )
+    """Length of a room, shortest and longest."""
+    room_width: tuple[float, float] = number(
+        (0.9, 1.4), "m", "assumed: about the room of the scene `room`, 1.2 m"
+    )
+    """Width of a room, narrowest and widest."""
+    arm_share: float = number(0.2, "1", "assumed: sometimes", ge=0, le=1)
+    """Share of draws of two and more pieces with a blind arm, straight on where the way turns."""
+    arm_depth: tuple[float, float] = number(
+        (0.3, 1.0), "m", "assumed: from a niche to more than the robot's length"
+    )
+    """Depth of a blind arm behind the outer wall of the turn, least and most."""
+    arm_turn: float = number(
+        60.0,
+        "deg",
+        "assumed: at a smaller turn arm and way part too slowly to be two",
+        ge=30,
+        le=120,
+    )
+    """Smallest turn at which an arm goes straight on."""
+    pace: float = number(
+        50.0, "s/m", "paper: 0.04 m/s without feedback, half of that: 100 s for 2 m", gt=0, le=1000
+    )
+    """Time limit of a draw on a metre of its way."""
+
+    @model_validator(mode="after")
+    def _ranges(self) -> CorridorsParams:
+        least = {
+            "pieces": 1,
+            "length": 0.3,
+            "free_width": 0.1,
+            "mass": 1e-3,
+            "strewn": 0.0,
+            "room_length": 0.1,
+            "room_width": 0.1,
+            "arm_depth": 0.05,
+        }
+        most = {"pieces": 10, "length": 20.0, "free_width": 2.0, "mass": 10.0, "strewn": 20.0}
+        for name, bound in least.items():
+            low, high = getattr(self, name)
+            if not bound <= low <= high <= most.get(name, 5.0):
+                raise ValueError(
+                    f"{name} must rise from at least {bound:g} to at most {most.get(name, 5.0):g}, "
+                    f"found {low:g} and {high:g}"
+                )
+        if self.room_share + self.arm_share > 1:
+            raise ValueError(
+                f"room_share and arm_share must not exceed 1 together, found "
+                f"{self.room_share + self.arm_share:g}: a draw has one of them at most"
+            )
+        if self.arm_share and self.largest_turn < self.arm_turn:
+            raise ValueError(
+                f"largest_turn must be at least arm_turn, {self.arm_turn:g} deg, where there are "
+                f"blind arms, found {self.largest_turn:g} deg"
+            )
+        return self
 
 
 class PhysicsParams(Params):

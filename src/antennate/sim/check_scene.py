@@ -13,7 +13,7 @@ from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
-from antennate.sim.trial import MEMBERS, make_world, place_at_start, require_room
+from antennate.sim.trial import MEMBERS, Judge, make_world, place_at_start, require_room
 from antennate.types import Floats
 
 _SEEDS = (0, 1, 2)
@@ -32,8 +32,8 @@ def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
 
     The same seed gives the same instance, other seeds give others if the scene says that it is
     random. An instance compiles; the robot has room at its start and stands there. Progress is 0 at
-    the start, grows ahead of it and is the length at the exit; the head has succeeded past the exit
-    and not before, and has left far outside and not at the start.
+    the start, grows ahead of it and is the length at the exit; the head succeeds by crossing the
+    exit and not before it, and has left far outside and not at the start.
 
     Args:
         scene: The scene.
@@ -95,8 +95,9 @@ def _check_course(drawn: SceneInstance) -> None:
     first, then = drawn.progress(start.copy()), drawn.progress(start + _STEP * ahead)
     expect(abs(first) < 1e-3, "progress 0 m at the start", f"{first} m")
     expect(then > first, f"progress to grow over {_STEP} m ahead of the start", f"{then} m")
-    expect(not drawn.succeeded(start.copy()), "no success at the start", "success")
-    expect(not drawn.left(start.copy()), "a start inside", "a robot that has left")
+    ended = _ended(drawn, start)
+    expect(ended != "success", "no success at the start", "success")
+    expect(ended is None, "a start inside", "a robot that has left")
     _check_exit(drawn)
     for turn in np.arange(8) * math.pi / 4:
         where = start + _FAR * np.array([math.cos(turn), math.sin(turn)])
@@ -113,11 +114,22 @@ def _check_exit(drawn: SceneInstance) -> None:
     ways = [drawn.progress(side) for side in sides]
     expect(bool(np.isfinite(ways).all()), "finite progress about the exit", f"{ways} m")
     before, past = sorted(sides, key=drawn.progress)
-    expect(drawn.succeeded(past), f"success past the exit, at {_shown(past)}", "none")
-    expect(not drawn.succeeded(before), f"no success before it, at {_shown(before)}", "success")
-    expect(not drawn.left(before), f"{_shown(before)}, before the exit, inside", "outside")
+    there = _ended(drawn, before)
+    expect(there != "success", f"no success before it, at {_shown(before)}", "success")
+    expect(there is None, f"{_shown(before)}, before the exit, inside", "outside")
+    out = _ended(drawn, before, past)
+    expect(out == "success", f"success past the exit, at {_shown(past)}", "none")
     gap = drawn.progress(middle) - drawn.length
     expect(abs(gap) < _NEAR, "progress at the exit to be the length", f"{gap:+.3f} m more")
+
+
+def _ended(drawn: SceneInstance, *heads: Floats) -> str | None:
+    """How a trial ends whose head is seen at these places, one after the other."""
+    judge = Judge(drawn)
+    try:
+        return [judge.look(head.copy()) for head in heads][-1]
+    except AntennateError as error:
+        raise AssertionError(f"expected to be told how a trial ends, found: {error}") from error
 
 
 def _shown(where: Floats) -> str:

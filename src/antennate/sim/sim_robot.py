@@ -25,9 +25,13 @@ NOISE_BLOCK = 1024
 class Disturbance:
     """What chance does to one trial: sensor noise, slipping legs, joints off their zero.
 
+    An antenna that is broken off is one whose flex sensor stays straight.
+
     Attributes:
         joint_bias: Error of the zero of each yaw joint [rad], shape (Y,).
         slip_ticks: Ticks from one friction of the legs to the next.
+        bends: 1 for each flex sensor that bends with its antenna, 0 for one that stays straight,
+            shape (2,).
     """
 
     def __init__(
@@ -42,6 +46,11 @@ class Disturbance:
         self.slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
         self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
+        self.bends: Floats = np.ones(2)
+        if variation.broken != "none":
+            random = variation.broken == "random"
+            side = int(rng.integers(2)) if random else ("left", "right").index(variation.broken)
+            self.bends[side] = 0.0
 
     def noise(self, tick: int) -> Floats:
         """Reading noise of one tick [counts], shape (2,)."""
@@ -52,7 +61,8 @@ class Disturbance:
 
     def noise_block(self) -> Floats:
         """Reading noise of the next NOISE_BLOCK ticks [counts], shape (NOISE_BLOCK, 2)."""
-        return reading_noise(self._robot.antenna.sensor, self._rng, (NOISE_BLOCK, 2))
+        noise = reading_noise(self._robot.antenna.sensor, self._rng, (NOISE_BLOCK, 2))
+        return self._variation.reading_noise * noise
 
     def leg_friction(self, tick: int) -> Floats | None:
         """New friction of all legs where this tick draws one, else None."""
@@ -105,6 +115,7 @@ class SimRobot:
         sensed = robot.antenna.sensed_hinges if robot.antenna_count else 0
         self._states = States(batch, sensed)
         self._bias: Floats = np.zeros((batch, robot.yaw_count))
+        self._bends: Floats = np.ones((batch, 2))
         self._noise: Floats = np.zeros((batch, NOISE_BLOCK, 2))
         self._every: Ints = np.arange(batch)
         self._empty, self._missing = np.ones((2, batch), dtype=bool)
@@ -120,7 +131,7 @@ class SimRobot:
         self.unload(row)
         self._rows[row] = _Row(world, chance)
         self._states.put(row, world)
-        self._bias[row] = chance.joint_bias
+        self._bias[row], self._bends[row] = chance.joint_bias, chance.bends
         self._sensors.reset(row)
         self._empty[row], self._missing[row] = False, not world.robot.antenna_count
 
@@ -165,7 +176,7 @@ class SimRobot:
             if not at[i]:
                 self._noise[i] = row.chance.noise_block()
         noise = self._noise[self._every, at]
-        counts = self._sensors.step(self._states.hinges.sum(axis=2), noise)
+        counts = self._sensors.step(self._states.hinges.sum(axis=2) * self._bends, noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=np.where(self._empty, np.nan, self._states.times), counts=counts)
 

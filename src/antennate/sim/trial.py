@@ -13,16 +13,18 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
-from antennate.errors import AntennateError, SceneError, raised
+from antennate.errors import AntennateError, ConfigError, SceneError, raised
 from antennate.messages import shortened
-from antennate.params.base import Params, number
+from antennate.params.base import Params, changes, number
 from antennate.params.control import ControlParams, GaitParams
-from antennate.params.scene import PhysicsParams, TunnelParams, VariationParams
+from antennate.params.reading import from_values
+from antennate.params.scene import CorridorsParams, PhysicsParams, TunnelParams, VariationParams
 from antennate.robots.readers import unused
 from antennate.robots.sensor import require_own_curve
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.registry import TUNNEL, check_name, make_scene
-from antennate.sim.scenes.scene import Scene, SceneInstance
+from antennate.sim.scenes.geometry import crossing
+from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
+from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
 from antennate.types import Floats
@@ -31,7 +33,7 @@ LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
-MEMBERS = ("start", "length", "exit", "build", "progress", "succeeded", "left")
+MEMBERS = ("start", "length", "exit", "build", "progress", "left")
 """What a SceneInstance has."""
 
 
@@ -40,9 +42,11 @@ class TrialConfig(Params):
 
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
-    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=["tunnel", "flat"])
-    """Tunnel, flat, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
+    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
+    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, a MJCF file.xml,
+    MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
+    corridors: CorridorsParams = CorridorsParams()
     robot: RobotSpec = RobotSpec()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
@@ -58,17 +62,46 @@ class TrialConfig(Params):
 
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
-        if self.scene != TUNNEL:
-            if self.tunnel != TunnelParams():
+        owned = {TUNNEL: self.tunnel, CORRIDORS: self.corridors}
+        for owner, params in owned.items():
+            if self.scene != owner and params != type(params)():
                 raise ValueError(
-                    f"tunnel belongs to the scene {TUNNEL!r}, found the scene {self.scene!r}"
+                    f"{owner} belongs to the scene {owner!r}, found the scene {self.scene!r}"
                 )
-        elif self.tunnel.free_width < self.robot.width:
+        widths = {TUNNEL: self.tunnel.free_width, CORRIDORS: self.corridors.free_width[0]}
+        width = widths.get(self.scene, math.inf)
+        if width < self.robot.width:
             raise ValueError(
-                f"tunnel.free_width must be at least robot.width, {self.robot.width:g} m, "
-                f"found {self.tunnel.free_width:g} m"
+                f"{self.scene}.free_width must be at least robot.width, {self.robot.width:g} m, "
+                f"found {width:g} m"
             )
         return self
+
+
+def scene_of(config: TrialConfig) -> Scene:
+    """The scene of a configuration.
+
+    Raises:
+        ConfigError: There is no such scene.
+        SceneError: The file cannot be used, or the constructor failed.
+    """
+    return make_scene(config.scene, config.tunnel, config.corridors)
+
+
+def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
+    """Time after which a trial has failed [s]: the one that is wanted, or else the scene's own.
+
+    Raises:
+        SceneError: That of the scene is no time.
+    """
+    if wanted is not None:
+        return wanted
+    limit = getattr(scene, "time_limit", TIME_LIMIT)
+    if not _is_finite(limit) or limit <= 0:
+        raise SceneError(
+            f"scene: expected time_limit to be a time above 0 s, found {shortened(repr(limit))}"
+        )
+    return float(limit)
 
 
 def require_own_curves(robot: RobotSpec, control: ControlParams) -> None:
@@ -114,7 +147,7 @@ def draw_trial(
         SceneError: The scene cannot be built.
     """
     for_scene, for_start, for_chance = _generators(config.seed, trial)
-    robot, variation = config.robot, config.variation
+    robot, variation = config.robot, variation_of(config, scene)
     drawn = _drawn(config, scene, for_scene)
     with _errors_of(config.scene):
         world = make_world(config.physics, robot, drawn)
@@ -135,6 +168,24 @@ def draw_scene(config: TrialConfig, scene: Scene, trial: int) -> SceneInstance:
     return _drawn(config, scene, _generators(config.seed, trial)[0])
 
 
+def variation_of(config: TrialConfig, scene: Scene) -> VariationParams:
+    """What differs between the trials of a configuration, with the changes of its scene.
+
+    Raises:
+        SceneError: The scene changes what there is not, or what was set.
+    """
+    own = dict(getattr(scene, "variation", {}))
+    for name, *_ in changes(config.variation, [n for n in own if hasattr(config.variation, n)]):
+        raise SceneError(
+            f"variation.{name}: expected the default, as the scene {config.scene!r} sets it, found "
+            f"{getattr(config.variation, name)}"
+        )
+    try:
+        return from_values(VariationParams, {**config.variation.model_dump(), **own})
+    except ConfigError as error:
+        raise SceneError(f"scene {config.scene!r}: variation: {error}") from error
+
+
 def check_start(config: TrialConfig) -> None:
     """Find a bad scene before anything is run: draw trial 0, and compile it if it is not ours.
 
@@ -142,7 +193,8 @@ def check_start(config: TrialConfig) -> None:
         ConfigError: There is no such scene.
         SceneError: It cannot be read, drawn or built, or the robot does not fit at its start.
     """
-    scene = make_scene(config.scene, config.tunnel)
+    scene = scene_of(config)
+    variation_of(config, scene)
     drawn = draw_scene(config, scene, 0)
     if config.scene != TUNNEL:
         with _errors_of(config.scene):
@@ -183,15 +235,51 @@ def progress_of(scene: SceneInstance, head: Floats) -> float:
     return _answer(scene, "progress", head, "a finite number [m]", _is_finite)
 
 
-def end_of(scene: SceneInstance, head: Floats) -> Literal["success", "left"] | None:
-    """Whether a trial has ended by what a scene says of a head at this position, shape (2,).
+class Judge:
+    """Says how a trial ends in its scene, from one look at the head to the next.
 
-    Raises:
-        SceneError: It raises an exception, or does not say True or False.
+    The head succeeds when it crosses the exit between its ends, outwards and from inside: who went
+    round and came in there has to go out twice. A scene with a rule of its own, `succeeded(head)`,
+    is asked instead.
+
+    Args:
+        scene: The scene of the trial.
     """
-    if _answer(scene, "succeeded", head, "True or False", _is_bool):
-        return "success"
-    return "left" if _answer(scene, "left", head, "True or False", _is_bool) else None
+
+    def __init__(self, scene: SceneInstance) -> None:
+        self._scene = scene
+        self._head: Floats = np.array(scene.start[:2], float)
+        self._crossings = 0
+
+    def look(self, head: Floats) -> Literal["success", "left"] | None:
+        """How the trial has ended with the head at this position, shape (2,); None if it goes on.
+
+        Raises:
+            SceneError: The scene raises an exception, or does not say True or False.
+        """
+        if self._succeeded(head):
+            return "success"
+        return "left" if _answer(self._scene, "left", head, "True or False", _is_bool) else None
+
+    def _succeeded(self, head: Floats) -> bool:
+        if hasattr(self._scene, "succeeded"):
+            return bool(_answer(self._scene, "succeeded", head, "True or False", _is_bool))
+        before, self._head = self._head, head.copy()
+        self._crossings += crossing(_exit_of(self._scene), before, head)
+        return self._crossings > 0
+
+
+def _exit_of(scene: SceneInstance) -> Floats:
+    try:
+        line = np.asarray(scene.exit, float)
+    except Exception as error:
+        raise SceneError(f"scene: exit raised {raised(error)}") from error
+    if line.shape != (2, 2) or not np.isfinite(line).all():
+        raise SceneError(
+            "scene: expected exit to be two points, finite, shape (2, 2) [m], found "
+            f"{shortened(repr(line.tolist()))}"
+        )
+    return line
 
 
 def _answer(

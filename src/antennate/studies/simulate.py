@@ -16,16 +16,17 @@ from antennate.errors import ConfigError, ControllerError
 from antennate.params.control import ControlParams
 from antennate.params.reading import from_values
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
     LOOK_EVERY,
+    Judge,
     Trial,
     TrialConfig,
     draw_trial,
-    end_of,
     require_own_curves,
     require_room,
+    scene_of,
+    time_limit_of,
 )
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
@@ -36,7 +37,7 @@ from antennate.types import AntennaFrame, Controller, JointCommand
 def simulate(
     controller: str | ControllerFactory = "closed",
     trial: int = 0,
-    time_limit: float = 100.0,
+    time_limit: float | None = None,
     control: ControlParams | None = None,
     log: str | Path | None = None,
     **settings: Any,
@@ -48,11 +49,11 @@ def simulate(
     Args:
         controller: A name, as `closed` or `file.py:Class`, or a controller class.
         trial: Number of the trial, from 0.
-        time_limit: Time above 0 after which it ends [s]; it ends earlier at the exit, or when the
-            robot has left the scene or the physics failed.
+        time_limit: Time above 0 after which it ends [s], that of the scene if not given; it ends
+            earlier at the exit, or when the robot has left the scene or the physics failed.
         control: Parameters of the controller, the defaults if not given.
         log: A file that does not exist yet, with the ending .mcap, for the log of the trial.
-        settings: Fields of the trial: seed, scene, robot, tunnel, variation, physics.
+        settings: Fields of the trial: seed, scene, robot, tunnel, corridors, variation, physics.
 
     Returns:
         The series; `meta["outcome"]` is success, timeout, left or invalid.
@@ -65,7 +66,8 @@ def simulate(
         LogError: The log cannot be written.
     """
     trial = checks.whole("trial", trial)
-    time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
+    if time_limit is not None:
+        time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
     control = ControlParams() if control is None else control
     checks.instance("control", control, ControlParams)
     log = None if log is None else _log(log)
@@ -74,14 +76,15 @@ def simulate(
         require_own_curves(config.robot, control)
     except ValueError as error:
         raise ConfigError(str(error)) from None
-    scene = make_scene(config.scene, config.tunnel)
+    scene = scene_of(config)
     start = draw_trial(config, scene, trial, control.gait, control.period)
     require_room(start.world)
     controlling = make_controller(controller, control, config.robot, 1)
     robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
-    walk = _Walk(config.robot, robot, controlling, start, time_limit)
+    limit = time_limit_of(start.scene, time_limit)
+    walk = _Walk(config.robot, robot, controlling, start, limit)
     name = controller if isinstance(controller, str) else _name(controller)
     with contextlib.ExitStack() as stack:
         if log is not None:
@@ -153,7 +156,7 @@ class _Walk:
         self.decisions = Decisions(spec, controller)
         self.log: SimulatedLog | None = None
         self.outcome = "timeout"
-        self._ticks = 0
+        self._ticks, self._judge = 0, Judge(start.scene)
 
     def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
         """Keep a tick; whether there is a next one.
@@ -169,15 +172,10 @@ class _Walk:
         self._ticks += 1
         self.outcome = "invalid" if self._robot.failures else "timeout"
         if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
-            self.outcome = _seen(self._start)
+            self.outcome = self._judge.look(self._start.world.head[:2]) or "timeout"
         return self.outcome == "timeout" and self._start.world.t < self._time_limit
 
 
 def _name(factory: ControllerFactory) -> str:
     """What a log calls a controller that has no name in a registry."""
     return str(getattr(factory, "__name__", type(factory).__name__))
-
-
-def _seen(trial: Trial) -> str:
-    """How the trial has ended by what the scene says of the head; `timeout` if it goes on."""
-    return end_of(trial.scene, trial.world.head[:2]) or "timeout"

@@ -9,9 +9,8 @@ from antennate.params.control import GaitParams
 from antennate.params.gaits import LiftParams
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
-from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import TrialConfig, draw_trial, require_room
+from antennate.sim.trial import TrialConfig, draw_trial, require_room, scene_of
 from antennate.twin.driven_servo import factory_new
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
@@ -81,7 +80,7 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     """
     require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period
-    scene = make_scene(config.scene, config.tunnel)
+    scene = scene_of(config)
     start = draw_trial(config, scene, config.trial, control.gait, period)
     require_room(start.world)
     body = SimRobot(1, config.robot, period, config.physics.timestep)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import LOOK_EVERY, end_of, progress_of
+from antennate.sim.trial import LOOK_EVERY, Judge, progress_of
 from antennate.sim.world import World
 
 
@@ -31,7 +31,7 @@ class Passage:
 
     def reset(self) -> None:
         """The robot stands at the start again."""
-        self._ticks = 0
+        self._ticks, self._judge = 0, Judge(self._scene)
         self.progress = 0.0
         self.passed = math.inf
 
@@ -47,7 +47,7 @@ class Passage:
             return
         head = world.head[:2]
         self.progress = progress_of(self._scene, head)
-        if self.passed == math.inf and end_of(self._scene, head) == "success":
+        if self.passed == math.inf and self._judge.look(head) == "success":
             self.passed = world.t
             self.on_pass()
 

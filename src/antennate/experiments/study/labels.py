@@ -58,7 +58,8 @@ def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[flo
         return of.least, of.most
     known = _experiment(experiment)
     default = known.config.model_fields[of.most].default if known else math.inf
-    return of.least, float(values.get(of.most, default))
+    most = values.get(of.most, default)
+    return of.least, math.inf if most is None else float(most)
 
 
 def cell(of: Measure, number: Any, interval: Any = None) -> str:

@@ -3,5 +3,5 @@
 The controllers differ in one decision: `open` walks forward whatever it feels, `paper` follows the
 published table, `closed` escapes when its readings repeat; your own is named by MODULE:CLASS or
 FILE.py:CLASS. All meet the same tunnels, starts and disturbances. A trial succeeds when the head
-passes the exit.
+crosses the exit from inside.
 """

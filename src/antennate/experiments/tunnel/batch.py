@@ -19,10 +19,15 @@ from antennate.experiments.tunnel.monitor import (
     TrialPath,
     TrialResult,
 )
-from antennate.sim.scenes.registry import make_scene
-from antennate.sim.scenes.scene import Scene
+from antennate.sim.scenes.scene import TIME_LIMIT, Scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, draw_trial, require_room
+from antennate.sim.trial import (
+    LOOK_EVERY,
+    draw_trial,
+    require_room,
+    scene_of,
+    time_limit_of,
+)
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.parts import log_name
@@ -89,10 +94,16 @@ def cpu_bodies(config: TunnelConfig) -> MakeBodies:
     robot, period = config.robot, config.control.period
 
     def make(batch: int) -> tuple[Scene, SimRobot]:
-        scene = make_scene(config.scene, config.tunnel)
+        scene = scene_of(config)
         return scene, SimRobot(batch, robot, period, config.physics.timestep)
 
     return make
+
+
+def lost_row(key: tuple[int, int, str], config: TunnelConfig, reason: str) -> TrialResult:
+    """The row of a trial, named by seed, number and controller, of which there is nothing else."""
+    limit = config.time_limit or TIME_LIMIT
+    return TrialResult(*key, "invalid", limit, limit_s=limit, reason=reason)
 
 
 class _Rows:
@@ -164,7 +175,7 @@ class _Rows:
                 return self._begin(row, trial)
             except SceneError as error:
                 key = self._config.seed, trial, self._name
-                lost = TrialResult(*key, "invalid", self._config.time_limit, reason=str(error))
+                lost = lost_row(key, self._config, str(error))
                 self._emit((lost, None))
         return None
 
@@ -177,11 +188,12 @@ class _Rows:
         config = self._config
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
+        limit = time_limit_of(start.scene, config.time_limit)
         self._robot.load(row, start.world, start.chance)
         self._begun[row], self._maneuvers[row] = self._ticks, 0
         before = self._robot.world(row).outlines()[1] if trial < SHOWN_TRIALS else []
         self._monitors[row] = TrialMonitor(
-            config.seed, trial, self._name, start.scene, before, config.time_limit
+            config.seed, trial, self._name, start.scene, before, limit
         )
         try:
             require_room(start.world)
@@ -245,9 +257,9 @@ class _Rows:
             ended.append(row)
         self._maneuvers[self._every, maneuvers] += 1
         self._ticks += 1
-        times, ticks, limit = t.tolist(), self._ticks, self._config.time_limit
+        times, ticks = t.tolist(), self._ticks
         for row, begun in [*self._begun.items()]:
-            if (ticks - begun) % LOOK_EVERY and times[row] < limit:
+            if (ticks - begun) % LOOK_EVERY and times[row] < self._monitors[row].time_limit:
                 continue
             world, maneuver = self._robot.world(row), maneuvers.item(row)
             try:

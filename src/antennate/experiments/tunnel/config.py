@@ -31,10 +31,10 @@ class TunnelConfig(TrialConfig):
         examples=["open", "paper", "closed"],
     )
     """Controllers to run: open, paper, closed, or MODULE:NAME or FILE.py:NAME of your own."""
-    time_limit: float = number(
-        100.0, "s", "paper: 0.04 m/s without feedback; half of that on 2 m", gt=0, le=3600
+    time_limit: float | None = number(
+        None, "s", "paper: 0.04 m/s without feedback; half of that on 2 m, 100 s", gt=0, le=3600
     )
-    """Time after which a trial has failed."""
+    """Time after which a trial has failed; that of its scene if not given."""
     control: ControlParams = ControlParams()
 
     @field_validator("controllers")

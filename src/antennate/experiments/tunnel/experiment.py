@@ -23,6 +23,9 @@ _STUDENT = "Intervals of means are Student's, cut at 0 and the limit."
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The controllers one by one and two by two."""
     controllers, pairs = result["controllers"], result["paired"]
+    limit = result["time_limit_s"]
+    one, two = measures.shown(limit)
+    until = "its limit, of each trial its own" if limit is None else f"the time limit, {limit:g} s"
     short = short_names(controllers)
     counts = sorted({row["trials"] for row in controllers.values()})
     many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
@@ -30,9 +33,9 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     one_by_one = Table.of(
         "Controllers",
         {short[name]: row for name, row in controllers.items()},
-        measures.CONTROLLER,
-        f"{many} a controller, seed {result['seed']}. A failure counts as the time limit, "
-        f"{result['time_limit_s']:g} s.\nInvalid trials do not count in the rows below "
+        one,
+        f"{many} a controller, seed {result['seed']}. A failure counts as {until}.\n"
+        f"Invalid trials do not count in the rows below "
         f"`invalid`.{'' if few(_valid(result)) else f' {_STUDENT}'}",
         about(controllers),
     )
@@ -43,7 +46,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             for first, second in combinations(controllers, 2)
             if f"{first}-{second}" in pairs
         },
-        measures.PAIR,
+        two,
         "McNemar's test is exact; Wilcoxon's takes failures as the limit; both two-sided.",
     )
     return (one_by_one, two_by_two) if pairs else (one_by_one,)
@@ -77,29 +80,34 @@ def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:
     first, rival = names
     for key in (f"{rival}-{first}", f"{first}-{rival}"):
         pair = result["paired"].get(key)
-        if pair is None or pair["time_difference_95"] is None:
+        shares = result["time_limit_s"] is None
+        mean, of = ("share_difference", 100.0) if shares else ("time_difference_s", 1.0)
+        ends = pair and pair["share_difference_95" if shares else "time_difference_95"]
+        if ends is None:
             continue
-        sign = 1 if key.startswith(f"{rival}-") else -1  # so that a gain of the first is positive
-        gain = sign * pair["time_difference_s"]
-        ends = sorted((sign * end for end in pair["time_difference_95"]), reverse=gain >= 0)
+        unit = "% of the limit" if shares else "s"
+        sign = of if key.startswith(f"{rival}-") else -of  # so that a gain of the first is positive
+        gain = sign * pair[mean]
+        ends = sorted((sign * end for end in ends), reverse=gain >= 0)
         return (
-            f"; {short[first]} against {short[rival]}: {_faster(gain)} (95 % interval: "
-            f"{_span(ends)}; a failure counts as the limit), McNemar p {pair['mcnemar_p']:.2g}"
+            f"; {short[first]} against {short[rival]}: {_faster(gain, unit)} (95 % interval: "
+            f"{_span(ends, unit)}; a failure counts as the limit), McNemar p "
+            f"{pair['mcnemar_p']:.2g}"
         )
     return ""
 
 
-def _span(ends: Sequence[float]) -> str:
-    """Gains of time from one end to the other [s], the larger of that sign first if both occur."""
+def _span(ends: Sequence[float], unit: str) -> str:
+    """Gains of time from one end to the other, the larger of that sign first if both occur."""
     if min(ends) < 0 < max(ends):
-        return f"{_faster(ends[0])} to {_faster(ends[1])}"
+        return f"{_faster(ends[0], unit)} to {_faster(ends[1], unit)}"
     low, high = sorted(ends, key=abs)
-    return f"{abs(low):.1f} to {_faster(high)}"
+    return f"{abs(low):.1f} to {_faster(high, unit)}"
 
 
-def _faster(gain: float) -> str:
-    """A gain of time in words, from [s]."""
-    return f"{abs(gain):.1f} s {'faster' if gain >= 0 else 'slower'}"
+def _faster(gain: float, unit: str) -> str:
+    """A gain of time in words."""
+    return f"{abs(gain):.1f} {unit} {'faster' if gain >= 0 else 'slower'}"
 
 
 def _valid(result: Mapping[str, Any]) -> list[int]:

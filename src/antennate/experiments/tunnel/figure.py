@@ -48,7 +48,9 @@ def figures(outcome: TunnelOutcome) -> dict[str, Figure]:
     config, trials = outcome.config, range(min(SHOWN_TRIALS, outcome.config.trials))
     return {
         "trajectories": trajectories(outcome.paths, config.controllers, outcome.rows, trials),
-        "summary": summary(outcome.result()["controllers"], outcome.rows, config.time_limit),
+        "summary": summary(
+            (found := outcome.result())["controllers"], outcome.rows, found["time_limit_s"]
+        ),
     }
 
 
@@ -208,15 +210,19 @@ def _handles(paths: Sequence[TrialPath]) -> list[Any]:
 
 @style.styled
 def summary(
-    controllers: Mapping[str, Mapping[str, Any]], rows: Sequence[TrialResult], time_limit: float
+    controllers: Mapping[str, Mapping[str, Any]],
+    rows: Sequence[TrialResult],
+    time_limit: float | None,
 ) -> Figure:
     """Success, time inside and restricted mean time of every controller.
 
     Args:
         controllers: Per controller what result.json says of it.
         rows: The table.
-        time_limit: Time after which a trial has failed [s].
+        time_limit: Time after which a trial has failed [s]; None where each trial has its own,
+            then times are shares of it.
     """
+    key = "restricted_mean_share" if time_limit is None else "restricted_mean_time"
     figure = style.canvas(style.WIDTH, 2.6 + 2 * (1.0 + 0.4 * len(controllers)))
     heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
     rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
@@ -225,13 +231,17 @@ def summary(
         valid, colour = found["trials"] - found["invalid"], colours[name]
         if not valid:
             continue
-        time = found["restricted_mean_time_s"]
-        time95 = found["restricted_mean_time_95"] if valid >= style.ENOUGH_TRIALS else None
+        time = found[key if time_limit is None else f"{key}_s"]
+        time95 = found[f"{key}_95"] if valid >= style.ENOUGH_TRIALS else None
         _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
         _interval(mean, i, time, time95 or (), colour)
-        exits = sorted(r.time_s for r in rows if r.controller == name and r.outcome == "success")
+        exits = sorted(
+            r.time_s / (r.limit_s if time_limit is None else 1.0)
+            for r in rows
+            if r.controller == name and r.outcome == "success"
+        )
         inside.step(
-            [0.0, *exits, time_limit],
+            [0.0, *exits, time_limit or 1.0],
             [*(left := 1.0 - np.arange(len(exits) + 1) / valid), left[-1]],
             where="post",
             color=colour,
@@ -257,25 +267,30 @@ def _name_lines(panel: Axes, labels: Sequence[str]) -> None:
     panel.grid(visible=False, axis="y")
 
 
-def _title_panels(rate: Axes, inside: Axes, mean: Axes, time_limit: float, trials: int) -> None:
+def _title_panels(
+    rate: Axes, inside: Axes, mean: Axes, time_limit: float | None, trials: int
+) -> None:
+    shares, most = time_limit is None, time_limit or 1.0
+    time = "time, share of the limit [%]" if shares else "time [s]"
+    until = "its limit" if shares else f"{time_limit:g} s"
     rate.set(
         xlim=(-0.02, 1.02),
         xlabel="trials that succeeded [%]",
         title="Success; Wilson 95 %",
     )
     mean.set(
-        xlim=(0, 1.02 * time_limit),
-        xlabel="restricted mean time [s]",
+        xlim=(0, 1.02 * most),
+        xlabel=f"restricted mean {time}",
         title=f"Time to the exit; {style.interval_note('95 %', trials)}",
     )
     inside.set(
-        xlim=(0, time_limit),
+        xlim=(0, most),
         ylim=(-0.03, 1.03),
-        xlabel="time [s]",
+        xlabel=time,
         ylabel="trials still inside [%]",
-        title=f"Trials still inside; failures until {time_limit:g} s",
+        title=f"Trials still inside; failures until {until}",
     )
-    for axis in (rate.xaxis, inside.yaxis):
+    for axis in (rate.xaxis, inside.yaxis, *((mean.xaxis, inside.xaxis) if shares else ())):
         axis.set_major_formatter(PercentFormatter(1.0, symbol=""))
 
 

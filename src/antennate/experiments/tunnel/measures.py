@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies import statistics
 from antennate.studies.measures import Measure, count, largest, mean, summarise, total
 
@@ -26,6 +27,14 @@ def _share(label: str, name: str) -> Measure:
     return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0, least=0.0, most=1.0)
 
 
+_SECONDS = (
+    Measure("restricted_mean_time_s", "restricted mean time", "s", form=".1f"),
+    Measure("restricted_mean_time_95", "  95 %", "s", form=".1f"),
+)
+_SHARES = (
+    Measure("restricted_mean_share", "restricted mean time", "% of limit", form=".1f", scale=100.0),
+    Measure("restricted_mean_share_95", "  95 %", "% of limit", form=".1f", scale=100.0),
+)
 CONTROLLER = (
     Measure("trials", "trials", form="d"),
     Measure("successes", "successes", of=count("outcome", "success"), form="d"),
@@ -36,8 +45,7 @@ CONTROLLER = (
     Measure("invalid", "invalid", form="d"),
     Measure("speed_m_s", "speed over successes", "m/s", form=".3f"),
     Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),
-    Measure("restricted_mean_time_s", "restricted mean time", "s", form=".1f"),
-    Measure("restricted_mean_time_95", "  95 %", "s", form=".1f"),
+    *_SECONDS,
     Measure("stuck", "stuck episodes", of=total, form="d", least=0.0),
     Measure("recovered", "  recovered", of=total, form="d", least=0.0),
     *(_share(label, name) for name, label in SHARES.items()),
@@ -47,7 +55,16 @@ CONTROLLER = (
 TIME = Measure(
     *("time_s", "time, a failure as the limit", "s"), form=".1f", least=0.0, most="time_limit"
 )
-COLUMNS = (*CONTROLLER, TIME)
+LIMIT = Measure("limit_s", "time limit", "s", form=".1f", least=0.0)
+COLUMNS = (*CONTROLLER, TIME, LIMIT)
+_SECONDS_APART = (
+    Measure("time_difference_s", "difference", "s", form="+.1f"),
+    Measure("time_difference_95", "  95 %", "s", form="+.1f"),
+)
+_SHARES_APART = (
+    Measure("share_difference", "difference", "% of limit", form="+.1f", scale=100.0),
+    Measure("share_difference_95", "  95 %", "% of limit", form="+.1f", scale=100.0),
+)
 PAIR = (
     Measure("trials", "valid in both", form="d"),
     Measure("only_first", "only the first", form="d"),
@@ -55,21 +72,38 @@ PAIR = (
     Measure("both", "both succeeded", form="d"),
     Measure("both_time_s", "  time of each", "s", form=".1f", join=", "),
     Measure("mcnemar_p", "McNemar p", form=".3g"),
-    Measure("time_difference_s", "difference", "s", form="+.1f"),
-    Measure("time_difference_95", "  95 %", "s", form="+.1f"),
+    *_SECONDS_APART,
     Measure("wilcoxon_p", "Wilcoxon p", form=".3g"),
 )
 
 
-def summary(rows: Sequence[TrialResult], limit: float) -> dict[str, Any]:
+def limit_of(rows: Sequence[TrialResult], wanted: float | None) -> float | None:
+    """The time limit that all valid trials share [s], None where each has its own."""
+    limits = {row.limit_s for row in rows if row.outcome != "invalid"} or {TIME_LIMIT}
+    return wanted or (limits.pop() if len(limits) == 1 else None)
+
+
+def shown(limit: float | None) -> tuple[Sequence[Measure], Sequence[Measure]]:
+    """What tables show of one controller, and of two: in shares where there is no limit of all."""
+    if limit is not None:
+        return CONTROLLER, PAIR
+    shares = dict(zip((*_SECONDS, *_SECONDS_APART), (*_SHARES, *_SHARES_APART), strict=True))
+    one, two = ([shares.get(measure, measure) for measure in each] for each in (CONTROLLER, PAIR))
+    return one, two
+
+
+def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
     """One controller in numbers; invalid trials are counted and left out of all others.
 
-    The restricted mean time lies between 0 and the time limit [s], and so does its interval.
+    The restricted mean time lies between 0 and the time limit [s], and so does its interval; it is
+    None where trials have limits of their own. The mean share of the limits is there always.
     """
     valid = [row for row in rows if row.outcome != "invalid"]
     won = [row for row in valid if row.outcome == "success"]
     times = np.array([row.time_s for row in valid])
-    restricted, ends = statistics.mean95(times, 0.0, limit)
+    limits = np.array([row.limit_s for row in valid])
+    share, share_ends = statistics.mean95(times / limits, 0.0, 1.0)
+    restricted, ends = (None, None) if limit is None else statistics.mean95(times, 0.0, limit)
     progress = sum(row.progress_m for row in valid)
     return {
         "trials": len(rows),
@@ -83,11 +117,18 @@ def summary(rows: Sequence[TrialResult], limit: float) -> dict[str, Any]:
         "progress_per_time_m_s": progress / float(times.sum()) if valid else None,
         "restricted_mean_time_s": restricted if valid else None,
         "restricted_mean_time_95": ends,
+        "restricted_mean_share": share if valid else None,
+        "restricted_mean_share_95": share_ends,
     }
 
 
-def paired(by_controller: Mapping[str, Sequence[TrialResult]], limit: float) -> dict[str, Any]:
-    """Every two controllers on the trials that are valid in both, with the time limit [s]."""
+def paired(
+    by_controller: Mapping[str, Sequence[TrialResult]], limit: float | None
+) -> dict[str, Any]:
+    """Every two controllers on the trials that are valid in both, with the time limit [s].
+
+    Where there is none of all, the times that are compared are shares of the limit of each trial.
+    """
     tests = {}
     for first, second in combinations(by_controller, 2):
         ours, theirs = (
@@ -96,12 +137,17 @@ def paired(by_controller: Mapping[str, Sequence[TrialResult]], limit: float) -> 
         )
         both = sorted(ours.keys() & theirs.keys())
         if both:
-            test = statistics.compare(
-                np.array([ours[k].outcome == "success" for k in both]),
-                np.array([theirs[k].outcome == "success" for k in both]),
-                np.array([ours[k].time_s for k in both]),
-                np.array([theirs[k].time_s for k in both]),
-                limit,
-            )
-            tests[f"{first}-{second}"] = {"trials": len(both), **asdict(test)}
+            times = np.array([[rows[k].time_s for k in both] for rows in (ours, theirs)])
+            ends = np.array([[rows[k].outcome for k in both] for rows in (ours, theirs)])
+            won = ends == "success"
+            units = np.array([ours[k].limit_s for k in both]) if limit is None else 1.0
+            first_t, second_t = times / units
+            test = statistics.compare(won[0], won[1], first_t, second_t, limit or 1.0)
+            found = asdict(test)
+            if limit is None:
+                found["share_difference"] = found.pop("time_difference_s")
+                found["share_difference_95"] = found.pop("time_difference_95")
+                means = times[:, won.all(axis=0)].mean(axis=1).tolist() if test.both else None
+                found["both_time_s"] = means and tuple(means)
+            tests[f"{first}-{second}"] = {"trials": len(both), **found}
     return tests

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, Union
 import numpy as np
 
 from antennate.errors import SceneError
-from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import end_of, progress_of
+from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
+from antennate.sim.trial import Judge, progress_of
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -40,13 +40,15 @@ class TrialResult:
     Attributes:
         seed: Seed of the run; with `trial` it decides all chance.
         controller: Name of the controller.
-        outcome: success (the head passed the exit), timeout, left (out another way) or invalid.
+        outcome: success (the head crossed the exit from inside), timeout, left (out another way)
+            or invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: How far the head came, within 0 and the length of the scene [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
         share_forward: Share of ticks in each maneuver.
         force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
         force_max_n: Their maximum [N].
+        limit_s: Time limit of the trial [s].
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -65,6 +67,7 @@ class TrialResult:
     share_hold: float = 0.0
     force_mean_n: float = 0.0
     force_max_n: float = 0.0
+    limit_s: float = TIME_LIMIT
     reason: str = ""
 
 
@@ -118,6 +121,10 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
+    _judge: Judge = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._judge = Judge(self.scene)
 
     def look(self, world: Watched, t: float, maneuver: int) -> Outcome | None:
         """Look at the world at time t [s]; the outcome once there is one.
@@ -130,7 +137,7 @@ class TrialMonitor:
         self._samples.append((t, x, y, maneuver))
         self._forces.append(world.obstacle_force())
         self._note_progress(progress_of(self.scene, head), t)
-        return end_of(self.scene, head) or ("timeout" if t >= self.time_limit else None)
+        return self._judge.look(head) or ("timeout" if t >= self.time_limit else None)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
@@ -161,6 +168,7 @@ class TrialMonitor:
             **{f"share_{m.name.lower()}": round(float(share[m]), 6) for m in Maneuver},
             force_mean_n=round(float(forces.mean()), 6),
             force_max_n=round(float(forces.max()), 6),
+            limit_s=self.time_limit,
             reason=reason,
         )
 

@@ -11,7 +11,7 @@ from typing import Any
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel.batch import BATCH, Emit, run_trials
+from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
 from antennate.sim.scenes.registry import TUNNEL
@@ -39,6 +39,7 @@ class TunnelOutcome:
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
+        shared = measures.limit_of(self.rows, config.time_limit)
         by_name = {
             name: [row for row in self.rows if row.controller == name]
             for name in config.controllers
@@ -48,13 +49,11 @@ class TunnelOutcome:
             "command": "tunnel",
             "seed": config.seed,
             "scene": config.scene,
-            "time_limit_s": config.time_limit,
+            "time_limit_s": shared,
             "length_m": config.tunnel.length if config.scene == TUNNEL else None,
             "interrupted": self.interrupted,
-            "controllers": {
-                name: measures.summary(rows, config.time_limit) for name, rows in by_name.items()
-            },
-            "paired": measures.paired(by_name, config.time_limit),
+            "controllers": {name: measures.summary(rows, shared) for name, rows in by_name.items()},
+            "paired": measures.paired(by_name, shared),
         }
 
 
@@ -143,7 +142,7 @@ def _lost(config: TunnelConfig, trial: Trial, failure: Failure) -> _Found:
         raise failure.raised()
     name, number = trial
     key = config.seed, number, name
-    return TrialResult(*key, "invalid", config.time_limit, reason=failure.reason), None
+    return lost_row(key, config, failure.reason), None
 
 
 def _run_viewed(

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from antennate.experiments.tunnel.batch import Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
-from antennate.sim.trial import draw_scene
+from antennate.sim.trial import draw_scene, scene_of
 from antennate.sim.warp.arenas import CountingRobot, PaddedTunnels
 from antennate.sim.warp.packages import require_device
 from antennate.sim.warp.robot import WarpRobot
@@ -51,7 +50,7 @@ def run_trials_on_warp(
     require_device(device)
     if not trials:
         return
-    plain = make_scene(config.scene, config.tunnel)
+    plain = scene_of(config)
     scene = PaddedTunnels(plain, (draw_scene(config, plain, trial) for trial in trials))
     sizes = limits or room_for(config, controller, trials[:_COUNTED], scene)
     period, timestep = config.control.period, config.physics.timestep

@@ -21,15 +21,12 @@ from statistics import median
 
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
+from antennate.control.conditioning import HIGH_RAIL, LOW_RAIL
 from antennate.errors import CalibrationError
 from antennate.hardware.safety.noise import Noise, noise_of
 from antennate.params.control import CurveParams
 from antennate.params.safety import SupervisorParams
 
-LOW_RAIL = 5.0
-"""Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
-HIGH_RAIL = 4090.0
-"""Readings from this on are at the upper rail [counts]: two sigma below full scale (assumed)."""
 WINDOW = 10
 """Readings from which a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
 OPEN_BAD = 6

@@ -29,21 +29,26 @@ def offset_line(points: Floats, distance: float, corner_radius: float = 0.0) -> 
 
     Corners are mitred; where the moved line is the outer one it is rounded by `corner_radius` [m].
     """
+    return np.concatenate(offset_corners(points, distance, corner_radius))
+
+
+def offset_corners(points: Floats, distance: float, corner_radius: float = 0.0) -> list[Floats]:
+    """`offset_line`, the points at each corner of the polyline by themselves, each (k, 2)."""
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    moved = [points[0] + distance * normal[0]]
+    moved: list[list[Floats]] = [[points[0] + distance * normal[0]]]
     for i in range(1, len(points) - 1):
         before, after = normal[i - 1], normal[i]
         mitre = points[i] + distance * (before + after) / (1.0 + before @ after)
         into, out = along[i - 1], along[i]
         turn = math.atan2(into[0] * out[1] - into[1] * out[0], into @ out)
         if turn * distance < 0 and corner_radius > 0:
-            moved.extend(_fillet(mitre, into, out, turn, corner_radius))
+            moved.append(_fillet(mitre, into, out, turn, corner_radius))
         else:
-            moved.append(mitre)
-    moved.append(points[-1] + distance * normal[-1])
-    return np.array(moved)
+            moved.append([mitre])
+    moved.append([points[-1] + distance * normal[-1]])
+    return [np.array(corner) for corner in moved]
 
 
 def _fillet(corner: Floats, into: Floats, out: Floats, turn: float, radius: float) -> list[Floats]:
@@ -70,7 +75,10 @@ def resample(points: Floats, spacing: Floats) -> Floats:
 
 
 def progress(points: Floats, where: Floats) -> float:
-    """Arc length of the centre line's nearest point [m]; it goes on straight past its ends."""
+    """Arc length of the centre line's nearest point [m]; past its ends it goes on straight.
+
+    What lies past an end is as far away as that end: the line itself ends there.
+    """
     x, y = where.tolist()
     corners = points.tolist()
     best, best_distance, done = 0.0, math.inf, 0.0
@@ -80,16 +88,58 @@ def progress(points: Floats, where: Floats) -> float:
         dx, dy = x1 - x0, y1 - y0
         length = math.hypot(dx, dy)
         s = ((x - x0) * dx + (y - y0) * dy) / length
+        part = min(max(s / length, 0.0), 1.0)
         if i > 0:
             s = max(s, 0.0)
         if i < last:
             s = min(s, length)
-        part = s / length
         distance = math.hypot(x - x0 - dx * part, y - y0 - dy * part)
         if distance < best_distance:
             best, best_distance = done + s, distance
         done += length
     return best
+
+
+def crossing(line: Floats, before: Floats, after: Floats) -> int:
+    """Whether a step crosses a line between its ends.
+
+    Args:
+        line: The left and the right end, as seen by who goes out over it, shape (2, 2).
+        before: Where the step begins, shape (2,).
+        after: Where it ends, likewise.
+
+    Returns:
+        1 outwards, -1 inwards, 0 not between the ends. Who stands on the line is outside.
+    """
+    (x0, y0), (dx, dy) = line[0].tolist(), (line[1] - line[0]).tolist()
+    sides, along = [], []
+    for x, y in (before.tolist(), after.tolist()):
+        sides.append(dx * (y - y0) - dy * (x - x0))
+        along.append(dx * (x - x0) + dy * (y - y0))
+    out = (sides[1] >= 0.0) - (sides[0] >= 0.0)
+    if not out:
+        return 0
+    part = sides[0] / (sides[0] - sides[1])
+    at = along[0] + part * (along[1] - along[0])
+    return out if 0.0 <= at <= dx**2 + dy**2 else 0
+
+
+def is_simple(polygon: Floats) -> bool:
+    """Whether no two sides of a closed polygon of corners (n, 2) meet but neighbours."""
+    ends = np.roll(polygon, -1, axis=0)
+    count = len(polygon)
+    first, second = np.triu_indices(count, 2)
+    apart = (first + count - second) % count > 1  # the last side is a neighbour of the first
+    first, second = first[apart], second[apart]
+
+    def side(a: Floats, b: Floats, c: Floats) -> Floats:
+        return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
+    a, b, c, d = polygon[first], ends[first], polygon[second], ends[second]
+    across = (side(a, b, c) * side(a, b, d) <= 0.0) & (side(c, d, a) * side(c, d, b) <= 0.0)
+    near = np.minimum(a, b) <= np.maximum(c, d)  # or else they may be parts of one line
+    near &= np.minimum(c, d) <= np.maximum(a, b)
+    return not (across & near.all(axis=1)).any()
 
 
 def contains(polygon: Floats, where: Floats) -> bool:

@@ -16,12 +16,20 @@ from antennate.types import Floats
 LEFT_BEHIND = 0.8
 """Distance from the start, or from all walls, at which the robot has left [m]: its length and more.
 """
+TIME_LIMIT = 100.0
+"""Time after which a trial has failed, where its scene does not say another [s].
+
+Paper: 0.04 m/s without feedback; half of that on 2 m."""
 EXIT_HALF_WIDTH = 0.5
 """Half the width of an exit that no walls bound [m]."""
 
 
 class SceneInstance(Protocol):
-    """One drawn scene. Positions are in plan, x and y [m]; the floor at the start is at z = 0."""
+    """One drawn scene. Positions are in plan, x and y [m]; the floor at the start is at z = 0.
+
+    It may have more: `succeeded(head)`, see `exit`; `route`, corner points from the start to the
+    exit [m], shape (n, 2); `time_limit`, after which a trial has failed [s].
+    """
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -35,7 +43,12 @@ class SceneInstance(Protocol):
 
     @property
     def exit(self) -> Floats:
-        """Ends of the line that the head crosses at the exit [m], shape (2, 2)."""
+        """Ends of the line that the head crosses at the exit [m], shape (2, 2).
+
+        The first is on the left of who goes out. A trial succeeds when the head crosses the line
+        outwards between them, unless the instance has a rule of its own: a method
+        `succeeded(head)` that says whether a head at this position, shape (2,), is past the exit.
+        """
         ...
 
     def build(self, spec: mujoco.MjSpec) -> None:
@@ -46,17 +59,17 @@ class SceneInstance(Protocol):
         """How far a head at this position, shape (2,), has come from the start [m]."""
         ...
 
-    def succeeded(self, head: Floats) -> bool:
-        """Whether a head at this position has passed the exit."""
-        ...
-
     def left(self, head: Floats) -> bool:
-        """Whether a head at this position has left another way and cannot succeed any more."""
+        """Whether a head at this position, not through the exit, has left and cannot succeed."""
         ...
 
 
 class Scene(Protocol):
-    """Draws instances. The same state of the generator gives the same instance."""
+    """Draws instances. The same state of the generator gives the same instance.
+
+    A scene may change what differs between its trials: an attribute `variation`, a mapping of
+    fields of `VariationParams` to values.
+    """
 
     @property
     def random(self) -> bool:
@@ -75,9 +88,10 @@ class Scene(Protocol):
 class Route:
     """Base of an instance whose progress is arc length along a polyline, from start to exit.
 
-    It starts with a flat floor; a subclass adds to `build`. The robot succeeds when it passes the
-    end of the route within `EXIT_HALF_WIDTH`, and has left when it is farther than `LEFT_BEHIND`
-    from the smallest rectangle along x and y that holds the route and `bounds`.
+    It starts with a flat floor; a subclass adds to `build`. The robot succeeds when it crosses the
+    end of the route within `EXIT_HALF_WIDTH`. It has left when it is past that end without having
+    crossed it there, or farther than `LEFT_BEHIND` from the smallest rectangle along x and y that
+    holds the route and `bounds`.
 
     Args:
         route: Corner points [m], shape (n, 2), n at least 2.
@@ -99,7 +113,7 @@ class Route:
 
     @property
     def exit(self) -> Floats:
-        """A line across the end of the route."""
+        """A line across the end of the route, its left end first."""
         dx, dy = self._along[-1] / np.hypot(*self._along[-1]) * EXIT_HALF_WIDTH
         return self.route[-1] + np.array([[-dy, dx], [dy, -dx]])
 
@@ -111,15 +125,14 @@ class Route:
         """Arc length of the nearest point of the route [m]."""
         return geometry.progress(self.route, head)
 
-    def succeeded(self, head: Floats) -> bool:
-        """Whether the head is past the end of the route, at most half a width beside it."""
-        gap = math.hypot(*(head - self.route[-1]))
-        past = self.progress(head) - self.length
-        return past >= 0.0 and gap**2 - past**2 <= EXIT_HALF_WIDTH**2
-
     def left(self, head: Floats) -> bool:
-        """Whether the head is outside the rectangle."""
-        return bool((head < self._low).any() or (head > self._high).any())
+        """Whether the head is past the end of the route, or outside the rectangle.
+
+        Where success has a rule of its own, the robot may go on past the end.
+        """
+        outside = (head < self._low).any() or (head > self._high).any()
+        past = not hasattr(self, "succeeded") and self.progress(head) > self.length
+        return bool(outside or past)
 
 
 class FlatScene:

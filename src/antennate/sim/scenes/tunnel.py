@@ -9,7 +9,10 @@ there.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +22,8 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import layers
 from antennate.sim.engine import mujoco
 from antennate.sim.scenes import geometry
-from antennate.sim.scenes.scene import LEFT_BEHIND, add_floor
+from antennate.sim.scenes.plan import Arm, Plan, Room
+from antennate.sim.scenes.scene import LEFT_BEHIND, TIME_LIMIT, add_floor
 from antennate.types import Floats
 
 _WALL_HALF_THICKNESS = 0.02
@@ -34,12 +38,23 @@ class TunnelScene:
 
     Args:
         params: Shape of the corridor, and its cylinders.
+        rooms: Its rooms.
+        arms: Its blind arms.
+        variation: What it changes between trials, fields of `VariationParams`.
     """
 
     random = True
 
-    def __init__(self, params: TunnelParams | None = None) -> None:
+    def __init__(
+        self,
+        params: TunnelParams | None = None,
+        rooms: tuple[Room, ...] = (),
+        arms: tuple[Arm, ...] = (),
+        variation: Mapping[str, Any] | None = None,
+    ) -> None:
         self._params = params or TunnelParams()
+        self._rooms, self._arms = rooms, arms
+        self.variation = variation or {}
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
         """Draw one tunnel.
@@ -56,17 +71,40 @@ class TunnelScene:
         mirrored = params.mirror == "always"
         if params.mirror == "random":
             mirrored = bool(rng.random() < 0.5)
-        centre = geometry.centre_line(params)
-        walls = (
-            geometry.offset_line(centre, params.wall_distance, params.corner_radius),
-            geometry.offset_line(centre, -params.wall_distance, params.corner_radius),
-        )
-        cylinders = _place_cylinders(params, robot, centre, walls, rng)
-        if mirrored:
-            flip = np.array([1.0, -1.0])
-            centre, cylinders = centre * flip, cylinders * flip
-            walls = (walls[1] * flip, walls[0] * flip)
-        return Tunnel(params=params, centre=centre, walls=walls, cylinders=cylinders)
+        plan = plan_of(params, self._rooms, self._arms)
+        return build_along(plan, params, robot, rng, mirrored)
+
+
+def plan_of(params: TunnelParams, rooms: tuple[Room, ...] = (), arms: tuple[Arm, ...] = ()) -> Plan:
+    """The passage of these parameters, with rooms and blind arms."""
+    width, lining = params.free_width, 2 * params.cylinder.radius
+    return Plan(geometry.centre_line(params), width, rooms, arms, lining)
+
+
+def build_along(
+    plan: Plan,
+    params: TunnelParams,
+    robot: RobotSpec,
+    rng: np.random.Generator,
+    mirrored: bool = False,
+    time_limit: float = TIME_LIMIT,
+) -> Tunnel:
+    """Draw the cylinders of a passage.
+
+    Raises:
+        SceneError: The strewn ones find no room.
+    """
+    centre, distance = plan.centre, params.wall_distance
+    walls = (
+        plan.line(distance, params.corner_radius),
+        plan.line(-distance, params.corner_radius),
+    )
+    cylinders = _place_cylinders(params, robot, plan, rng)
+    if mirrored:
+        flip = np.array([1.0, -1.0])
+        centre, cylinders = centre * flip, cylinders * flip
+        walls = (walls[1] * flip, walls[0] * flip)
+    return Tunnel(params, centre, walls, cylinders, time_limit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,17 +115,26 @@ class Tunnel:
         centre: Corner points of the centre line [m], shape (n, 2).
         walls: Two polylines [m], left and right.
         cylinders: Where the cylinders stand at first [m], shape (m, 2).
+        time_limit: Time after which a trial has failed [s].
+        parked: Walls far away, that only fill the counts of a batch on a GPU.
     """
 
     params: TunnelParams
     centre: Floats
     walls: tuple[Floats, Floats]
     cylinders: Floats
+    time_limit: float = TIME_LIMIT
+    parked: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     @property
     def start(self) -> tuple[float, float, float]:
         """The origin, facing along the first piece."""
         return 0.0, 0.0, 0.0
+
+    @property
+    def route(self) -> Floats:
+        """The centre line."""
+        return self.centre
 
     @property
     def length(self) -> float:
@@ -96,29 +143,30 @@ class Tunnel:
 
     @property
     def exit(self) -> Floats:
-        """The line between the ends of the walls."""
+        """The line between the ends of the walls, left and right."""
         return np.array([wall[-1] for wall in self.walls])
 
     def build(self, spec: mujoco.MjSpec) -> None:
         """Add floor, walls and cylinders."""
         add_floor(spec)
         friction = self.params.cylinder.contact_friction
-        for side, out, line in zip("lr", (1.0, -1.0), self.walls, strict=True):
-            for i in range(len(line) - 1):
-                _add_wall(spec, f"wall_{side}{i}", line[i], line[i + 1], out, friction)
+        for i, (start, end, out) in enumerate(self.pieces()):
+            _add_wall(spec, f"wall{i}", start, end, out, friction)
         for i, where in enumerate(self.cylinders):
             _add_cylinder(spec, f"cylinder{i}", where, self.params.cylinder)
+
+    def pieces(self) -> Iterator[tuple[Floats, Floats, float]]:
+        """Ends of each straight wall [m], shapes (2,), and 1 where its left is outside, or -1."""
+        for out, line in zip((1.0, -1.0), self.walls, strict=True):
+            yield from ((a, b, out) for a, b in pairwise(line))
+        yield from ((start, end, 1.0) for start, end in self.parked)
 
     def progress(self, head: Floats) -> float:
         """Arc length of the nearest point of the centre line [m]."""
         return geometry.progress(self.centre, head)
 
-    def succeeded(self, head: Floats) -> bool:
-        """Whether the head has passed the end of the centre line."""
-        return self.progress(head) >= self.length
-
     def left(self, head: Floats) -> bool:
-        """Whether it is far behind the entrance, or beside the walls."""
+        """Whether it is far behind the entrance, beside the walls, or past them."""
         if self.progress(head) < 0.0:
             return math.hypot(*head) >= LEFT_BEHIND
         left, right = self.walls
@@ -128,17 +176,14 @@ class Tunnel:
 def _place_cylinders(
     params: TunnelParams,
     robot: RobotSpec,
-    centre: Floats,
-    walls: tuple[Floats, Floats],
+    plan: Plan,
     rng: np.random.Generator,
 ) -> Floats:
     placed: list[Floats] = []
     diameter = 2 * params.cylinder.radius + _SETTLE_GAP
     reach = params.free_width / 2 + params.cylinder.radius - _SETTLE_GAP
     for distance in (reach, -reach):
-        line = geometry.offset_line(
-            centre, distance, max(0.0, params.corner_radius - params.cylinder.radius)
-        )
+        line = plan.line(distance, max(0.0, params.corner_radius - params.cylinder.radius))
         gaps = diameter + rng.uniform(0.0, 2.0 * params.lining_gap, size=1000)
         start = rng.uniform(0.0, diameter)
         for point in geometry.resample(line, start + np.cumsum(gaps)):
@@ -150,7 +195,9 @@ def _place_cylinders(
     for _ in range(200 * params.strewn):
         if len(placed) == wanted:
             break
-        point = geometry.resample(centre, np.array([rng.uniform(start_zone, params.length)]))[0]
+        point = geometry.resample(plan.centre, np.array([rng.uniform(start_zone, params.length)]))[
+            0
+        ]
         point = point + rng.uniform(-max(room, 0.0), max(room, 0.0), size=2)
         if _is_free(point, placed, diameter):
             placed.append(point)

@@ -1,4 +1,4 @@
-"""Tunnels with one number of cylinders, as Warp needs them, and the sizes that they need."""
+"""Tunnels with one number of cylinders and walls, as Warp needs them, and the sizes for them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ _PARKING = -60.0
 """Cylinders that a tunnel has too few of stand behind this x, away from everything [m]."""
 _GAP = 0.05
 """Free distance between parked cylinders [m]."""
+_ASIDE = 5.0
+"""Distance of the parked walls from the parked cylinders [m]."""
 _RESERVE = 1.5
 """Room on the device over the largest counts on the CPU."""
 _LEAST = (100, 40)
@@ -26,7 +28,7 @@ _LEAST = (100, 40)
 
 
 class PaddedTunnels:
-    """A scene whose tunnels all have the same number of cylinders; other scenes stay as they are.
+    """A scene whose tunnels all have as many cylinders and walls; other scenes stay as they are.
 
     Args:
         scene: Draws them.
@@ -35,11 +37,13 @@ class PaddedTunnels:
 
     def __init__(self, scene: Scene, instances: Iterable[SceneInstance]) -> None:
         self._scene, self.random = scene, scene.random
-        counts = [len(each.cylinders) for each in instances if isinstance(each, Tunnel)]
-        self._count = max(counts, default=0)
+        self.variation = getattr(scene, "variation", {})
+        tunnels = [each for each in instances if isinstance(each, Tunnel)]
+        self._count = max((len(each.cylinders) for each in tunnels), default=0)
+        self._walls = max((len([*each.pieces()]) for each in tunnels), default=0)
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> SceneInstance:
-        """Draw the same instance as the scene itself, filled up with parked cylinders.
+        """Draw the same instance as the scene itself, filled up with parked cylinders and walls.
 
         Raises:
             SceneError: There is none.
@@ -50,7 +54,11 @@ class PaddedTunnels:
         pitch = 2 * drawn.params.cylinder.radius + _GAP
         spare = self._count - len(drawn.cylinders)
         parked = np.column_stack([_PARKING - pitch * np.arange(1, spare + 1), np.zeros(spare)])
-        return replace(drawn, cylinders=np.concatenate([drawn.cylinders, parked]))
+        lacking = self._walls - len([*drawn.pieces()])
+        row = np.arange(lacking)[:, None] + [0.0, 0.5]
+        walls = np.stack([_PARKING - 1.0 - row, np.full_like(row, _ASIDE)], axis=2)
+        cylinders = np.concatenate([drawn.cylinders, parked])
+        return replace(drawn, cylinders=cylinders, parked=walls)
 
 
 def is_parked(polygon: Floats) -> bool:

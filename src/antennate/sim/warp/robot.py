@@ -67,12 +67,16 @@ class WarpRow:
         """Obstacles in plan, as `World.outlines` has them, without those that fill the counts."""
         self._follow()
         still, loose = self.world.outlines()
-        return still, [polygon for polygon in loose if not is_parked(polygon)]
+        return _standing(still), _standing(loose)
 
     def _follow(self) -> None:
         data = self.world.data
         data.qpos[:] = self._batch.positions[self._row]
         mujoco.mj_kinematics(self.world.model, data)
+
+
+def _standing(polygons: list[Floats]) -> list[Floats]:
+    return [polygon for polygon in polygons if not is_parked(polygon)]
 
 
 class WarpRobot:
@@ -175,12 +179,13 @@ class WarpRobot:
     def read(self) -> AntennaFrame:
         """Sample both sensors of every row."""
         t, flex = np.full(self._batch, np.nan), np.zeros((self._batch, 2))
+        bends = np.ones((self._batch, 2))
         for i, row in self._rows.items():
             t[i] = row.t
-            self._noise[i] = row.chance.noise(row.ticks)
+            self._noise[i], bends[i] = row.chance.noise(row.ticks), row.chance.bends
         for row in list(self._rows.values())[:1]:
             hinges = self.positions[:, row.world.places.hinges]
-            flex = np.where(self._missing[:, None], 0.0, hinges.sum(axis=2))
+            flex = np.where(self._missing[:, None], 0.0, hinges.sum(axis=2) * bends)
         counts = self._sensors.step(flex, self._noise)
         counts[self._missing] = np.nan
         return AntennaFrame(t=t, counts=counts)
