@@ -24,6 +24,7 @@ PARAMS = SearchParams(
     wrong_side=0.4,
     free_time=1.0,
     proof_time=9.0,
+    lost_turn=3.0,
     lost_time=4.0,
     return_time=12.0,
 )
@@ -118,14 +119,19 @@ def test_after_a_time_without_touch_it_is_stuck_anew() -> None:
     assert short == (TURN_L, 6.0)
 
 
-def test_it_turns_round_where_nothing_is_felt_for_long_after_a_turn() -> None:
-    said = story(24.0, lambda t: t == 3.0, lambda t: t < 8.0)
-    assert said[2:4] == [(TURN_R, 2.0), (FORWARD, 6.0)]
-    assert said[4] == (TURN_L, 12.0)
+def test_it_turns_round_where_nothing_is_felt_for_long_after_a_turn_that_went_far() -> None:
+    """The second turn goes to 4 s from the first heading."""
+    said = story(40.0, lambda t: t in (3.0, 10.0), lambda t: t < 19.0)
+    assert said[4:7] == [(REVERSE, 2.0), (TURN_L, 6.0), (FORWARD, 5.0)]
+    assert said[7] == (TURN_R, 12.0)
 
 
-def test_without_a_turn_before_it_walks_on_where_nothing_is_felt() -> None:
-    assert story(20.0, lambda t: False, lambda t: t < 2.0) == [(FORWARD, 20.0)]
+@pytest.mark.parametrize("jams", [(), (3.0,)])
+def test_without_a_turn_that_went_far_it_walks_on_where_nothing_is_felt(
+    jams: tuple[float, ...],
+) -> None:
+    said = story(30.0, lambda t: t in jams, lambda t: t < 8.0)
+    assert said[-1] == (FORWARD, 24.0 if jams else 30.0)
 
 
 def test_it_holds_while_a_reading_is_not_known_and_goes_on_then() -> None:

@@ -9,7 +9,9 @@ over: nothing felt for `free_time`, or a walk of `proof_time` that was not stuck
 robot gets on, and the next jam is a new one.
 
 Until then turns go to both sides by turns, each farther from the heading in which the robot was
-stuck first, and it backs off for longer each time, so that no try repeats another.
+stuck first, and it backs off for longer each time, so that no try repeats another. A turn that goes
+far can lead the robot back out of a passage. Where it feels nothing for `lost_time` after one, it
+turns round.
 """
 
 from __future__ import annotations
@@ -48,14 +50,14 @@ class Search:
         self._felt: Floats = np.zeros(batch)
         self._lean: Floats = np.zeros(batch)
         self._turned: Floats = np.zeros(batch)
-        self._right, self._at_once, self._searching = np.zeros((3, batch), dtype=bool)
+        self._right, self._at_once = np.zeros((2, batch), dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
         self.maneuver[rows] = _FORWARD
         self.tries[rows] = 0
         self._begun[rows] = np.nan
-        self._searching[rows] = False
+        self._turned[rows] = 0.0
 
     def step(self, t: Floats, flex: Floats, stuck: Bools, pressed: Bools) -> Ints:
         """The maneuver of every row.
@@ -84,7 +86,8 @@ class Search:
         stuck = walking & stuck & (walked >= params.patience)
         if np.count_nonzero(stuck):
             self._back_off(stuck, t)
-        lost = walking & self._searching & (free > params.lost_time)
+        astray = np.abs(self._turned) >= params.lost_turn
+        lost = walking & astray & (free > params.lost_time)
         if np.count_nonzero(lost):
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
@@ -127,13 +130,12 @@ class Search:
         self._turned += np.where(rows, turn, 0.0)
         self._lean = np.where(rows, 0.0, self._lean)
         self.tries = self.tries + rows
-        self._searching |= rows
 
     def _return(self, rows: Bools, t: Floats) -> None:
         """Turn back, opposite to the last turn, and begin the search anew."""
         time = self._params.return_time
         self._turn_by(rows, np.where(self._right, -time, time), t)
-        self._searching &= ~rows
+        self._turned = np.where(rows, 0.0, self._turned)
         self.tries = np.where(rows, 0, self.tries)
 
     def _turn_by(self, rows: Bools, turn: Floats, t: Floats) -> None:

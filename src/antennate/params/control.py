@@ -255,10 +255,14 @@ class SearchParams(Params):
     """Nothing felt for so long proves that the robot gets on."""
     proof_time: float = number(8.0, "s", "assumed: five gait cycles", gt=0, le=300)
     """A walk of so long proves that the robot gets on."""
-    lost_time: float = number(
-        4.0, "s", "fitted: tuning draws; with 2 s it turns round in wide corridors", gt=0, le=3600
+    lost_turn: float = number(
+        3.5, "s", "assumed: about 80 deg; after less it cannot face where it came from", gt=0, le=60
     )
-    """Nothing felt for so long after a turn means that the walls are lost."""
+    """Turn from the first heading after which the robot can have turned round."""
+    lost_time: float = number(
+        3.0, "s", "fitted: tuning draws; with 2 s it turns round in wide corridors", gt=0, le=3600
+    )
+    """Nothing felt for so long after such a turn means that the walls are lost."""
     return_time: float = number(7.5, "s", "assumed: about 180 deg in free space", gt=0, le=60)
     """Time to turn round; no heading is farther than that from the first one."""
 
