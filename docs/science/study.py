@@ -37,7 +37,6 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "no patience": {"search": {"patience": 0.0}},
     "no growth: every turn goes as far": {"search": {"growth": 1.0}},
     "nothing proves that it gets on": {"search": {"free_time": 60.0, "proof_time": 300.0}},
-    "no feeling at the end of a turn": {"search": {"wrong_side": 2.0}},
     "walls are never lost": {"search": {"lost_time": 3600.0}},
     "turns at the gait's own offset": {"escape": {"turn_offset": 0.349}},
 }

@@ -3,10 +3,9 @@
 Touch says when: the robot escapes once its readings repeat, though not before `patience`, since an
 escape that comes too early repeats itself. Touch says where to: the first turn goes away from the
 antenna that stays bent while the robot backs off, when the wall ahead is left behind and only the
-walls beside it are felt. At the end of a turn the opposite antenna is bent where the robot has
-turned to the wrong side; then it turns to the other side at once. And touch says when a search is
-over: nothing felt for `free_time`, or a walk of `proof_time` that was not stuck, proves that the
-robot gets on, and the next jam is a new one.
+walls beside it are felt. And touch says when a search is over: nothing felt for `free_time`, or a
+walk of `proof_time` that was not stuck, proves that the robot gets on, and the next jam is a new
+one.
 
 Until then turns go to both sides by turns, each farther from the heading in which the robot was
 stuck first, and it backs off for longer each time, so that no try repeats another. A turn that goes
@@ -33,16 +32,14 @@ class Search:
     Args:
         params: Times and sizes.
         batch: Number of rows B.
-        period: Control period [s].
 
     Attributes:
         maneuver: `Maneuver` of each row, shape (B,).
         tries: Turns since the last proof that it gets on, shape (B,).
     """
 
-    def __init__(self, params: SearchParams, batch: int, period: float) -> None:
-        self._params, self._period = params, period
-        self._gain = min(1.0, period / params.feel_time)
+    def __init__(self, params: SearchParams, batch: int) -> None:
+        self._params = params
         self.maneuver: Ints = np.full(batch, _FORWARD)
         self.tries: Ints = np.zeros(batch, dtype=np.int64)
         self._begun: Floats = np.full(batch, np.nan)
@@ -50,7 +47,7 @@ class Search:
         self._felt: Floats = np.zeros(batch)
         self._lean: Floats = np.zeros(batch)
         self._turned: Floats = np.zeros(batch)
-        self._right, self._at_once = np.zeros((2, batch), dtype=bool)
+        self._right: Bools = np.zeros(batch, dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
@@ -76,10 +73,10 @@ class Search:
         walking = known & (self.maneuver == _FORWARD)
         self._begun = np.where(np.isnan(self._begun), t, self._begun)
         self._felt = np.where(walking & ~pressed, self._felt, t)
-        escaping = known & ~walking
-        if np.count_nonzero(escaping):
-            self._feel(escaping, lean)
-            self._go_on(escaping & (t >= self._until), t)
+        self._lean += np.where(known & (self.maneuver == _REVERSE), lean, 0.0)
+        over = known & ~walking & (t >= self._until)
+        if np.count_nonzero(over):
+            self._go_on(over, t)
         walked, free = t - self._begun, t - self._felt
         proved = walking & ((free >= params.free_time) | (walked >= params.proof_time))
         self.tries = np.where(proved, 0, self.tries)
@@ -92,26 +89,14 @@ class Search:
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
 
-    def _feel(self, rows: Bools, lean: Floats) -> None:
-        """Left minus right flex: its integral while backing off, its mean while turning."""
-        backing = self.maneuver == _REVERSE
-        change = np.where(backing, lean * self._period, (lean - self._lean) * self._gain)
-        self._lean += np.where(rows, change, 0.0)
-
     def _go_on(self, over: Bools, t: Floats) -> None:
-        """What comes after a maneuver that is over."""
+        """Turn after backing off, and walk after a turn."""
         backed = over & (self.maneuver == _REVERSE)
-        against = np.where(self._right, self._lean, -self._lean)
-        tried = over & ~backed & (self.tries > 0)
-        wrong = tried & ~self._at_once & (against > self._params.wrong_side)
-        walks = over & ~backed & ~wrong
-        self.maneuver = np.where(walks, _FORWARD, self.maneuver)
-        self._begun = np.where(walks, t, self._begun)
-        first = backed & (self.tries == 0)
-        self._right = np.where(first, self._lean >= 0.0, self._right ^ (wrong | (backed & ~first)))
-        self._at_once = (self._at_once & ~backed) | wrong
-        if np.count_nonzero(backed | wrong):
-            self._turn(backed | wrong, t)
+        turned = over & ~backed
+        self.maneuver = np.where(turned, _FORWARD, self.maneuver)
+        self._begun = np.where(turned, t, self._begun)
+        if np.count_nonzero(backed):
+            self._turn(backed, t)
 
     def _back_off(self, rows: Bools, t: Floats) -> None:
         params = self._params
@@ -124,11 +109,12 @@ class Search:
     def _turn(self, rows: Bools, t: Floats) -> None:
         """Turn to the next heading; each is farther from the first one than the last."""
         params = self._params
+        side = np.where(self.tries == 0, self._lean >= 0.0, ~self._right)
+        self._right = np.where(rows, side, self._right)
         size = np.minimum(params.turn_time * params.growth**self.tries, params.return_time)
         turn = np.where(self._right, size, -size) - self._turned
         self._turn_by(rows, turn, t)
         self._turned += np.where(rows, turn, 0.0)
-        self._lean = np.where(rows, 0.0, self._lean)
         self.tries = self.tries + rows
 
     def _return(self, rows: Bools, t: Floats) -> None:
@@ -154,7 +140,7 @@ class SearchRule:
         self._detector = RepetitionDetector(
             control.repetition, batch, control.period, control.gait.frequency
         )
-        self._search = Search(control.search, batch, control.period)
+        self._search = Search(control.search, batch)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Forget everything about some rows."""

@@ -241,14 +241,6 @@ class SearchParams(Params):
         1.2, "1", "assumed: the fifth turn is twice the first from the first heading", ge=1, le=3
     )
     """Factor of each further turn from the first heading, and of backing off."""
-    feel_time: float = number(
-        0.5, "s", "fitted: 86 turns of tuning draws; 0.3 to 1 s tell as much", gt=0, le=10
-    )
-    """Time constant of what is felt while turning."""
-    wrong_side: float = number(
-        0.4, "1", "fitted: 86 turns of tuning draws; 49 % of wrong ones, 13 % of others", gt=0, le=2
-    )
-    """Flex of the opposite antenna above that of the side turned to: a turn to the wrong side."""
     free_time: float = number(
         1.0, "s", "fitted: after such a time the way is free with 95 %", gt=0, le=60
     )
