@@ -24,9 +24,8 @@ from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.joints import Joints
 from antennate.params.safety import FollowingParams
 from antennate.robots.servos import FULL_DRIVE
-from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, draw_trial
+from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 
@@ -55,13 +54,14 @@ class Trial:
     def __init__(
         self, config: TunnelConfig, body: SimRobot, name: str, number: int, hold: float
     ) -> None:
-        scene, period = make_scene(config.scene, config.tunnel), config.control.period
+        scene, period = scene_of(config), config.control.period
         start = draw_trial(config, scene, number, config.control.gait, period)
         body.load(0, start.world, start.chance)
         self._config, self._body, self._joints = config, body, Joints(config.robot)
         self._control = make_controller(name, config.control, config.robot)
         self._control.reset(np.array([0]), start.phase)
-        self._monitor = TrialMonitor(config.seed, number, name, start.scene, [], config.time_limit)
+        limit = time_limit_of(start.scene, config.time_limit)
+        self._monitor = TrialMonitor(config.seed, number, name, start.scene, [], limit)
         kinds = [config.robot.servos.of(kind) for kind in config.robot.servo_names]
         self._stall = np.array([kind.stall_torque for kind in kinds])
         self.following = Following(self._joints, FollowingParams())
@@ -84,7 +84,7 @@ class Trial:
         self._goals = self._joints.ticks(command).astype(float)
         if self._body.failures:
             self.status = "invalid"
-        elif self.ticks % LOOK_EVERY == 0 or world.t >= self._config.time_limit:
+        elif self.ticks % LOOK_EVERY == 0 or world.t >= self._monitor.time_limit:
             maneuver = int(self._control.maneuver[0])
             self.status = self._monitor.look(world, world.t, maneuver) or ""
         return not self.status

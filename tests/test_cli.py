@@ -187,7 +187,10 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         (["tunel"], ["antennate: error:", "did you mean tunnel?", "found tunel"]),
         (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
         (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
-        (["tunnel", "--free-width", "1"], ["did you mean --tunnel.free-width?"]),
+        (
+            ["tunnel", "--free-width", "1"],
+            ["did you mean --tunnel.free-width or --corridors.free-width?"],
+        ),
         (["tunnel", "--arms", "open"], ["did you mean --controllers?", "found '--arms'"]),
         (["wall", "--arms", "stiff"], ["did you mean --profiles?", "found '--arms'"]),
         (["tunnel", "--bogus"], ["expected a known flag, found '--bogus'"]),

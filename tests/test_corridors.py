@@ -25,7 +25,17 @@ from antennate.sim.scenes.hard import HARD
 from antennate.sim.scenes.plan import Arm, Plan, Room
 from antennate.sim.scenes.registry import SHIPPED, make_scene
 from antennate.sim.scenes.tunnel import Tunnel
-from antennate.sim.trial import TrialConfig, draw_trial, scene_of, time_limit_of, variation_of
+from antennate.sim.trial import (
+    Judge,
+    TrialConfig,
+    draw_scene,
+    draw_trial,
+    make_world,
+    scene_of,
+    time_limit_of,
+    variation_of,
+)
+from antennate.sim.warp.arenas import PaddedTunnels
 from antennate.testing import check_scene
 from antennate.types import AntennaFrame, Floats, Maneuver
 
@@ -307,3 +317,24 @@ def test_no_trial_is_crossed_on_open_wires() -> None:
     series = simulate("closed", robot=robot, time_limit=6.0)
     assert set(series.maneuver.tolist()) == {Maneuver.HOLD}
     assert series.meta["outcome"] == "timeout"
+
+
+def test_a_batch_on_a_gpu_gets_corridors_of_one_structure_and_judges_them_alike() -> None:
+    """Walls and cylinders that a draw lacks are parked far away; who crosses its exit succeeds."""
+    config = TunnelConfig(scene="corridors", corridors=CorridorsParams(length=(0.5, 1.5)))
+    scene = scene_of(config)
+    plain = [draw_scene(config, scene, trial) for trial in range(3)]
+    padded = PaddedTunnels(scene, plain)
+    drawn = [draw_scene(config, padded, trial) for trial in range(3)]
+    models = [make_world(config.physics, config.robot, each).model for each in drawn]
+    assert len({(model.ngeom, model.nbody, bytes(model.names)) for model in models}) == 1
+    for alone, filled in zip(plain, drawn, strict=True):
+        assert time_limit_of(filled, None) == time_limit_of(alone, None)
+        assert (filled.exit == alone.exit).all()
+        end, before = alone.exit.mean(axis=0), alone.route[-2]  # type: ignore[attr-defined]
+        past = end + 0.01 * (end - before) / np.hypot(*(end - before))
+        for one in (alone, filled):
+            judge = Judge(one)
+            assert [judge.look(head) for head in (before, end - (past - end), past)][
+                -1
+            ] == "success"

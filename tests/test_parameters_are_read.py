@@ -78,6 +78,14 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "control": {"conditioning": RISING},
         },
         {
+            "trials": 3,
+            "controllers": ["open"],
+            "seed": 2,
+            "scene": "corridors",
+            "time_limit": 0.02,
+            "corridors": {"pieces": [2, 2], "room_share": 0.5, "arm_share": 0.5},
+        },
+        {
             "trials": 1,
             "time_limit": 0.1,
             "control": {"rate": 25.0},

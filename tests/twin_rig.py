@@ -31,9 +31,8 @@ from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
-from antennate.sim.scenes.registry import make_scene
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, draw_trial
+from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
@@ -85,14 +84,14 @@ class Watch:
 
     def __init__(self, config: TunnelConfig, name: str, trial: int) -> None:
         period = config.control.period
-        scene = make_scene(config.scene, config.tunnel)
+        scene = scene_of(config)
         start = draw_trial(config, scene, trial, config.control.gait, period)
         self.body = SimRobot(1, config.robot, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._limit = config.time_limit
-        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], config.time_limit)
+        self._limit = time_limit_of(start.scene, config.time_limit)
+        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], self._limit)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""

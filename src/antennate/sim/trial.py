@@ -181,9 +181,10 @@ def variation_of(config: TrialConfig, scene: Scene) -> VariationParams:
             f"{getattr(config.variation, name)}"
         )
     try:
-        return from_values(VariationParams, {**config.variation.model_dump(), **own})
+        checked = from_values(VariationParams, own)
     except ConfigError as error:
         raise SceneError(f"scene {config.scene!r}: variation: {error}") from error
+    return config.variation.model_copy(update={name: getattr(checked, name) for name in own})
 
 
 def check_start(config: TrialConfig) -> None:
