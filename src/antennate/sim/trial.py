@@ -15,7 +15,7 @@ from pydantic import field_validator, model_validator
 from antennate.control.gait import targets
 from antennate.errors import AntennateError, ConfigError, SceneError, raised
 from antennate.messages import shortened
-from antennate.params.base import Params, changes, number
+from antennate.params.base import Params, changes, number, paths_of
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.reading import from_values
 from antennate.params.scene import CorridorsParams, PhysicsParams, TunnelParams, VariationParams
@@ -57,17 +57,19 @@ class TrialConfig(Params):
         return check_name(name)
 
     def unread_here(self) -> Mapping[str, str]:
-        """What this robot does not have."""
-        return unused(self.robot)
+        """What this robot does not have, and ranges of a scene that is another."""
+        ranges = () if self.scene == CORRIDORS else paths_of(CorridorsParams, CORRIDORS)
+        return {
+            **unused(self.robot),
+            **dict.fromkeys(ranges, f"it belongs to the scene {CORRIDORS!r}"),
+        }
 
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
-        owned = {TUNNEL: self.tunnel, CORRIDORS: self.corridors}
-        for owner, params in owned.items():
-            if self.scene != owner and params != type(params)():
-                raise ValueError(
-                    f"{owner} belongs to the scene {owner!r}, found the scene {self.scene!r}"
-                )
+        if self.scene != TUNNEL and self.tunnel != TunnelParams():
+            raise ValueError(
+                f"tunnel belongs to the scene {TUNNEL!r}, found the scene {self.scene!r}"
+            )
         widths = {TUNNEL: self.tunnel.free_width, CORRIDORS: self.corridors.free_width[0]}
         width = widths.get(self.scene, math.inf)
         if width < self.robot.width:
