@@ -172,7 +172,8 @@ def test_without_the_same_name_the_group_or_the_groups_that_are_read_are_named(
     [
         (["open", "paper"], {"rule": {"hold_time": 3.0}}, {}),
         (["closed", "paper"], {"gait": {"turn_offset": 0.2}}, {}),
-        (["closed"], {"rule": {"strong": 0.8}, "escape": {"trigger": "contact"}}, {}),
+        (["closed-1"], {"rule": {"strong": 0.8}, "escape": {"trigger": "contact"}}, {}),
+        (["closed"], {"search": {"patience": 4.0}}, {}),
         (["closed"], {"repetition": {"change": 0.1}}, {}),
         (["open", OWN], {"rule": {"strong": 0.8}, "gait": {"lift": {"lag": 1.0}}}, {}),
         (["open"], {"gait": {"lift": {"lag": 1.0}}}, LIFTING),

@@ -34,9 +34,10 @@ MAP_SEED = 777
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "closed": {},
-    "stuck = both strong and similar (the paper's REVERSE)": {"escape": {"trigger": "contact"}},
-    "first turn always right, no memory of touch": {"escape": {"first_turn": "right"}},
-    "no alternation: every turn is a first turn": {"escape": {"alternate": False}},
+    "no patience": {"search": {"patience": 0.0}},
+    "no growth: every turn goes as far": {"search": {"growth": 1.0}},
+    "nothing proves that it gets on": {"search": {"free_time": 60.0, "proof_time": 300.0}},
+    "walls are never lost": {"search": {"lost_time": 3600.0}},
     "turns at the gait's own offset": {"escape": {"turn_offset": 0.349}},
 }
 ONE_WAY = {"robot": {"antenna": {"sensor": {"directions": "one"}}}}

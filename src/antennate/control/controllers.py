@@ -4,7 +4,8 @@ Conditioning, contact and gait are the same in all. The rule that chooses the ma
 
 - `open` always walks FORWARD;
 - `paper` follows the published table and holds each maneuver for a time;
-- `closed` walks FORWARD until its readings repeat, then escapes;
+- `closed-1` walks FORWARD until its readings repeat, then escapes;
+- `closed` does so with patience, and searches for the way on;
 - `map` walks along the route, which only a simulation can tell it.
 """
 
@@ -22,6 +23,7 @@ from antennate.control.knowledge import Kind, Knowledge
 from antennate.control.maneuver import Hold, decide
 from antennate.control.map_rule import MapRule
 from antennate.control.repetition import RepetitionDetector
+from antennate.control.search import SearchRule
 from antennate.params.control import ControlParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.robots.spec import RobotSpec, require_antennae
@@ -191,9 +193,14 @@ def paper(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControlle
     return RuleController(_PaperRule(control, batch), control, robot, batch)
 
 
-def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
-    """`closed`: walks FORWARD until its readings repeat, then escapes."""
+def closed_1(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`closed-1`: walks FORWARD until its readings repeat, then escapes."""
     return RuleController(_ClosedRule(control, batch), control, robot, batch)
+
+
+def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`closed`: walks FORWARD until its readings repeat, then searches for the way on."""
+    return RuleController(SearchRule(control, batch), control, robot, batch)
 
 
 def by_map(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:

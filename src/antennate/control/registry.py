@@ -24,6 +24,7 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "timed": blind.timed,
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
+    "closed-1": controllers.closed_1,
     "schedule": blind.schedule,
     "zigzag": blind.zigzag,
     "random": blind.RandomController,
@@ -35,9 +36,10 @@ PRIVILEGED: dict[str, ControllerFactory] = {"map": controllers.by_map}
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
-    "timed": "escapes as closed does, by the clock and whatever it feels: the control of closed",
+    "timed": "backs off and turns by the clock, whatever it feels: the control of closed",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
-    "closed": "walks on until its readings repeat: then it is stuck, backs off and turns",
+    "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
+    "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",

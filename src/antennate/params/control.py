@@ -160,9 +160,9 @@ class RepetitionParams(Params):
 
 
 class EscapeParams(Params):
-    """Backing off and turning when stuck.
+    """Backing off and turning when stuck, as `closed-1` does.
 
-    Fitted: times without feedback on 96 tunnels, turns with `closed` on 60 and then 200 tuning
+    Fitted: times without feedback on 96 tunnels, turns with `closed-1` on 60 and then 200 tuning
     tunnels.
     """
 
@@ -175,13 +175,13 @@ class EscapeParams(Params):
     reverse_time: float = number(
         2.2,
         "s",
-        "fitted: `closed` on 60 tuning tunnels (docs/science/study.py); 2/3 of the body",
+        "fitted: `closed-1` on 60 tuning tunnels (docs/science/study.py); 2/3 of the body",
         gt=0,
         le=30,
     )
     """Time to back off."""
     turn_time: float = number(
-        2.2, "s", "fitted: `closed` on 60 tuning tunnels; about 50 deg at turn_offset", gt=0, le=30
+        2.2, "s", "fitted: `closed-1` on 60 tuning tunnels; about 50 deg", gt=0, le=30
     )
     """Time of the first turn."""
     turn_offset: float = number(0.52, "rad", "assumed: a turn nearly on the spot", gt=0, le=1.0)
@@ -193,7 +193,7 @@ class EscapeParams(Params):
     second_turn: float = number(
         1.5,
         "1",
-        "fitted: `closed` on 200 tuning tunnels (seeds 31, 32): 192 successes, 188 with 2.0",
+        "fitted: `closed-1` on 200 tuning tunnels (seeds 31, 32): 192 successes, 188 with 2.0",
         gt=0,
         le=5,
     )
@@ -222,6 +222,44 @@ class EscapeParams(Params):
     """Time to turn round."""
 
 
+class SearchParams(Params):
+    """How `closed` looks for the way on when stuck: with patience, and with turns that grow.
+
+    Fitted on tuning draws alone (seed 410001, docs/science/tunnel.md).
+    """
+
+    patience: float = number(
+        3.0, "s", "fitted: tuning draws; an escape that comes too early repeats itself", ge=0, le=60
+    )
+    """Shortest walk between two escapes."""
+    reverse_time: float = number(2.2, "s", "assumed: as escape.reverse_time", gt=0, le=30)
+    """Time to back off at first."""
+    reverse_most: float = number(5.0, "s", "assumed: more than the body", gt=0, le=30)
+    """Longest time to back off."""
+    turn_time: float = number(2.6, "s", "assumed: about 60 deg in free space", gt=0, le=30)
+    """Time of the first turn."""
+    growth: float = number(
+        1.2, "1", "assumed: the fifth turn is twice the first from the first heading", ge=1, le=3
+    )
+    """Factor of each further turn from the first heading, and of backing off."""
+    free_time: float = number(
+        1.0, "s", "fitted: after such a time the way is free with 95 %", gt=0, le=60
+    )
+    """Nothing felt for so long proves that the robot gets on."""
+    proof_time: float = number(8.0, "s", "assumed: five gait cycles", gt=0, le=300)
+    """A walk of so long proves that the robot gets on."""
+    lost_turn: float = number(
+        3.5, "s", "assumed: about 80 deg; after less it cannot face where it came from", gt=0, le=60
+    )
+    """Turn from the first heading after which the robot can have turned round."""
+    lost_time: float = number(
+        3.0, "s", "fitted: tuning draws; with 2 s it turns round in wide corridors", gt=0, le=3600
+    )
+    """Nothing felt for so long after such a turn means that the walls are lost."""
+    return_time: float = number(7.5, "s", "assumed: about 180 deg in free space", gt=0, le=60)
+    """Time to turn round; no heading is farther than that from the first one."""
+
+
 class ControlParams(Params):
     """Conditioning, contact rule, maneuvers and gait of the controllers."""
 
@@ -234,6 +272,7 @@ class ControlParams(Params):
     rule: RuleParams = RuleParams()
     repetition: RepetitionParams = RepetitionParams()
     escape: EscapeParams = EscapeParams()
+    search: SearchParams = SearchParams()
     timed: TimedParams = TimedParams()
     schedule: ScheduleParams = ScheduleParams()
     zigzag: ZigzagParams = ZigzagParams()
