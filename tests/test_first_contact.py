@@ -149,7 +149,7 @@ def test_nothing_of_nothing_is_never_said() -> None:
 
 ABOUT = [
     "open: walks forward whatever its antennae feel",
-    "timed: escapes as closed does, by the clock",
+    "timed: backs off and turns by the clock",
     "paper: turns away from the side that touches",
     "closed: walks on until its readings repeat",
 ]

@@ -198,16 +198,16 @@ def walked(name: str, knowledge: Knowledge, seconds: float) -> list[int]:
 
 def test_an_escape_goes_by_what_is_known() -> None:
     jam, no = np.array([True]), np.array([False])
-    assert set(walked("closed", Knowledge(jam=no), 9)) == {Maneuver.FORWARD}
+    assert set(walked("closed-1", Knowledge(jam=no), 9)) == {Maneuver.FORWARD}
     for side, turn in ((1, Maneuver.TURN_L), (-1, Maneuver.TURN_R)):
-        done = walked("closed", Knowledge(jam=jam, side=np.array([side])), 4)
+        done = walked("closed-1", Knowledge(jam=jam, side=np.array([side])), 4)
         assert [m for m in (Maneuver.REVERSE, turn) if m in done] == [Maneuver.REVERSE, turn]
         assert set(done) <= {Maneuver.FORWARD, Maneuver.REVERSE, turn}
-    assert set(walked("closed", Knowledge(jam=jam, free=jam), 9)) == {Maneuver.FORWARD}
-    assert set(walked("closed", Knowledge(facing=jam), 9)) & {Maneuver.TURN_L, Maneuver.TURN_R}
-    assert set(walked("closed", Knowledge(facing=no), 9)) == {Maneuver.FORWARD}
+    assert set(walked("closed-1", Knowledge(jam=jam, free=jam), 9)) == {Maneuver.FORWARD}
+    assert set(walked("closed-1", Knowledge(facing=jam), 9)) & {Maneuver.TURN_L, Maneuver.TURN_R}
+    assert set(walked("closed-1", Knowledge(facing=no), 9)) == {Maneuver.FORWARD}
     # a turn ends where the point is ahead: it was off by a whole turn time otherwise
-    ahead = walked("closed", Knowledge(jam=jam, map=np.array([0.05])), 4)
+    ahead = walked("closed-1", Knowledge(jam=jam, map=np.array([0.05])), 4)
     turns = sum(m in (Maneuver.TURN_L, Maneuver.TURN_R) for m in ahead)
     assert turns <= 2
 
@@ -248,9 +248,9 @@ def test_numbers_that_a_page_changes_leave_a_controller_its_knowledge() -> None:
 
 @pytest.mark.parametrize("knows", [("side", "jam"), ("map", "free")])
 def test_rows_do_not_depend_on_batch_and_workers(knows: tuple[Any, ...]) -> None:
-    config = TunnelConfig(**SHORT, controllers=("closed",), knows=knows)
+    config = TunnelConfig(**SHORT, controllers=("closed-1",), knows=knows)
     alone: list[Any] = []
-    run_trials(config, "closed", [0, 1, 2], lambda found: alone.append(found[0]), batch=1)
+    run_trials(config, "closed-1", [0, 1, 2], lambda found: alone.append(found[0]), batch=1)
     assert run(config).rows == alone
     assert run(config, workers=2).rows == alone
 
@@ -269,7 +269,7 @@ def test_map_crosses_tunnels_in_which_open_is_stuck() -> None:
 
 @pytest.mark.parametrize(
     ("controllers", "knows"),
-    [(("open",), ("side",)), (("closed", "paper"), ("jam",)), (("map",), ("free",))],
+    [(("open",), ("side",)), (("closed-1", "paper"), ("jam",)), (("map",), ("free",))],
 )
 def test_a_controller_that_uses_nothing_of_it_is_refused(
     controllers: tuple[str, ...], knows: tuple[Any, ...]
@@ -282,8 +282,8 @@ def test_a_scene_without_a_route_is_refused_where_it_is_needed(pathless: str) ->
     with pytest.raises(SceneError, match="route"):
         check(TunnelConfig(scene=pathless, controllers=("map",)))
     with pytest.raises(SceneError, match="side"):
-        check(TunnelConfig(scene=pathless, controllers=("closed",), knows=("side", "jam")))
-    check(TunnelConfig(scene=pathless, controllers=("closed",), knows=("jam", "free")))
+        check(TunnelConfig(scene=pathless, controllers=("closed-1",), knows=("side", "jam")))
+    check(TunnelConfig(scene=pathless, controllers=("closed-1",), knows=("jam", "free")))
 
 
 @pytest.mark.parametrize(
@@ -308,7 +308,7 @@ def test_no_robot_has_it(words: str, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_log_says_what_was_known_and_is_not_replayed(tmp_path: Path) -> None:
-    config = TunnelConfig(trials=1, time_limit=0.3, controllers=("closed",), knows=("jam", "side"))
+    config = TunnelConfig(trials=1, time_limit=0.3, controllers=("closed-1",), knows=("jam", "side"))
     run(config, logs=tmp_path)
     with LogReader(next(tmp_path.glob("*.mcap"))) as log:
         header = log.header
