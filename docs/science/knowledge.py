@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
+from scipy.stats import t as student
 
 from antennate.control.knowledge import KNOWABLE, Knowing, Knowledge
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import cpu_bodies, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
-from antennate.sim.knowledge import side_ahead
+from antennate.sim.knowledge import SIDE_AHEAD, angle_ahead
 from antennate.sim.trial import draw_scene, scene_of
 from antennate.studies.statistics import compare
 from antennate.types import AntennaFrame
@@ -261,11 +262,12 @@ def _ends(cell: dict[int, Any], base: dict[int, Any], trial: int) -> tuple[str, 
 
 
 def _pooled(cells: list[dict[str, Any]]) -> dict[str, Any]:
-    """The mean over scenes, each with the same weight, and its 95 % interval."""
+    """The mean over scenes, each with the same weight, and its 95 % interval (Student's)."""
     mean = float(np.mean([cell["saved_s"] for cell in cells]))
     error = float(np.sqrt(sum(c["spread_s"] ** 2 / c["trials"] for c in cells)) / len(cells))
     share = mean / float(np.mean([c["mean_s"] + c["saved_s"] for c in cells]))
-    ends = [mean - 1.96 * error, mean + 1.96 * error]
+    reach = error * float(student.ppf(0.975, sum(cell["trials"] - 1 for cell in cells)))
+    ends = [mean - reach, mean + reach]
     return {"scenes": len(cells), "saved_s": mean, "saved_95_s": ends, "share": share}
 
 
@@ -293,6 +295,9 @@ def _figure(scenes: dict[str, Any]) -> Figure:
     return figure
 
 
+PLACE = ("x", "y", "heading")
+ASIDE = np.radians(30.0)
+"""Angle to the point ahead from which on there is a side to ask for [rad]."""
 CYCLE = 33
 """Samples of a gait cycle."""
 GYRO_NOISE = 0.007
@@ -400,22 +405,28 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
             samples = file["samples"]
         config = config_of(scene, 1)
         drawn = scene_of(config)
-        for row in np.unique(samples[:, 0]).tolist():
+        for row, seen in [(r, m) for r in np.unique(samples[:, 0]).tolist() for m in (False, True)]:
             trial = samples[samples[:, 0] == row]
             if len(trial) < 4 * CYCLE:
                 continue
             rng = np.random.default_rng([SEED, int(row), len(groups)])
             some = slice(2 * CYCLE, None, 10)
             route: Any = getattr(draw_scene(config, drawn, int(row)), "route")  # noqa: B009
-            place = [SIGNALS.index(name) for name in ("x", "y", "heading")]
-            side = [side_ahead(route, p[:2], p[2]) for p in trial[some][:, place].astype(float)]
-            truths.setdefault("side", []).append(np.array(side))
+            x, y, heading = (trial[:, SIGNALS.index(n)].astype(float) for n in PLACE)
+            heading = _mean(np.unwrap(heading)[:, None], CYCLE)[:, 0]  # without the head's swing
+            places = zip(np.stack([x, y], axis=1)[some], heading[some].tolist(), strict=True)
+            angles = np.array([angle_ahead(route, *place, SIDE_AHEAD) for place in places])
+            side = np.sign(angles) * (np.abs(angles) > ASIDE) * (-1 if seen else 1)
+            trial = mirrored(trial) if seen else trial
+            truths.setdefault("side", []).append(side)
             for name, values in features(trial, rng).items():
                 parts.setdefault(name, []).append(values[some])
             for kind in ("jam", "facing", "free", "maneuver"):
                 truths.setdefault(kind, []).append(trial[some, SIGNALS.index(kind)])
             count = len(trial[some])
             truths.setdefault("known", []).append(np.full(count, condition))
+            truths.setdefault("mirrored", []).append(np.full(count, seen))
+            truths.setdefault("half", []).append(np.full(count, int(row) % 2))
             scenes.append(np.full(count, scene))
             groups.append(np.full(count, f"{scene}-{int(row)}"))
     return (
@@ -424,6 +435,18 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
         np.concatenate(scenes),
         np.concatenate(groups),
     )
+
+
+def mirrored(samples: Any) -> Any:
+    """The samples of a trial as they were in a mirror, left for right."""
+    found = samples.copy()
+    at = {name: i for i, name in enumerate(SIGNALS)}
+    found[:, [at["left"], at["right"]]] = samples[:, [at["right"], at["left"]]]
+    found[:, [at["heading"], at["bend"]]] *= -1.0
+    found[:, at["phase"]] += np.pi  # the right legs step where the left ones did
+    turns = samples[:, at["maneuver"]]
+    found[:, at["maneuver"]] = np.where(turns == 1, 2, np.where(turns == 2, 1, turns))
+    return found
 
 
 def _auc(score: Any, truth: Any) -> float:
@@ -458,6 +481,13 @@ def readings(folder: Path, kinds: list[str]) -> None:
         truth, chosen = asked[kind]
         told = truths["known"] == kind.split()[0]  # whose commands would give the truth away
         chosen = chosen & ~told
+        half = None
+        if kind.startswith("side"):
+            half = truths[
+                "half"
+            ]  # trials of a number begin alike in all scenes, and go to one side
+        else:
+            chosen = chosen & ~truths["mirrored"].astype(bool)
         result["samples"][kind] = [int((truth & chosen).sum()), int((~truth & chosen).sum())]
         result["auc"][kind] = {}
         for name, wanted in SETS.items():
@@ -476,11 +506,19 @@ def readings(folder: Path, kinds: list[str]) -> None:
                 ),
             }
             result["auc"][kind][name] = {
-                label: _left_out(model, x[chosen], truth[chosen], scenes[chosen], groups[chosen])
+                label: _left_out(
+                    *(model, x[chosen], truth[chosen], scenes[chosen], groups[chosen]),
+                    None if half is None else half[chosen],
+                )
                 for label, model in models.items()
             }
             print(kind, name, result["auc"][kind][name], flush=True)
     path.write_text(json.dumps(result, indent=1) + "\n")
+    tell_readings(result)
+
+
+def tell_readings(result: dict[str, Any]) -> None:
+    """Write the tables of what the readings tell."""
     lines = ["AUC with 95 % interval; in brackets the samples that are so, and that are not."]
     for kind, sets in result["auc"].items():
         counts = " and ".join(f"{count}" for count in result["samples"][kind])
@@ -495,20 +533,29 @@ def readings(folder: Path, kinds: list[str]) -> None:
     _write("readings", lines)
 
 
-def _left_out(model: Any, x: Any, truth: Any, scenes: Any, groups: Any) -> dict[str, Any]:
-    """AUC of each scene by a model of the others, their mean, and its interval over trials."""
+def _left_out(
+    model: Any, x: Any, truth: Any, scenes: Any, groups: Any, half: Any | None
+) -> dict[str, Any]:
+    """AUC of each scene by a model of the others, their mean, and its interval over trials.
+
+    With halves, of shape (n,), a model learns on one half of the trials of the other scenes, and is
+    tested on the other half of this one.
+    """
     scores = np.full(len(truth), np.nan)
     by_scene: dict[str, float] = {}
     for scene in SCENES:
         out = scenes == scene
         if not (0 < truth[out].sum() < out.sum()) or out.all():
             continue
-        if model is None:
-            areas = np.array([_auc(column, truth[~out]) for column in x[~out].T])
-            best = int(np.argmax(np.abs(areas - 0.5)))
-            scores[out] = x[out, best] * np.sign(areas[best] - 0.5)
-        else:
-            scores[out] = model.fit(x[~out], truth[~out]).predict_proba(x[out])[:, 1]
+        for part in (None,) if half is None else (0, 1):
+            test = out if part is None else out & (half == part)
+            learn = ~out if part is None else ~out & (half != part)
+            if model is None:
+                areas = np.array([_auc(column, truth[learn]) for column in x[learn].T])
+                best = int(np.argmax(np.abs(areas - 0.5)))
+                scores[test] = x[test, best] * np.sign(areas[best] - 0.5)
+            elif test.any():
+                scores[test] = model.fit(x[learn], truth[learn]).predict_proba(x[test])[:, 1]
         by_scene[scene] = _auc(scores[out], truth[out])
     rng, means = np.random.default_rng(SEED), list[float]()
     places = {g: np.flatnonzero(groups == g) for g in np.unique(groups)}
