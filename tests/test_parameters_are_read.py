@@ -88,6 +88,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {
             "trials": 1,
             "time_limit": 0.1,
+            "controllers": ["open", "paper", "closed", "closed-1"],
             "control": {"rate": 25.0},
             "robot": {
                 "yaw": {"servo": "xl330_m288"},
