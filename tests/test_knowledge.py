@@ -308,7 +308,9 @@ def test_no_robot_has_it(words: str, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_log_says_what_was_known_and_is_not_replayed(tmp_path: Path) -> None:
-    config = TunnelConfig(trials=1, time_limit=0.3, controllers=("closed-1",), knows=("jam", "side"))
+    config = TunnelConfig(
+        trials=1, time_limit=0.3, controllers=("closed-1",), knows=("jam", "side")
+    )
     run(config, logs=tmp_path)
     with LogReader(next(tmp_path.glob("*.mcap"))) as log:
         header = log.header
