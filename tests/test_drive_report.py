@@ -256,7 +256,7 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
     assert main(["drive", *ports, "--controller", "clsoed"]) == 2
     said = capsys.readouterr().err
-    assert "controller: expected one of open, timed, paper, closed, schedule, " in said
+    assert "controller: expected one of open, timed, paper, closed, closed-1, " in said
     assert "/no/board" not in said
 
 

@@ -106,7 +106,8 @@ def test_a_report_is_read_on_a_screen_and_on_a_phone(tmp_path: Path) -> None:
 def test_on_a_phone_every_column_of_a_comparison_is_seen_and_what_is_wider_says_so(
     tmp_path: Path,
 ) -> None:
-    settings = {"trials": 2, "time_limit": 12.0, "seed": 5}
+    three = ("open", "paper", "closed")  # beside one another, wider than a phone
+    settings = {"trials": 2, "time_limit": 12.0, "seed": 5, "controllers": three}
     antennate.run("tunnel", out=tmp_path / "one", **settings)
     words = ["report", "--compare", str(tmp_path / "one"), str(tmp_path / "one")]
     assert main([*words, "--out", str(tmp_path / "both.html")]) == 0
