@@ -1,10 +1,10 @@
 """How often a 95 % interval of a restricted mean time holds the true mean, by five methods.
 
 A restricted time is the limit where a trial fails. Times of successes are lognormal below the
-limit, or those of an evaluation (docs/science/evaluation.csv), drawn with replacement. Each cell
-is a number of trials, a distribution and a share of failures; each draw of it gives every method
-the same values. Differences are of two conditions on the same trials: how hard a trial is moves
-the times of both, and their failures (a Gaussian copula with a given correlation).
+limit, or those of an evaluation (docs/science/evaluation-20261126.csv), drawn with replacement.
+Each cell is a number of trials, a distribution and a share of failures; each draw of it gives
+every method the same values. Differences are of two conditions on the same trials: how hard a
+trial is moves the times of both, and their failures (a Gaussian copula with a given correlation).
 
 Methods: Student's t; Hall's (1992) cubic transformation of t against skewness, Journal of the Royal
 Statistical Society B 54, 221-228; bootstrap-t and BCa with 1000 samples (Efron and Tibshirani,
@@ -141,7 +141,7 @@ def _restricted(spread: float, share: float) -> float:
 def seen() -> dict[str, Floats]:
     """Restricted times of the evaluation by controller, in the order of trials [s]."""
     found: dict[str, list[float]] = {}
-    with (SCIENCE / "evaluation.csv").open() as file:
+    with (SCIENCE / "evaluation-20261126.csv").open() as file:
         for row in csv.DictReader(file):
             late = row["outcome"] != "success"
             found.setdefault(row["controller"], []).append(LIMIT if late else float(row["time_s"]))

@@ -248,8 +248,9 @@ def whole(figures: Figures) -> str:
     return f"""\
 ## The main job
 
-The default `antennate tunnel`, 90 trials of which some take the full 100 s, without figures, from
-the command to its end: {one:.0f} s with `--workers 1`, {two:.0f} s with two, once each.
+The default `antennate tunnel` before `timed` was added to it, 90 trials of which some take the
+full 100 s, without figures, from the command to its end: {one:.0f} s with `--workers 1`,
+{two:.0f} s with two, once each.
 """
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-from antennate.control.registry import about, compared
+from antennate.control.registry import RIVAL, about, compared
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.experiments.tunnel.batch import BATCH
@@ -46,7 +46,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         "Pairs, trial by trial",
         {
             f"{short[first]} minus {short[second]}": pairs[f"{first}-{second}"]
-            for first, second in combinations(controllers, 2)
+            for first, second in _shown_pairs(list(controllers))
             if f"{first}-{second}" in pairs
         },
         two,
@@ -54,6 +54,13 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         "ranks; both two-sided.",
     )
     return (one_by_one, two_by_two) if pairs else (one_by_one,)
+
+
+def _shown_pairs(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Pairs that the table shows: of many, those with the rival; result.json holds all."""
+    pairs = list(combinations(names, 2))
+    with_rival = [pair for pair in pairs if RIVAL in pair]
+    return with_rival if len(names) > 3 and with_rival else pairs
 
 
 def sentence(result: Mapping[str, Any]) -> str:

@@ -53,7 +53,7 @@ CONTROLLER = (
     *(_share(label, name) for name, label in SHARES.items()),
     Measure("force_mean_n", "contact force, mean", "N", of=mean, least=0.0),
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
-    Measure("offset_m", "off the middle, successes", "m", form=".3f", least=0.0),
+    Measure("offset_m", "off the middle", "m", form=".3f", least=0.0),
     Measure("offset_95", "  95 %", "m", form=".3f"),
     Measure("spring_low_n_m", of=smallest),
     Measure("spring_high_n_m", "spring torque, most", "N·mm", of=largest, scale=1e3),
