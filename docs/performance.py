@@ -391,7 +391,8 @@ def agreement(figures: Figures) -> str:
     return f"""\
 {AGREEMENT_HEAD}
 {figures["trials"]} trials of the default `tunnel`, seed {figures["seed"]}: successes and
-restricted mean time. *Old instructions*: NumPy without {figures["old_instructions"]}.
+restricted mean time of the `closed` of then, now `closed-1`. *Old instructions*: NumPy without
+{figures["old_instructions"]}.
 
 {table(("way", *names), ways)}
 {table(("controller", "first", "second", "other end", "difference of time, 95 % [s]"), pairs)}
