@@ -42,9 +42,9 @@ def peer(server: PtyServer) -> Iterator[Any]:
 
 
 def tried(call: Callable[[], Any], good: Any) -> Any:
-    """What it returns, tried a few times: a busy machine may be slower than its patience."""
+    """What it returns, tried again and again: a busy machine may be slower than its patience."""
     found = None
-    for _ in range(5):
+    for _ in range(20):
         try:
             found = call()
         except RuntimeError as error:
