@@ -202,7 +202,7 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     ]
     assert len(figure.legends) == 1
     named = [text.get_text() for panel in figure.axes for text in panel.texts]
-    assert named == list(USUAL)
+    assert named == [*USUAL] * 4  # in lines of two, above each panel
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3, 4])

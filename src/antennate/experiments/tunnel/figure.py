@@ -79,6 +79,7 @@ def trajectories(
     sides = [most if box is None else box[1] - box[0] for box in boxes.values()]
     step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, most.max()))[0])
     figure, panels = _panels(len(controllers), sides, step, _handles(list(paths.values())))
+    beside = _in_a_line(len(controllers), len(trials))
     for i, (controller, label) in enumerate(short_names(controllers).items()):
         for j, trial in enumerate(trials):
             panel, place, box = panels[j, i], (controller, trial), boxes[trial]
@@ -89,10 +90,12 @@ def trajectories(
                 _draw_trial(panel, paths[place])
                 said = _OUTCOMES[table[place].outcome].format(table[place].time_s)
             panel.set_title(f"trial {trial}: {said}", fontsize=8)
-        _name_column(panels[0, i], label)
-    for panel in panels[-1]:
+        for panel in panels[:, i] if 1 < beside < len(controllers) else panels[:1, i]:
+            _name_column(panel, label)
+    lowest = -1 if beside == 1 else (len(controllers) - 1) // beside * beside
+    for panel in panels[-1] if len(trials) == 1 else panels[-1, lowest:]:
         panel.set_xlabel("x [m]")
-    for panel in panels[:, :: _in_a_line(len(controllers), len(trials))].flat:
+    for panel in panels[:, ::beside].flat:
         panel.set_ylabel("y [m]")
     return figure
 
@@ -121,7 +124,7 @@ def _panels(
     in_line = max(1, int(across // 2))
     low = _AXIS + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
     down = [size[1] for size in sizes for _ in range(lines)]
-    gap = _AXIS + _HEAD if lines > 1 else _TICKS + _TITLE
+    gap = _AXIS + _HEAD if len(sides) == 1 else _TICKS + (_HEAD if lines > 1 else _TITLE)
     high = low + sum(down) + (len(down) - 1) * gap + _HEAD
     figure = Figure(figsize=(across, high))
     panels = np.empty((len(sides), columns), object)
