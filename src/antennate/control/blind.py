@@ -1,9 +1,9 @@
 """Controllers that feel nothing: what an escape is worth without touch.
 
-Whoever claims that touch helps has to beat them: they back off and turn as `closed` does, but by
-the clock or by chance. All walk, back off and turn, again and again; the rules differ in the times:
+Whoever claims that touch helps has to beat them: they back off and turn, too, but by the clock or
+by chance. All walk, back off and turn, again and again; the rules differ in the times:
 
-- `timed` walks for a time, then makes the escape of `closed`, as if nothing had touched before;
+- `timed` walks for a time, then makes the escape of `closed-1`, as if nothing had touched before;
 - `schedule` turns right and left by turns, farther and farther from its first heading;
 - `zigzag` turns right and left by turns, always by as much;
 - `random` walks, backs off and turns for random times, to random sides.
@@ -36,7 +36,7 @@ _BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn", "retry
 
 
 class TimedRule:
-    """Walks for a time, then the escape of `closed` with nothing touched, again and again."""
+    """Walks for a time, then the escape of `closed-1` with nothing touched, again and again."""
 
     knows = Escape.knows
 
@@ -198,7 +198,7 @@ class RandomController(RuleController):
 
 
 def timed(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
-    """`timed`: walks for a time, then escapes as `closed` does."""
+    """`timed`: walks for a time, then escapes as `closed-1` does."""
     return RuleController(TimedRule(control, batch), control, robot, batch)
 
 

@@ -73,12 +73,12 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
         knows: What a simulation tells it; a robot tells nothing.
     """
     by_contact = name == "closed-1" and control.escape.trigger == "contact"
-    found = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    paths = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
     if name == "closed-1" and "jam" in knows:
-        found |= {"escape.trigger", *_REPEATED, *_BLOCKED}
+        paths |= {"escape.trigger", *_REPEATED, *_BLOCKED}
     if name == "timed" and "jam" in knows:
-        found |= set(_TIMED)
-    return found
+        paths |= set(_TIMED)
+    return paths
 
 
 def unread_by_all(

@@ -62,15 +62,15 @@ def _delay(text: str, seconds: str) -> float:
         ConfigError: It is no time above 0, or too long.
     """
     try:
-        found = float(seconds)
+        delay = float(seconds)
     except ValueError:
-        found = math.nan
-    if not 0.0 < found <= LONGEST_DELAY:
+        delay = math.nan
+    if not 0.0 < delay <= LONGEST_DELAY:
         raise ConfigError(
             f"expected {DELAYED}:S with seconds above 0 and at most {LONGEST_DELAY:g}, as "
             f"{DELAYED}:0.5, found {shown(text)}"
         )
-    return found
+    return delay
 
 
 def condition(controller: str, readings: str) -> str:

@@ -71,8 +71,8 @@ def check_for_robots(name: str) -> str:
 
 def about(names: Iterable[str]) -> str:
     """What the controllers of ours among these conditions do, a line each, then their readings."""
-    ours = dict.fromkeys(parts_of(name)[0] for name in names)
-    lines = [f"{name}: {ABOUT[name]}" for name in ours if name in ABOUT]
+    plain = dict.fromkeys(parts_of(name)[0] for name in names)
+    lines = [f"{name}: {ABOUT[name]}" for name in plain if name in ABOUT]
     return "\n".join([*lines, *about_readings(names)])
 
 

@@ -71,8 +71,9 @@ class Search:
         params, lean = self._params, flex[:, LEFT] - flex[:, RIGHT]
         known = ~np.isnan(lean)
         walking = known & (self.maneuver == _FORWARD)
-        self._begun = np.where(np.isnan(self._begun), t, self._begun)
-        self._felt = np.where(walking & ~pressed, self._felt, t)
+        new = np.isnan(self._begun)
+        self._begun = np.where(new, t, self._begun)
+        self._felt = np.where(walking & ~pressed & ~new, self._felt, t)
         self._lean += np.where(known & (self.maneuver == _REVERSE), lean, 0.0)
         over = known & ~walking & (t >= self._until)
         if np.count_nonzero(over):

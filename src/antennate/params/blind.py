@@ -16,9 +16,7 @@ _Time = Annotated[float, Field(ge=0, le=30)]
 class TimedParams(Params):
     """When `timed` escapes; how it escapes is `escape`."""
 
-    walk_time: float = number(
-        5.0, "s", "assumed: three gait cycles; 3 s cross less, 8 s lose time", gt=0, le=300
-    )
+    walk_time: float = number(5.0, "s", "assumed: three gait cycles; not tuned", gt=0, le=300)
     """Time to walk between two escapes."""
 
 

@@ -225,7 +225,7 @@ class EscapeParams(Params):
 class SearchParams(Params):
     """How `closed` looks for the way on when stuck: with patience, and with turns that grow.
 
-    Fitted on tuning draws alone (seed 410001, docs/science/tunnel.md).
+    Set by reasoning, and tried on tuning draws alone (seed 410001, docs/science/tunnel.md).
     """
 
     patience: float = number(
@@ -243,7 +243,7 @@ class SearchParams(Params):
     )
     """Factor of each further turn from the first heading, and of backing off."""
     free_time: float = number(
-        1.0, "s", "fitted: after such a time the way is free with 95 %", gt=0, le=60
+        1.0, "s", "assumed: over half a gait cycle, in which a wall is touched", gt=0, le=60
     )
     """Nothing felt for so long proves that the robot gets on."""
     proof_time: float = number(8.0, "s", "assumed: five gait cycles", gt=0, le=300)

@@ -159,18 +159,18 @@ def paired(
             units = np.array([ours[k].limit_s for k in both]) if limit is None else 1.0
             first_t, second_t = times / units
             test = statistics.compare(won[0], won[1], first_t, second_t, limit or 1.0)
-            found = asdict(test)
+            comparison = asdict(test)
             if limit is None:
-                found["share_difference"] = found.pop("time_difference_s")
-                found["share_difference_95"] = found.pop("time_difference_95")
+                comparison["share_difference"] = comparison.pop("time_difference_s")
+                comparison["share_difference_95"] = comparison.pop("time_difference_95")
                 means = times[:, won.all(axis=0)].mean(axis=1).tolist() if test.both else None
-                found["both_time_s"] = means and tuple(means)
+                comparison["both_time_s"] = means and tuple(means)
             apart = np.array([ours[k].offset_m - theirs[k].offset_m for k in both])
             offset, offsets = statistics.mean95(apart[won.all(axis=0)])
             known = math.isfinite(offset)
             tests[f"{first}-{second}"] = {
                 "trials": len(both),
-                **found,
+                **comparison,
                 "offset_difference_m": offset if known else None,
                 "offset_difference_95": offsets if known else None,
             }
