@@ -85,7 +85,7 @@ def _row(
     """The row of one recording, with errors (S,) [deg] that count at some times, `step` [s]."""
     held = np.searchsorted(recording.t, step * np.arange(len(away)) + STEP / 2, "right") - 1
     full, stalls = full_drive(recording)[held] & counts, stalled(recording)[held] & counts
-    told = bool(np.isfinite(recording.drive).all())
+    has_drive = bool(np.isfinite(recording.drive).all())
     time = counts.sum()
     weight = abs(_weight(recording))
     return RecordingRow(
@@ -93,8 +93,8 @@ def _row(
         p_gain=recording.p_gain,
         error_deg=_mean(away[counts]),
         error_max_deg=float(away[counts].max()) if time else math.nan,
-        full_drive=float(full.sum() / time) if told and time else math.nan,
-        stalled=float(stalls.sum() / time) if told and time else math.nan,
+        full_drive=float(full.sum() / time) if has_drive and time else math.nan,
+        stalled=float(stalls.sum() / time) if has_drive and time else math.nan,
         error_stalled_deg=_mean(away[stalls]),
         error_else_deg=_mean(away[counts & ~stalls]),
         supply_stalled_v=_mean(recording.supply[held][stalls]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
@@ -42,16 +43,19 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"`invalid`.{'' if few(_valid(result)) else f' {_JOINED}'}",
         about(controllers),
     )
+    shown_pairs = _shown_pairs(list(controllers))
+    all_shown = len(shown_pairs) == math.comb(len(controllers), 2)
+    hidden = "" if all_shown else f" Pairs without `{RIVAL}` are in result.json."
     two_by_two = Table.of(
         "Pairs, trial by trial",
         {
             f"{short[first]} minus {short[second]}": pairs[f"{first}-{second}"]
-            for first, second in _shown_pairs(list(controllers))
+            for first, second in shown_pairs
             if f"{first}-{second}" in pairs
         },
         two,
         "McNemar's test is exact; Wilcoxon's takes failures as the limit, and zeros by Pratt's "
-        "ranks; both two-sided.",
+        f"ranks; both two-sided.{hidden}",
     )
     return (one_by_one, two_by_two) if pairs else (one_by_one,)
 
