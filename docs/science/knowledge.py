@@ -58,7 +58,7 @@ CONDITIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "jam": ("timed", ("jam",)),
     "facing": ("timed", ("facing",)),
     "free": ("timed", ("free",)),
-    "closed": ("closed", ()),
+    "closed-1": ("closed-1", ()),
 }
 """A controller and what it knows, by the name of a column."""
 SIGNALS = (
@@ -168,7 +168,7 @@ def trials(folder: Path, rounds: int, workers: int) -> None:
     tasks = [
         (folder, scene, condition, AT_ONCE * number)
         for number in range(rounds)
-        for some in (("nothing", "side", "map"), ("jam", "facing", "free", "closed"))
+        for some in (("nothing", "side", "map"), ("jam", "facing", "free", "closed-1"))
         for scene in SCENES
         for condition in some
     ]
@@ -181,7 +181,8 @@ def rows_of(folder: Path) -> dict[tuple[str, str], dict[int, Any]]:
     """The rows of all tasks that are done, by scene and condition, then by trial."""
     found: dict[tuple[str, str], dict[int, Any]] = {}
     for path in sorted(folder.glob("*.npz")):
-        scene, condition, _ = path.stem.split("-")
+        scene, _, rest = path.stem.partition("-")
+        condition = rest.rpartition("-")[0]
         with np.load(path) as file:
             for row in json.loads(str(file["rows"])):
                 found.setdefault((scene, condition), {})[row["trial"]] = row
@@ -217,7 +218,7 @@ def worth(folder: Path) -> None:
         for name, cell in cells.items():
             saved = "" if name == "nothing" else _span(cell["saved_s"], cell["saved_95_s"])
             crossed = f"{cell['successes']} of {cell['trials']}"
-            label = {"map": "`map`", "closed": "`closed`, nothing"}.get(name, f"`timed`, {name}")
+            label = {"map": "`map`", "closed-1": "`closed-1`, nothing"}.get(name, f"`timed`, {name}")
             lines += [row(scene, label, cell["trials"], crossed, f"{cell['mean_s']:.1f}", saved)]
     lines += ["", row("all scenes alike", "saved [s]", "share of the time")]
     lines += [row(*["---"] * 3)]
@@ -398,7 +399,8 @@ def data(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any, Any]:
     scenes: list[Any] = []
     groups: list[Any] = []
     for path in sorted(folder.glob("*.npz")):
-        scene, condition, _ = path.stem.split("-")
+        scene, _, rest = path.stem.partition("-")
+        condition = rest.rpartition("-")[0]
         if condition == "map":
             continue
         with np.load(path) as file:
