@@ -218,7 +218,8 @@ def worth(folder: Path) -> None:
         for name, cell in cells.items():
             saved = "" if name == "nothing" else _span(cell["saved_s"], cell["saved_95_s"])
             crossed = f"{cell['successes']} of {cell['trials']}"
-            label = {"map": "`map`", "closed-1": "`closed-1`, nothing"}.get(name, f"`timed`, {name}")
+            others = {"map": "`map`", "closed-1": "`closed-1`, nothing"}
+            label = others.get(name, f"`timed`, {name}")
             lines += [row(scene, label, cell["trials"], crossed, f"{cell['mean_s']:.1f}", saved)]
     lines += ["", row("all scenes alike", "saved [s]", "share of the time")]
     lines += [row(*["---"] * 3)]
