@@ -35,6 +35,9 @@ WIDTHS = "[...document.querySelectorAll('.uplot canvas')].map(e => e.clientWidth
 TIME = "parseFloat(document.body.innerText.match(/time\\s+([0-9.]+) s/)[1])"
 """The time that the page shows, in JavaScript."""
 
+DRIVES = 4
+"""Drives that are tried on a machine whose page may be given up for the loop's sake."""
+
 NOTICE = ".mantine-Notification-root"
 """What the page says of a computer that draws slowly."""
 
@@ -110,8 +113,13 @@ def stays_here(tab: Tab, view: Shown) -> None:
         ours = parts.netloc == f"127.0.0.1:{view.port}" and parts.scheme in ("http", "ws")
         assert ours or parts.scheme in ("data", "blob"), address
     assert any(urlsplit(address).scheme == "ws" for address in tab.requests)
-    known = [each for each in tab.troubles if all(part in each for part in KNOWN)]
-    assert tab.troubles == known
+    gone = f"'ws://127.0.0.1:{view.port}/' failed"  # a page looks for a command that has ended
+    ended = view.process.poll() is not None
+
+    def known(trouble: str) -> bool:
+        return all(part in trouble for part in KNOWN) or (ended and gone in trouble)
+
+    assert [each for each in tab.troubles if not known(each)] == []
 
 
 def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_path: Path) -> None:
@@ -251,40 +259,51 @@ def settled(tab: Tab) -> float:
     raise AssertionError("time does not stand")
 
 
+def looked_at(tab: Tab, view: Shown) -> None:
+    """The page of a robot: read only, with a scene, and nothing from elsewhere."""
+    assert colours(tab) > 50
+    assert not tab.run("/pause|one step|restart|θ: level/.test(document.body.innerText)")
+    stays_here(tab, view)
+    tab.requests.clear()
+
+
+def driven_shown(tab: Tab, keep: Keep, driven: Shown) -> None:
+    """Its charts move, and it says what the supervisor does and what was missed."""
+    opened(tab, driven)
+    before, begin = charts(tab), seconds(tab)
+    assert status(tab, "supervisor")
+    assert "frames" in status(tab, "counters")
+    text = str(tab.run("document.body.innerText"))
+    assert "missed answers" in status(tab, "counters")
+    assert "missed answers" in text.partition("counted in these seconds")[2]
+    tab.until(f"{TIME} > {begin + 1}", 30)
+    assert charts(tab) != before
+    tab.until(f"{TIME} > 12", 30)  # limits have changed with the readings by then
+    tab.until(f"(w => w.length >= 5 && w.every(e => e === w[0] && e > 200))({WIDTHS})")
+    keep(tab, "drive", "/maneuver\\s+(forward|turn|reverse)/.test(document.body.innerText)")
+    looked_at(tab, driven)
+
+
 def test_X23_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
-    """The pages of both are read only; charts move while the robot of the twin is driven."""
+    """A page that took too much of a busy machine was given up, as it must be: another is tried."""
     twin = ("twin", "--view", "--view-port", "0", "--duration", "600")
     with shown(*twin, folder=tmp_path) as served:
         paths = json.loads(served.answer())
-        words = [*("drive", "--arm", "--no-touch-check", "--duration", "600", "--out", "run")]
+        words = [*("drive", "--arm", "--no-touch-check", "--duration", "600")]
         words += ["--esp32", paths["esp32"], "--bus", paths["bus"], "--view", "--view-port", "0"]
         # browsers fill the machine, and a twin that answers late is not what is looked at here
         words += ["--limits.silent-answers", "100", "--limits.longest-pause", "10"]
-        with shown(*words, folder=tmp_path) as driven:
-            for view, name in ((driven, "drive"), (served, "twin")):
-                opened(tab, view)
-                before, begin = charts(tab), seconds(tab)
-                if name == "drive":
-                    assert status(tab, "supervisor")
-                    assert "frames" in status(tab, "counters")
-                    text = str(tab.run("document.body.innerText"))
-                    assert "missed answers" in status(tab, "counters")
-                    assert "missed answers" in text.partition("counted in these seconds")[2]
-                    tab.until(f"{TIME} > {begin + 1}")
-                    assert charts(tab) != before
-                    tab.until(f"{TIME} > 12")  # limits have changed with the readings by then
-                    tab.until(
-                        f"(w => w.length >= 5 && w.every(e => e === w[0] && e > 200))({WIDTHS})"
-                    )
-                assert colours(tab) > 50
-                assert not tab.run(
-                    "/pause|one step|restart|θ: level/.test(document.body.innerText)"
-                )
-                walks = "/maneuver\\s+(forward|turn|reverse)/.test(document.body.innerText)"
-                if name == "drive":
-                    keep(tab, name, walks)
-                stays_here(tab, view)
-                tab.requests.clear()
-            driven.process.send_signal(signal.SIGINT)
-            assert driven.process.wait(PATIENCE) is not None
-    assert (tmp_path / "run" / "drive.mcap").exists()
+        for tried in range(DRIVES):
+            with shown(*words, "--out", f"run{tried}", folder=tmp_path) as driven:
+                try:
+                    driven_shown(tab, keep, driven)
+                except AssertionError:
+                    if tried + 1 < DRIVES and "view: given up" in "".join(driven.lines):
+                        continue
+                    raise
+                opened(tab, served)
+                looked_at(tab, served)
+                driven.process.send_signal(signal.SIGINT)
+                assert driven.process.wait(PATIENCE) is not None
+                assert (tmp_path / f"run{tried}" / "drive.mcap").exists()
+                break
