@@ -257,6 +257,7 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     assert main(["drive", *ports, "--controller", "clsoed"]) == 2
     said = capsys.readouterr().err
     assert "controller: expected one of open, timed, paper, closed, closed-1, " in said
+    assert "map" not in said  # which no robot can have
     assert "/no/board" not in said
 
 

@@ -53,6 +53,7 @@ CONTROLLERS: Registry[ControllerFactory] = Registry(
     "controller", "antennate.controllers", BUILT_IN | PRIVILEGED
 )
 """All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
+_FOR_ROBOTS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
 
 
 def check_for_robots(name: str) -> str:
@@ -66,7 +67,7 @@ def check_for_robots(name: str) -> str:
             f"expected a controller that lives on its readings, found {name!r}, which needs what "
             "only a simulation knows; `antennate tunnel` runs it"
         )
-    return CONTROLLERS.check(name)
+    return _FOR_ROBOTS.check(name)
 
 
 def about(names: Iterable[str]) -> str:
