@@ -1,8 +1,10 @@
-"""Compare two run directories value by value: `python benchmarks/same_numbers.py OLD NEW`.
+"""Compare two folders of results value by value: `python benchmarks/same_numbers.py OLD NEW`.
 
-Not one bit may differ: cells of `trials.csv` are compared as text. Columns may be renamed or added,
-and the new run may have fewer trials. Every number of the old `result.json` must be in the new one;
-its keys may be renamed. Ends with 1 if anything differs.
+Each is a run directory, or holds some at any depth, as those of `golden.py` do. Not one bit may
+differ: cells of tables are compared as text. Columns of `trials.csv` may be renamed or added, and
+the new run may have fewer trials. Every number of the old `result.json` must be in the new one; its
+keys may be renamed. Other tables, and bytes, are compared as they are. Ends with 1 if anything
+differs or is missing.
 """
 
 import csv
@@ -67,8 +69,8 @@ def numbers(value: object) -> Iterator[float]:
         yield value
 
 
-def main(old: Path, new: Path) -> int:
-    """Compare, print and return the exit code."""
+def compare(old: Path, new: Path) -> bool:
+    """Compare two run directories, print, and say whether they are the same."""
     count, lines, fewer = 0, list[str](), False
     if (old / "trials.csv").exists():
         before, after = table(old / "trials.csv"), table(new / "trials.csv")
@@ -82,10 +84,46 @@ def main(old: Path, new: Path) -> int:
     for line in lines[:SHOWN]:
         print(line)
     print(f"{old} and {new}: {count} values compared, {len(lines)} differ")
-    return int(bool(lines))
+    return not lines
+
+
+def same_file(old: Path, new: Path) -> bool:
+    """Compare two files byte by byte, print, and say whether they are the same."""
+    first, second = old.read_bytes(), new.read_bytes()
+    if first == second:
+        print(f"{old} and {new}: {len(first)} bytes compared, none differs")
+        return True
+    at = next(
+        (i for i, (a, b) in enumerate(zip(first, second, strict=False)) if a != b),
+        min(len(first), len(second)),
+    )
+    print(f"{old} and {new}: {len(first)} and {len(second)} bytes, the first differs at {at}")
+    return False
+
+
+def main(old: Path, new: Path) -> int:
+    """Compare all that lies in two folders and return the exit code."""
+    runs = sorted(path.parent for path in old.rglob("result.json"))
+    files = sorted(
+        path
+        for kind in ("*.csv", "*.bytes")
+        for path in old.rglob(kind)
+        if path.name != "trials.csv"
+    )
+    if not runs and not files:
+        sys.exit(f"expected result.json, tables or bytes in {old}, found none")
+    same = True
+    for path in (*runs, *files):
+        other = new / path.relative_to(old)
+        if not other.exists() or (path.is_dir() and not (other / "result.json").exists()):
+            print(f"{other}: missing")
+            same = False
+        else:
+            same &= compare(path, other) if path.is_dir() else same_file(path, other)
+    return int(not same)
 
 
 if __name__ == "__main__":
     if len(sys.argv) != 3:
-        sys.exit("expected two run directories: OLD NEW")
+        sys.exit("expected two folders: OLD NEW")
     sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))

@@ -1,0 +1,191 @@
+"""Runs everything once, small, and keeps what comes out: `python benchmarks/golden.py FOLDER`.
+
+Made before a change and after it, two such folders are compared with `same_numbers.py OLD NEW`: not
+one value may differ. There are runs of the experiments with one worker and with two, one that was
+killed and resumed, logs of simulated trials and what a replay decides upon them, each tick of a
+drive in lock-step, and the bytes that a twin and its board sent in a minute. Ten minutes on two
+cores. Parts by name: `golden.py FOLDER springs tunnel drive`.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tty
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+ANTENNATE = (sys.executable, "-m", "antennate")
+TRIALS = "--trials 3 --seed 5 --time-limit 30"
+ALONE = {
+    "springs": "springs",
+    "taper": "taper",
+    "sensor": "sensor",
+    "ringdown": "ringdown --cone-hinges 6 14",
+    "gait": "gait --cycles 2 --settling-cycles 1 --sweep-points 4",
+    "gait_hexapod": "gait --robot hexapod --cycles 2 --settling-cycles 1 --sweep-points 4",
+    "calibrate": "calibrate",
+    "force": "force --profiles stiff descending --traverses 4 --loads 6 --place-step 0.25",
+}
+"""Runs without workers, or whose trials are few."""
+POOLED = {
+    "touch": "touch --trials 1 --walls flat boulders --speeds 0.1 --profiles stiff descending",
+    "wall": "wall --trials 2",
+    "sweep": "sweep --profiles stiff --distances 0.5 --centres 1.2 --amplitudes 0.5 --sweeps 1",
+    "tunnel": f"tunnel {TRIALS}",
+    "corridors": "tunnel --scene corridors --trials 2 --time-limit 20 --controllers random map",
+    "hexapod": "tunnel --robot hexapod --trials 1 --time-limit 20",
+    "readings": f"tunnel {TRIALS} --controllers closed --readings swapped yoked delayed:0.2",
+    "knows": f"tunnel {TRIALS} --controllers timed map --knows side jam",
+    "study": f"study {ROOT / 'studies' / 'smoke.toml'}",
+}
+"""Runs with one worker and with two."""
+KILLED = "tunnel --trials 8 --seed 6 --time-limit 30 --controllers open closed --workers 2"
+LOGGED = f"tunnel {TRIALS} --log"
+MINUTE = 6000
+"""Control ticks."""
+DRIVEN = (("closed", 1, math.inf), ("paper", 0, 600.0))
+"""Controller, trial and most ticks of each drive in lock-step."""
+
+
+def antennate(words: str, *more: str | Path) -> None:
+    """Run a command; 2 is no failure, as of a replay of a damaged log."""
+    done = subprocess.run(
+        [*ANTENNATE, *words.split(), *map(str, more)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    if done.returncode not in (0, 2):
+        sys.exit(f"{words}: {done.returncode}: {done.stderr.decode()[-2000:]}")
+
+
+def run(words: str, folder: Path, *more: str) -> None:
+    """A run without figures."""
+    antennate(words, "--no-figures", "--out", folder, *more)
+
+
+def killed(folder: Path) -> None:
+    """A run whose processes are killed after some rows, then resumed."""
+    words = [*ANTENNATE, *KILLED.split(), "--no-figures", "--out", str(folder)]
+    store = folder / "trials.store.jsonl"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(words, start_new_session=True, **quiet) as process:
+        while process.poll() is None:
+            if store.exists() and store.read_bytes().count(b"\n") > 4:
+                os.killpg(process.pid, signal.SIGKILL)
+                break
+            time.sleep(0.01)
+    run(KILLED, folder, "--resume")
+
+
+def logged(folder: Path) -> None:
+    """Logs of trials, and what replays decide upon them."""
+    run(LOGGED, folder / "run")
+    for log in sorted((folder / "run").rglob("*.mcap")):
+        name = log.parent.name + "-" + log.stem if log.parent.name != "logs" else log.stem
+        antennate("replay", log, "--out", folder / f"replay-{name}")
+        antennate("replay --controller paper", log, "--out", folder / f"paper-{name}")
+
+
+def served(folder: Path) -> None:
+    """What a twin in lock-step and its board send while a robot walks a minute on its spot."""
+    from antennate.hardware.dynamixel import packets
+    from antennate.robots.spec import RobotSpec
+
+    folder.mkdir(parents=True)
+    robot = RobotSpec()
+    words = [*ANTENNATE, "twin", "--pace", "lockstep", "--duration", f"{0.01 * MINUTE}"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        ports = json.loads(process.stdout.readline())
+        board, bus = (os.open(ports[name], os.O_RDWR | os.O_NONBLOCK) for name in ("esp32", "bus"))
+        tty.setraw(bus)
+        tty.setraw(board)
+        received = {board: bytearray(), bus: bytearray()}
+
+        def read(patience: float = 0.0) -> bool:
+            """Take what has come; whether anything has within a time [s]."""
+            ready, _, _ = select.select([board, bus], [], [], patience)
+            for port in ready:
+                try:
+                    data = os.read(port, 65536)
+                except OSError:
+                    data = b""
+                if not data:  # the twin has ended
+                    return False
+                received[port] += data
+            return bool(ready)
+
+        def send(packet: bytes) -> None:
+            while packet:
+                try:
+                    packet = packet[os.write(bus, packet) :]
+                except BlockingIOError:
+                    read(0.01)
+            read()
+
+        send(packets.sync_write(64, dict.fromkeys(robot.ids, b"\x01")))
+        for tick in range(MINUTE):
+            swing = round(150 * math.sin(2 * math.pi * 0.006 * tick))
+            goals = {
+                servo: (zero + swing * (-1) ** place).to_bytes(4, "little", signed=True)
+                for place, (servo, zero) in enumerate(zip(robot.ids, robot.zeros, strict=True))
+            }
+            if tick % 10 == 0:
+                send(packets.sync_read(list(robot.ids), 132, 4))
+            send(packets.sync_write(116, goals))
+        while read(5.0):
+            pass
+        process.wait(60)
+    (folder / "board.bytes").write_bytes(received[board])
+    (folder / "bus.bytes").write_bytes(received[bus])
+
+
+def driven(folder: Path) -> None:
+    """Each tick of drives in lock-step, through session, supervisor and bytes."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    from driven_rig import driven as drive
+
+    from antennate.experiments.tunnel.run import TunnelConfig
+
+    folder.mkdir(parents=True)
+    for name, trial, ticks in DRIVEN:
+        walk = drive(TunnelConfig(seed=0), name, trial, ticks).walk
+        with (folder / f"{name}.csv").open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(["t", "left", "right", "maneuver", "command", "goals"])
+            for reading, maneuver, command, goals in zip(
+                walk.readings, walk.maneuvers, walk.commands, walk.goals, strict=False
+            ):
+                table.writerow([*map(repr, reading), maneuver, command.hex(), *goals])
+
+
+def main(folder: Path, wanted: list[str]) -> None:
+    """Make the parts that are wanted, all without names; a part that is there is made anew."""
+    parts = {name: lambda f, w=words: run(w, f) for name, words in ALONE.items()}
+    for name, words in POOLED.items():
+        for count in (1, 2):
+            parts[f"{name}-{count}"] = lambda f, w=words, c=count: run(w, f, "--workers", str(c))
+    parts |= {"killed": killed, "logged": logged, "twin": served, "drive": driven}
+    names = [name for name in parts if not wanted or name in wanted or name[:-2] in wanted]
+    if wanted and not names:
+        sys.exit(f"expected parts of {', '.join(parts)}, found {', '.join(wanted)}")
+    for name in names:
+        began = time.monotonic()
+        shutil.rmtree(folder / name, ignore_errors=True)
+        parts[name](folder / name)
+        print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit("expected a folder, and perhaps names of parts")
+    main(Path(sys.argv[1]), sys.argv[2:])
