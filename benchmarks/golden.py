@@ -10,6 +10,7 @@ cores. Parts by name: `golden.py FOLDER springs tunnel drive`.
 from __future__ import annotations
 
 import csv
+import importlib
 import json
 import math
 import os
@@ -76,8 +77,8 @@ def killed(folder: Path) -> None:
     """A run whose processes are killed after some rows, then resumed."""
     words = [*ANTENNATE, *KILLED.split(), "--no-figures", "--out", str(folder)]
     store = folder / "trials.store.jsonl"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen(words, start_new_session=True, **quiet) as process:
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(words, start_new_session=True, stdout=quiet, stderr=quiet) as process:
         while process.poll() is None:
             if store.exists() and store.read_bytes().count(b"\n") > 4:
                 os.killpg(process.pid, signal.SIGKILL)
@@ -152,7 +153,7 @@ def served(folder: Path) -> None:
 def driven(folder: Path) -> None:
     """Each tick of drives in lock-step, through session, supervisor and bytes."""
     sys.path.insert(0, str(ROOT / "tests"))
-    from driven_rig import driven as drive
+    drive = importlib.import_module("driven_rig").driven
 
     from antennate.experiments.tunnel.run import TunnelConfig
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.control.knowledge import KNOWABLE, Knowledge, aligned
+from antennate.control.knowledge import KNOWABLE, Knowledge, aligned, right_by, stuck_by
 from antennate.params.control import EscapeParams
 from antennate.robots.sides import LEFT, RIGHT
 from antennate.types import Bools, Floats, Ints, Maneuver
@@ -78,7 +78,7 @@ class Escape:
             backed = over & (self.maneuver == int(Maneuver.REVERSE))
             self._to(over & ~backed, int(Maneuver.FORWARD), t)
             self._turn(backed, t)
-        stuck = walking & self._really(stuck)
+        stuck = walking & stuck_by(self.knowledge, stuck)
         if np.count_nonzero(stuck):
             self._back_off(stuck, before, t)
         lost = walking & self._turned & (t - self._felt > self._params.lost_time)
@@ -128,17 +128,10 @@ class Escape:
         self._ended = np.where(rows, -np.inf, self._ended)
         self._turned &= ~rows
 
-    def _really(self, stuck: Bools) -> Bools:
-        """Rows that are stuck, by what is known where it is, else by the rule."""
-        known = self.knowledge
-        stuck = stuck if known.jam is None else known.jam
-        return stuck if known.free is None else stuck & ~known.free
-
     def _known_side(self, right: Bools) -> Bools:
         """Whether to turn right: as is known, else as given."""
         known = self.knowledge
-        side = known.side if known.map is None else known.map
-        return right if side is None else np.where(side == 0, right, side < 0)
+        return right_by(known.side if known.map is None else known.map, right)
 
     def _aligned(self) -> Bools:
         """Rows that turn, and have turned far enough by what is known."""

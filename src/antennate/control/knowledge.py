@@ -57,6 +57,22 @@ def aligned(maneuver: Ints, angle: Floats) -> Bools:
     return (left | right) & (still < ALIGNED) & (still > -math.pi / 2)
 
 
+def stuck_by(knowledge: Knowledge, stuck: Bools) -> Bools:
+    """Rows that are stuck: by what is known where it is, else as given, shape (B,)."""
+    stuck = stuck if knowledge.jam is None else knowledge.jam
+    return stuck if knowledge.free is None else stuck & ~knowledge.free
+
+
+def right_by(side: Ints | Floats | None, right: Bools) -> Bools:
+    """Whether to turn right: away from the left where a side is known, else as given, shape (B,).
+
+    Args:
+        side: Positive to the left, 0 straight ahead, shape (B,); None if it is not known.
+        right: As given, shape (B,).
+    """
+    return right if side is None else np.where(side == 0, right, side < 0)
+
+
 @runtime_checkable
 class Knowing(Protocol):
     """A controller that can use knowledge.

@@ -11,12 +11,17 @@ Until then turns go to both sides by turns, each farther from the heading in whi
 stuck first, and it backs off for longer each time, so that no try repeats another. A turn that goes
 far can lead the robot back out of a passage. Where it feels nothing for `lost_time` after one, it
 turns round.
+
+In a study a simulation may tell it what it knows: the side to turn to, from where it looks; whether
+the robot is jammed, in place of readings that repeat and of patience; whether the way ahead is
+free, so that it does not back off; or that it faces the entrance, so that it turns round.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from antennate.control.knowledge import Kind, Knowledge, right_by, stuck_by
 from antennate.control.repetition import RepetitionDetector
 from antennate.params.control import ControlParams, SearchParams
 from antennate.robots.sides import LEFT, RIGHT
@@ -36,6 +41,7 @@ class Search:
     Attributes:
         maneuver: `Maneuver` of each row, shape (B,).
         tries: Turns since the last proof that it gets on, shape (B,).
+        knowledge: What a simulation knows of the rows; nothing on a robot.
     """
 
     def __init__(self, params: SearchParams, batch: int) -> None:
@@ -48,6 +54,7 @@ class Search:
         self._lean: Floats = np.zeros(batch)
         self._turned: Floats = np.zeros(batch)
         self._right: Bools = np.zeros(batch, dtype=bool)
+        self.knowledge = Knowledge()
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking, with no memory."""
@@ -81,11 +88,13 @@ class Search:
         walked, free = t - self._begun, t - self._felt
         proved = walking & ((free >= params.free_time) | (walked >= params.proof_time))
         self.tries = np.where(proved, 0, self.tries)
-        stuck = walking & stuck & (walked >= params.patience)
+        stuck = walking & stuck_by(self.knowledge, stuck & (walked >= params.patience))
         if np.count_nonzero(stuck):
             self._back_off(stuck, t)
         astray = np.abs(self._turned) >= params.lost_turn
         lost = walking & astray & (free > params.lost_time)
+        if self.knowledge.facing is not None:
+            lost |= walking & ~stuck & self.knowledge.facing & (walked > params.lost_time)
         if np.count_nonzero(lost):
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
@@ -110,10 +119,13 @@ class Search:
     def _turn(self, rows: Bools, t: Floats) -> None:
         """Turn to the next heading; each is farther from the first one than the last."""
         params = self._params
-        side = np.where(self.tries == 0, self._lean >= 0.0, ~self._right)
-        self._right = np.where(rows, side, self._right)
+        right = np.where(self.tries == 0, self._lean >= 0.0, ~self._right)
+        self._right = np.where(rows, right_by(self.knowledge.side, right), self._right)
         size = np.minimum(params.turn_time * params.growth**self.tries, params.return_time)
         turn = np.where(self._right, size, -size) - self._turned
+        side = self.knowledge.side
+        if side is not None:
+            turn = np.where(side == 0, turn, -np.sign(side) * params.turn_time)
         self._turn_by(rows, turn, t)
         self._turned += np.where(rows, turn, 0.0)
         self.tries = self.tries + rows
@@ -135,6 +147,9 @@ class Search:
 class SearchRule:
     """FORWARD until readings repeat; then the search."""
 
+    knows: tuple[Kind, ...] = ("side", "jam", "facing", "free")
+    needs: tuple[Kind, ...] = ()
+
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._pressure = control.repetition.pressure
@@ -147,6 +162,10 @@ class SearchRule:
         """Forget everything about some rows."""
         self._detector.reset(rows)
         self._search.reset(rows)
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what a simulation knows, for the search."""
+        self._search.knowledge = knowledge
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""
