@@ -96,54 +96,56 @@ def logged(folder: Path) -> None:
         antennate("replay --controller paper", log, "--out", folder / f"paper-{name}")
 
 
-def served(folder: Path) -> None:
-    """What a twin in lock-step and its board send while a robot walks a minute on its spot."""
+def take(received: dict[int, bytearray], patience: float = 0.0) -> bool:
+    """Take what has come to ports; whether any came within a time [s]."""
+    ready, _, _ = select.select(list(received), [], [], patience)
+    for port in ready:
+        try:
+            data = os.read(port, 65536)
+        except OSError:
+            data = b""
+        if not data:  # the twin has ended
+            return False
+        received[port] += data
+    return bool(ready)
+
+
+def packets_of(tick: int) -> bytes:
+    """What the robot is told in a tick: legs and yaw that swing; each tenth, where they are."""
     from antennate.hardware.dynamixel import packets
     from antennate.robots.spec import RobotSpec
 
-    folder.mkdir(parents=True)
     robot = RobotSpec()
+    swing = round(150 * math.sin(2 * math.pi * 0.006 * tick))
+    goals = {
+        servo: (zero + swing * (-1) ** place).to_bytes(4, "little", signed=True)
+        for place, (servo, zero) in enumerate(zip(robot.ids, robot.zeros, strict=True))
+    }
+    asked = packets.sync_read(list(robot.ids), 132, 4) if tick % 10 == 0 else b""
+    torque = packets.sync_write(64, dict.fromkeys(robot.ids, b"\x01")) if tick == 0 else b""
+    return torque + asked + packets.sync_write(116, goals)
+
+
+def served(folder: Path) -> None:
+    """What a twin in lock-step and its board send while a robot swings its joints for a minute."""
+    folder.mkdir(parents=True)
     words = [*ANTENNATE, "twin", "--pace", "lockstep", "--duration", f"{0.01 * MINUTE}"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         ports = json.loads(process.stdout.readline())
         board, bus = (os.open(ports[name], os.O_RDWR | os.O_NONBLOCK) for name in ("esp32", "bus"))
-        tty.setraw(bus)
-        tty.setraw(board)
         received = {board: bytearray(), bus: bytearray()}
-
-        def read(patience: float = 0.0) -> bool:
-            """Take what has come; whether anything has within a time [s]."""
-            ready, _, _ = select.select([board, bus], [], [], patience)
-            for port in ready:
-                try:
-                    data = os.read(port, 65536)
-                except OSError:
-                    data = b""
-                if not data:  # the twin has ended
-                    return False
-                received[port] += data
-            return bool(ready)
-
-        def send(packet: bytes) -> None:
+        for port in received:
+            tty.setraw(port)
+        for tick in range(MINUTE):
+            packet = packets_of(tick)
             while packet:
                 try:
                     packet = packet[os.write(bus, packet) :]
                 except BlockingIOError:
-                    read(0.01)
-            read()
-
-        send(packets.sync_write(64, dict.fromkeys(robot.ids, b"\x01")))
-        for tick in range(MINUTE):
-            swing = round(150 * math.sin(2 * math.pi * 0.006 * tick))
-            goals = {
-                servo: (zero + swing * (-1) ** place).to_bytes(4, "little", signed=True)
-                for place, (servo, zero) in enumerate(zip(robot.ids, robot.zeros, strict=True))
-            }
-            if tick % 10 == 0:
-                send(packets.sync_read(list(robot.ids), 132, 4))
-            send(packets.sync_write(116, goals))
-        while read(5.0):
+                    take(received, 0.01)
+            take(received)
+        while take(received, 5.0):
             pass
         process.wait(60)
     (folder / "board.bytes").write_bytes(received[board])

@@ -62,11 +62,12 @@ def test_what_touches_changes_nothing_and_a_lost_reading_holds(name: str) -> Non
     assert set(run(name, 1.0, math.nan)) == {HOLD}
 
 
-def test_timed_walks_its_time_then_escapes_as_closed_does() -> None:
+@pytest.mark.parametrize("walk", [4.0, 18.0])  # 18 s is longer than escape.retry_time
+def test_timed_walks_its_time_then_escapes_to_the_right_and_left_alternately(walk: float) -> None:
     """Nothing was touched, so right first; then the other way, half as far again, and so on."""
-    found = stretches(run("timed", 40.0, timed={"walk_time": 4.0}))
-    told = [(FORWARD, 4.0), (REVERSE, 2.2), (RIGHT, 2.2), (FORWARD, 4.0), (REVERSE, 2.2)]
-    told += [(LEFT, 3.3), (FORWARD, 4.0), (REVERSE, 2.2), (RIGHT, 3.3)]
+    found = stretches(run("timed", 3 * walk + 28.0, timed={"walk_time": walk}))
+    told = [(FORWARD, walk), (REVERSE, 2.2), (RIGHT, 2.2), (FORWARD, walk), (REVERSE, 2.2)]
+    told += [(LEFT, 3.3), (FORWARD, walk), (REVERSE, 2.2), (RIGHT, 3.3)]
     assert [m for m, _ in found[:9]] == [m for m, _ in told]
     assert [s for _, s in found[:9]] == pytest.approx([s for _, s in told], abs=0.021)
 

@@ -124,5 +124,11 @@ def test_it_holds_while_a_reading_is_not_known_and_goes_on_then() -> None:
         return (math.nan, 0.5) if 4.5 <= t < 5.5 else BOTH
 
     said = story(8.0, lambda t: t == 4.0, flex=flex)
-    held = [(FORWARD, 4.0), (REVERSE, 0.5), (HOLD, 1.0), (TURN_R, 2.0), (FORWARD, 0.5)]
+    held = [(FORWARD, 4.0), (REVERSE, 0.5), (HOLD, 1.0), (REVERSE, 0.5), (TURN_R, 2.0)]
     assert said == held
+
+
+def test_a_walk_that_was_held_is_no_shorter_before_it_looks_for_a_way() -> None:
+    lost = (math.nan, math.nan)
+    said = story(9.5, flex=lambda t: lost if 1.0 <= t < 6.0 else BOTH)
+    assert said == [(FORWARD, 1.0), (HOLD, 5.0), (FORWARD, 2.0), (REVERSE, 1.0), (TURN_R, 0.5)]

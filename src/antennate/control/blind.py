@@ -3,9 +3,10 @@
 Whoever claims that touch helps has to beat them: they back off and turn, too, but by the clock or
 by chance. All walk, back off and turn, again and again; the rules differ in the times:
 
-- `timed` walks for a time, then makes the escape of `closed-1`, as if nothing had touched before;
-- `schedule` turns right and left by turns, farther and farther from its first heading;
-- `zigzag` turns right and left by turns, always by as much;
+- `timed` walks for a time, then makes the escape of `closed-1` as if nothing had touched before, to
+  the right and left alternately;
+- `schedule` turns right and left alternately, farther and farther from its first heading;
+- `zigzag` turns right and left alternately, always by the same angle;
 - `random` walks, backs off and turns for random times, to random sides.
 
 A reading that cannot be used still means HOLD. While it holds, the time of a maneuver stands still
@@ -14,6 +15,7 @@ A reading that cannot be used still means HOLD. While it holds, the time of a ma
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -31,20 +33,27 @@ Plan = Callable[[Ints, Ints], tuple[Floats, Floats, Floats]]
 turn in that round [s], each (n,), a turn to the right positive."""
 
 
-_BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn", "retry_time")
+_BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn")
 """What an escape depends on where nothing was touched before."""
+_KNOWING_ESCAPE = ("lost_time", "return_time")
+"""And where a simulation tells it more."""
 
 
 class TimedRule:
-    """Walks for a time, then the escape of `closed-1` with nothing touched, again and again."""
+    """Walks for a time, then the escape of `closed-1` with nothing touched, again and again.
+
+    Each turn but the first goes the other way, however long it walks between them.
+    """
 
     knows = Escape.knows
 
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._ticks = max(1, round(control.timed.walk_time / control.period))
-        read = {name: getattr(control.escape, name) for name in _BLIND_ESCAPE}
-        self._escape = Escape(EscapeParams(**read), batch, control.period)
+        names = (*_BLIND_ESCAPE, *_KNOWING_ESCAPE)
+        read = EscapeParams(**{name: getattr(control.escape, name) for name in names})
+        always = read.model_copy(update={"retry_time": math.inf})
+        self._escape = Escape(always, batch, control.period)
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:

@@ -34,7 +34,7 @@ _OTHER_ESCAPE = tuple(path for path in _TURNING if path.startswith("escape."))
 _FELT = (
     *paths_of(RepetitionParams, "repetition"),
     *(f"escape.{name}" for name in ("trigger", "first_turn", "memory_time", "memory_delay")),
-    *("escape.lost_time", "escape.return_time"),
+    *("escape.lost_time", "escape.return_time", "escape.retry_time"),
 )
 """What an escape does not read where nothing is felt."""
 
@@ -80,6 +80,8 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
         paths |= {"search.patience", *_REPEATED}
     if name == "timed" and "jam" in knows:
         paths |= set(_TIMED)
+    if name == "timed" and {"facing", "map"} & set(knows):
+        paths -= {"escape.return_time", *(["escape.lost_time"] if "facing" in knows else [])}
     return paths
 
 

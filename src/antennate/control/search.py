@@ -9,8 +9,11 @@ one.
 
 Until then turns go to both sides by turns, each farther from the heading in which the robot was
 stuck first, and it backs off for longer each time, so that no try repeats another. A turn that goes
-far can lead the robot back out of a passage. Where it feels nothing for `lost_time` after one, it
-turns round.
+far can lead the robot back out of a passage. So where it feels nothing for `lost_time` after one,
+it turns round, also when it has got on for long since: until the next jam nothing says where it
+looks.
+
+Where a reading cannot be used, it holds, and time stands still.
 
 In a study a simulation may tell it what it knows: the side to turn to, from where it looks; whether
 the robot is jammed, in place of readings that repeat and of patience; whether the way ahead is
@@ -49,6 +52,7 @@ class Search:
         self.maneuver: Ints = np.full(batch, _FORWARD)
         self.tries: Ints = np.zeros(batch, dtype=np.int64)
         self._begun: Floats = np.full(batch, np.nan)
+        self._last: Floats = np.full(batch, np.nan)
         self._until: Floats = np.zeros(batch)
         self._felt: Floats = np.zeros(batch)
         self._lean: Floats = np.zeros(batch)
@@ -60,7 +64,7 @@ class Search:
         """Some rows begin anew, walking, with no memory."""
         self.maneuver[rows] = _FORWARD
         self.tries[rows] = 0
-        self._begun[rows] = np.nan
+        self._begun[rows] = self._last[rows] = np.nan
         self._turned[rows] = 0.0
 
     def step(self, t: Floats, flex: Floats, stuck: Bools, pressed: Bools) -> Ints:
@@ -78,6 +82,7 @@ class Search:
         params, lean = self._params, flex[:, LEFT] - flex[:, RIGHT]
         known = ~np.isnan(lean)
         walking = known & (self.maneuver == _FORWARD)
+        self._pause(known, t)
         new = np.isnan(self._begun)
         self._begun = np.where(new, t, self._begun)
         self._felt = np.where(walking & ~pressed & ~new, self._felt, t)
@@ -98,6 +103,13 @@ class Search:
         if np.count_nonzero(lost):
             self._return(lost, t)
         return np.where(known, self.maneuver, int(Maneuver.HOLD))
+
+    def _pause(self, known: Bools, t: Floats) -> None:
+        """Move the times of rows that hold by the time for which they have held."""
+        held = np.where(known | np.isnan(self._last), 0.0, t - self._last)
+        self._begun += held
+        self._until += held
+        self._last = t.copy()
 
     def _go_on(self, over: Bools, t: Floats) -> None:
         """Turn after backing off, and walk after a turn."""
