@@ -45,7 +45,7 @@ POOLED = {
     "corridors": "tunnel --scene corridors --trials 2 --time-limit 20 --controllers random map",
     "hexapod": "tunnel --robot hexapod --trials 1 --time-limit 20",
     "readings": f"tunnel {TRIALS} --controllers closed --readings swapped yoked delayed:0.2",
-    "knows": f"tunnel {TRIALS} --controllers timed map --knows side jam",
+    "knows": f"tunnel {TRIALS} --controllers timed closed --knows side jam",
     "study": f"study {ROOT / 'studies' / 'smoke.toml'}",
 }
 """Runs with one worker and with two."""

@@ -297,6 +297,25 @@ def test_a_scene_without_a_route_is_refused_where_it_is_needed(pathless: str) ->
 
 
 @pytest.mark.parametrize(
+    "route",
+    ["abc", [[0.0, 0.0]], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]], [[0.0, 0.0], [np.nan, 1.0]]],
+)
+def test_a_route_that_is_no_line_is_refused(route: Any) -> None:
+    class Crooked(Pathless):
+        def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Any:
+            drawn = super().draw(robot, rng)
+            drawn.route = route
+            return drawn
+
+    SCENES.add("crooked", Crooked)
+    try:
+        with pytest.raises(SceneError, match=r"^scene: (expected )?route"):
+            check(TunnelConfig(scene="crooked", controllers=("map",)))
+    finally:
+        SCENES.added.clear()
+
+
+@pytest.mark.parametrize(
     "words",
     [
         "drive --knows side",
@@ -308,6 +327,8 @@ def test_a_scene_without_a_route_is_refused_where_it_is_needed(pathless: str) ->
         "tunnel --knows sight",
         "tunnel --knows side side --controllers closed",
         "tunnel --knows side --controllers open closed",
+        "tunnel --knows side map --controllers timed",
+        "tunnel --knows map --controllers timed closed",
     ],
 )
 def test_no_robot_has_it(words: str, capsys: pytest.CaptureFixture[str]) -> None:

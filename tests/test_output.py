@@ -176,6 +176,17 @@ def test_two_controllers_of_one_name_are_told_apart(capsys: pytest.CaptureFixtur
     assert ["a.py:", "b.py:"] in [line.split() for line in capsys.readouterr().out.splitlines()]
 
 
+def test_readings_that_are_not_its_own_stay_with_the_short_name() -> None:
+    names = [
+        "closed@delayed:0.25",
+        "closed@delayed:0.5",
+        "far/a.py:Mine@yoked",
+        "at@home/b.py:Mine",
+    ]
+    wanted = ["closed@delayed:0.25", "closed@delayed:0.5", "Mine@yoked", "Mine"]
+    assert list(short_names(names).values()) == wanted
+
+
 def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     """docs/install.md says how extras are installed: the package is on no index."""
     pages = (ROOT / "docs" / "install.md").read_text()

@@ -112,6 +112,14 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
     words = ["replay", log, "--readings", "yoked", "--donor", other]
     assert main([*words, "--out", "again"]) == 0
     assert json.loads(Path("again/result.json").read_text())["controller"] == "closed@yoked"
+    capsys.readouterr()
+    lent = {log: "expected a log of another trial or drive, found the same"}
+    lent["one/logs/closed_yoked-1.mcap"] = "expected a log of own readings, found yoked"
+    for donor, said in lent.items():
+        assert main([*words[:-1], donor]) == 2
+        error = capsys.readouterr().err
+        assert said in error
+        assert error.count("\n") == 1
 
 
 def test_rows_do_not_depend_on_the_batch() -> None:
@@ -146,6 +154,8 @@ def test_with_more_trials_only_the_yoked_trial_that_was_last_runs_anew(
         (["--readings", "yoked", "--trials", "1"], "expected trials of at least 2"),
         (["--readings", "delayed:-1"], "expected delayed:S with seconds above 0"),
         (["--readings", "delayed:x"], "expected delayed:S with seconds above 0"),
+        (["--readings", "delayed:1e-9"], "of whole control periods of 0.01 s"),
+        (["--readings", "delayed:0.012"], "of whole control periods of 0.01 s"),
         (["--readings", "delayed"], "expected delayed:S with seconds above 0"),
         (["--readings", "yokde"], "did you mean yoked?"),
         (["--readings", "own", "own"], "readings must differ"),

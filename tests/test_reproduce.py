@@ -218,9 +218,10 @@ def sensed(
         ("turns", gait(0.2, 3.0), "not_reproduced"),
         ("blind", blind(6, 10), "undecided"),  # Wilson: 31 to 83 %
         ("blind", blind(0, 10), "not_reproduced"),  # 0 to 28 %, clear of 45 to 75 %
-        ("blind", blind(150, 200), "fitted"),
-        ("blind", blind(152, 200), "not_reproduced"),
-        ("blind", blind(3000, 4000), "fitted"),  # more trials make it no harder
+        ("blind", blind(130, 200), "fitted"),  # 58 to 71 %, within 45 to 75 %
+        ("blind", blind(148, 200), "undecided"),  # 68 to 80 %
+        ("blind", blind(2960, 4000), "undecided"),  # 73 to 75.3 %
+        ("blind", blind(164, 200), "not_reproduced"),  # 76 to 87 %
         ("slope", sigmoid(18.0, 2.0, 0.3), "conditional"),
         ("slope", sigmoid(18.0, 2.0, 0.4), "not_reproduced"),
         ("slope", sigmoid(4.5, 0.1, 0.3), "not_reproduced"),

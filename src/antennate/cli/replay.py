@@ -122,7 +122,7 @@ def _readings(log: LogReader, config: ReplayConfig, options: Options) -> Reading
     if not options.donor:
         return changed_readings(log.header, config.readings, None)
     with LogReader(log_of(Path(options.donor))) as donor:
-        return changed_readings(log.header, config.readings, donor)
+        return changed_readings(log.header, config.readings, donor, donor.header)
 
 
 def complain(command: str, log: LogReader) -> int:

@@ -96,7 +96,7 @@ def needs_of(controller: Any) -> tuple[Kind, ...]:
 
 
 def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, ...]:
-    """Kinds that a simulation gives to a controller: what it needs, and what of `knows` it can use.
+    """Kinds that a simulation gives to a controller: what is offered, and what it needs.
 
     Args:
         controller: The controller.
@@ -104,17 +104,16 @@ def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, .
         knows: What is offered.
 
     Raises:
-        ConfigError: Something is offered, and it uses none of it.
+        ConfigError: It cannot use all of it.
     """
     offered = tuple(knows)
     usable = tuple(controller.knows) if isinstance(controller, Knowing) else ()
-    used = [kind for kind in offered if kind in usable]
-    if offered and not used:
+    if unused := [kind for kind in offered if kind not in usable]:
         what = f"one that uses {', '.join(usable)}" if usable else "one that uses no knowledge"
         raise ConfigError(
-            f"--knows: expected controllers that use {' or '.join(offered)}, found {name!r}, {what}"
+            f"--knows: expected controllers that use {', '.join(unused)}, found {name!r}, {what}"
         )
-    return tuple(kind for kind in KNOWABLE if kind in {*used, *needs_of(controller)})
+    return tuple(kind for kind in KNOWABLE if kind in {*offered, *needs_of(controller)})
 
 
 def require_own_senses(controller: Any, name: str, where: str) -> None:

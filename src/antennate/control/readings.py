@@ -73,6 +73,22 @@ def _delay(text: str, seconds: str) -> float:
     return delay
 
 
+def require_whole_delay(name: str, period: float) -> None:
+    """Check that a delay, if these readings have one, is of whole control periods [s].
+
+    Raises:
+        ConfigError: It is not.
+    """
+    kind, _, seconds = name.partition(":")
+    if kind == DELAYED:
+        ticks = _delay(name, seconds) / period
+        if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
+            raise ConfigError(
+                f"readings: expected {DELAYED}:S of whole control periods of {period:g} s, found "
+                f"{shown(name)}"
+            )
+
+
 def condition(controller: str, readings: str) -> str:
     """The name of a controller that is given these readings."""
     return controller if readings == OWN else f"{controller}@{readings}"
@@ -147,7 +163,7 @@ class Delayed:
     """What was read some ticks ago; until then the first reading."""
 
     def __init__(self, delay: float, batch: int, period: float) -> None:
-        self._past: Floats = np.zeros((max(1, round(delay / period)), batch, 2))
+        self._past: Floats = np.zeros((round(delay / period), batch, 2))
         self._next = 0
         self._fresh: Bools = np.ones(batch, dtype=bool)
 
@@ -205,7 +221,8 @@ def make_readings(
         donors: For `yoked` the recorded counts for each row, (ticks, 2).
 
     Raises:
-        ConfigError: There are no readings of that name, or of `yoked` no recorded counts.
+        ConfigError: There are no readings of that name, of `yoked` no recorded counts, or a delay
+            is of no whole periods.
     """
     kind = check_readings(name)
     if kind == NONE:
@@ -213,6 +230,7 @@ def make_readings(
     if kind == SWAPPED:
         return Swapped()
     if kind.startswith(DELAYED):
+        require_whole_delay(kind, control.period)
         return Delayed(float(kind.partition(":")[2]), batch, control.period)
     if kind == YOKED:
         if len(donors) != batch or not all(len(counts) for counts in donors):

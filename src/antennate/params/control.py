@@ -229,7 +229,11 @@ class SearchParams(Params):
     """
 
     patience: float = number(
-        3.0, "s", "assumed: not swept; an escape that comes too early repeats itself", ge=0, le=60
+        3.0,
+        "s",
+        "fitted: no patience, 3, 5 and 8 s were tried on few draws (docs/science/corridors.md)",
+        ge=0,
+        le=60,
     )
     """Shortest walk between two escapes."""
     reverse_time: float = number(2.2, "s", "assumed: as escape.reverse_time", gt=0, le=30)
@@ -253,7 +257,7 @@ class SearchParams(Params):
     )
     """Turn from the first heading after which the robot can have turned round."""
     lost_time: float = number(
-        3.0, "s", "assumed: not swept; with 2 s it turns round in wide corridors", gt=0, le=3600
+        3.0, "s", "fitted: with 2 s it turned round in wide corridors, once", gt=0, le=3600
     )
     """Nothing felt for so long after such a turn means that the walls are lost."""
     return_time: float = number(7.5, "s", "assumed: about 180 deg in free space", gt=0, le=60)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from antennate.control.knowledge import Kind, Knowledge
-from antennate.errors import SceneError
+from antennate.errors import SceneError, raised
+from antennate.messages import shortened
 from antennate.sim.engine import mujoco
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import SceneInstance
@@ -40,7 +41,7 @@ def require_route(name: str, scene: SceneInstance, kinds: Sequence[Kind]) -> Non
     """Check that a scene has the route from which these kinds follow.
 
     Raises:
-        SceneError: It has none.
+        SceneError: It has none, or one that is no line.
     """
     lacking = [kind for kind in kinds if kind in ON_ROUTE]
     if lacking and _route_of(scene) is None:
@@ -173,8 +174,20 @@ def _place(route: Floats, at: float) -> tuple[Floats, Floats]:
 
 def _route_of(scene: SceneInstance) -> Floats | None:
     """Corners of the centre line of a scene [m], shape (n, 2), None if it has none."""
-    found: Any = getattr(scene, "route", None)
-    return None if found is None else np.asarray(found, float)
+    try:
+        found: Any = getattr(scene, "route", None)
+        route = None if found is None else np.asarray(found, float)
+    except Exception as error:
+        raise SceneError(f"scene: route raised {raised(error)}") from error
+    if route is None:
+        return None
+    sound = route.ndim == 2 and route.shape[1] == 2 and len(route) > 1 and np.isfinite(route).all()
+    if not sound or not np.diff(route, axis=0).any(axis=1).all():
+        raise SceneError(
+            "scene: expected route to be two points or more, finite, each another than the one "
+            f"before, shape (n, 2) [m], found {shortened(repr(route.tolist()))}"
+        )
+    return route
 
 
 def _wrapped(angle: float) -> float:

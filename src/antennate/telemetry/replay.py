@@ -251,18 +251,27 @@ def replay(
     return found
 
 
-def changed_readings(header: Header, name: str, donor: Iterable[Tick] | None) -> Readings:
+def changed_readings(
+    header: Header, name: str, donor: Iterable[Tick] | None, lent: Header | None = None
+) -> Readings:
     """What a controller is given upon a log.
 
     Args:
         header: The header of the log.
         name: The readings, as `ReplayConfig` has them.
         donor: The ticks of the log that `yoked` gives, None without one.
+        lent: The header of that log.
 
     Raises:
-        LogError: The log holds changed readings itself, or the other one no ticks.
+        LogError: The log holds changed readings itself, or the other one does, is of the same
+            trial or drive, or holds no ticks.
         ConfigError: There are no such readings.
     """
+    if lent is not None:
+        if lent.readings != OWN:
+            raise LogError(f"--donor: expected a log of own readings, found {lent.readings}")
+        if _when(lent) == _when(header):
+            raise LogError("--donor: expected a log of another trial or drive, found the same")
     if name != OWN and header.readings != OWN:
         raise LogError(
             f"--readings {name}: expected a log of own readings, found one of {header.readings}"
@@ -271,6 +280,11 @@ def changed_readings(header: Header, name: str, donor: Iterable[Tick] | None) ->
     if name == YOKED and not counts:
         raise LogError(f"--donor: expected a log with ticks for --readings {YOKED}, found none")
     return make_readings(name, header.params, donors=[np.array(counts)] if counts else ())
+
+
+def _when(header: Header) -> tuple[object, ...]:
+    """What tells one trial or drive from another."""
+    return header.controller, header.seed, header.trial, header.start
 
 
 def recorded_controller(header: Header, name: str | None = None) -> Controller:

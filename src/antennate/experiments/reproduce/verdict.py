@@ -55,8 +55,7 @@ def above(interval: Ends | None, limit: float) -> bool | None:
 def agrees(value: float, interval: Ends | None, paper: float, tolerance: float) -> bool | None:
     """Whether a number agrees with the paper's.
 
-    None without an interval, and if that reaches the paper's number and is wider than what is
-    tolerated to both sides: few trials then decide nothing.
+    None without an interval, and if a limit of what agrees lies in it.
 
     Args:
         value: Our number.
@@ -67,7 +66,7 @@ def agrees(value: float, interval: Ends | None, paper: float, tolerance: float) 
     if interval is None:
         return None
     low, high = interval
-    if high - low > 2 * tolerance and low <= paper + tolerance and high >= paper - tolerance:
+    if any(low < limit < high for limit in (paper - tolerance, paper + tolerance)):
         return None
     return abs(value - paper) <= tolerance
 

@@ -21,7 +21,7 @@ from antennate.experiments.tunnel.monitor import (
     TrialPath,
     TrialResult,
 )
-from antennate.sim.knowledge import Truths
+from antennate.sim.knowledge import Truths, require_route
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
@@ -258,6 +258,7 @@ class _Rows:
             raise SceneError(f"{YOKED}: expected readings of trial {other}, found none")
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
+        require_route(config.scene, start.scene, self._known)
         limit = time_limit_of(start.scene, config.time_limit)
         self._robot.load(row, start.world, start.chance)
         self._begun[row], self._maneuvers[row] = self._ticks, 0

@@ -9,7 +9,14 @@ from pydantic import field_validator, model_validator
 
 from antennate.control.knowledge import KNOWABLE, Kind
 from antennate.control.readers import unread_by_all
-from antennate.control.readings import KINDS, OWN, YOKED, check_readings, condition
+from antennate.control.readings import (
+    KINDS,
+    OWN,
+    YOKED,
+    check_readings,
+    condition,
+    require_whole_delay,
+)
 from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
@@ -76,7 +83,11 @@ class TunnelConfig(TrialConfig):
     def _agree(self) -> TunnelConfig:
         require_different("controllers", self.controllers)
         require_different("knows", self.knows)
+        if {"side", "map"} <= set(self.knows):
+            raise ValueError("knows: expected side or map, found both; map tells the side, too")
         require_different("readings", self.readings)
+        for name in self.readings:
+            require_whole_delay(name, self.control.period)
         if YOKED in self.readings and self.trials < 2:
             raise ValueError(
                 f"readings {YOKED} are those of the next trial: expected trials of at least 2, "

@@ -75,11 +75,6 @@ def check(config: TunnelConfig) -> None:
         except ConfigError as error:
             raise ConfigError(f"--controllers: {error}") from error
         given |= dict.fromkeys(given_to(made, name, config.knows))
-    if unused := [kind for kind in config.knows if kind not in given]:
-        raise ConfigError(
-            f"--knows: expected what one of {', '.join(config.controllers)} can use, found "
-            f"{', '.join(unused)}"
-        )
     if given:
         require_route(config.scene, draw_scene(config, scene_of(config), 0), list(given))
 
