@@ -284,6 +284,7 @@ def _figure(scenes: dict[str, Any]) -> Figure:
         for place, name in enumerate(names):
             cell = scenes[scene].get(name)
             if cell is None:
+                panel.text(0.0, place, " not run", va="center", fontsize=7, color=INK)
                 continue
             low, high = cell["saved_95_s"] or (cell["saved_s"],) * 2
             panel.plot([low, high], [place, place], color=COLOUR, linewidth=2)
@@ -292,7 +293,8 @@ def _figure(scenes: dict[str, Any]) -> Figure:
         panel.set_yticks(range(len(names)), names)
         panel.set_ylim(len(names) - 0.5, -0.5)
         base = scenes[scene]["nothing"]
-        panel.set_title(f"{scene}: timed takes {base['mean_s']:.0f} s", loc="left", fontsize=8)
+        title = f"{scene}: timed takes {base['mean_s']:.0f} s ({base['trials']} trials)"
+        panel.set_title(title, loc="left", fontsize=8)
     panels[-1].set_xlabel("time saved against timed that knows nothing [s]")
     return figure
 

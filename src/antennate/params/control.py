@@ -231,7 +231,7 @@ class SearchParams(Params):
     patience: float = number(
         3.0,
         "s",
-        "fitted: no patience, 3, 5 and 8 s were tried on few draws (docs/science/corridors.md)",
+        "fitted: 3, 5 and 8 s were tried on few draws (docs/science/corridors.md)",
         ge=0,
         le=60,
     )
