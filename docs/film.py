@@ -1,7 +1,7 @@
-"""Make the film at the top of README: a robot without feedback and one with our controller.
+"""Make the film at the top of README: one tunnel without feedback, by the clock, and by touch.
 
 Needs the extra `video`: `uv run --extra video docs/film.py`. It takes the first trial of the
-default seed that `open` fails and `closed` passes.
+default seed that `open` fails and `timed` and `closed` pass.
 """
 
 from __future__ import annotations
@@ -18,25 +18,27 @@ from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.film import record
 from antennate.telemetry.film import RATE, Film, pictures, require_video
 
+SHOWN = {"open": "timeout", "timed": "success", "closed": "success"}
+"""Controllers, left to right, and how their trial ends."""
 PLACE = Path(__file__).parent / "images" / "tunnel.webp"
 SPEED = 3.0
 EVERY = 2
 """Of the pictures every other one is shown."""
 LIMIT = 40.0
 """Time after which a robot is taken for stuck [s]."""
-WIDTH, HEIGHT = 430, 300
+WIDTH, HEIGHT = 400, 280
 LARGEST = 3_000_000
 """Most bytes of the file."""
 
 
 def main() -> None:
-    """Find the trial, record both, and write the image."""
+    """Find the trial, record it, and write the image."""
     require_video()
     films = next(filter(None, map(_telling, itertools.count())))
     end = max(film.t[-1] for film in films.values())
     shown = [pictures(_cut(film, name), WIDTH, HEIGHT) for name, film in films.items()]
     sides = [[Image.fromarray(picture) for picture in each] for each in shown]
-    frames = [_beside(*pair) for pair in _together(*sides)]
+    frames = [_beside(row) for row in _together(sides)]
     frames[0].save(
         PLACE,
         save_all=True,
@@ -53,18 +55,22 @@ def main() -> None:
 
 
 def _telling(trial: int) -> dict[str, Film] | None:
-    """Both films of a trial that only `closed` passes, None of another."""
+    """The films of a trial that ends as it should, None of another."""
     config = TunnelConfig(time_limit=LIMIT)
-    films = {name: record(config, name, trial, name, SPEED) for name in ("open", "closed")}
-    blind, touching = (film.title.split(": ")[1].split()[0] for film in films.values())
-    print(f"trial {trial}: open {blind}, closed {touching}")
-    return films if (blind, touching) == ("timeout", "success") else None
+    films = dict[str, Film]()
+    for name, wanted in SHOWN.items():
+        films[name] = record(config, name, trial, name, SPEED)
+        ended = films[name].title.split(": ")[1].split()[0]
+        print(f"trial {trial}: {name} {ended}")
+        if ended != wanted:
+            return None
+    return films
 
 
-def _together(left: list[Image.Image], right: list[Image.Image]) -> Iterator[Sequence[Image.Image]]:
-    """Pictures of both films; the last one of the shorter, with its ending, stays."""
-    for i in range(max(len(left), len(right))):
-        yield [each[min(i, len(each) - 1)] for each in (left, right)]
+def _together(sides: Sequence[Sequence[Image.Image]]) -> Iterator[list[Image.Image]]:
+    """Pictures of all films; the last one of a shorter one, with its ending, stays."""
+    for i in range(max(map(len, sides))):
+        yield [each[min(i, len(each) - 1)] for each in sides]
 
 
 def _cut(film: Film, name: str) -> Film:
@@ -81,11 +87,12 @@ def _cut(film: Film, name: str) -> Film:
     )
 
 
-def _beside(left: Image.Image, right: Image.Image) -> Image.Image:
-    both = Image.new("RGB", (left.width + right.width + 10, left.height), "white")
-    both.paste(left, (0, 0))
-    both.paste(right, (left.width + 10, 0))
-    return both
+def _beside(row: Sequence[Image.Image]) -> Image.Image:
+    every = WIDTH + 10
+    whole = Image.new("RGB", (every * len(row) - 10, row[0].height), "white")
+    for place, picture in enumerate(row):
+        whole.paste(picture, (every * place, 0))
+    return whole
 
 
 if __name__ == "__main__":
