@@ -20,7 +20,14 @@ from antennate.experiments.tunnel.run import check, run
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.knowledge import Truths, angle_ahead, is_facing, is_free, side_ahead
+from antennate.sim.knowledge import (
+    Truths,
+    angle_ahead,
+    is_facing,
+    is_free,
+    mean_direction,
+    side_ahead,
+)
 from antennate.sim.scenes.registry import SCENES
 from antennate.sim.scenes.scene import FlatScene, Route, SceneInstance
 from antennate.sim.trial import make_world, place_at_start
@@ -179,6 +186,13 @@ def test_side_facing_and_map_of_a_robot_in_its_scene() -> None:
         assert known.map[0] == pytest.approx(-heading, abs=1e-9)
         assert known.jam is None
         assert known.free is None
+
+
+def test_the_side_does_not_swing_with_the_head() -> None:
+    swung = [math.radians(25.0) * math.sin(2 * math.pi * i / 16) for i in range(16)]
+    for heading in (0.4, math.pi - 0.01):
+        mean = mean_direction([heading + each for each in swung])
+        assert mean == pytest.approx(heading, abs=1e-9)
 
 
 # who takes it

@@ -25,8 +25,8 @@ class Knowledge:
     """The truth about B robots; a part that is not given is None.
 
     Attributes:
-        side: Side on which the route goes on from the head: +1 left, -1 right, 0 straight ahead,
-            shape (B,).
+        side: Side on which the route goes on from the head, by its mean direction in a gait cycle:
+            +1 left, -1 right, 0 straight ahead, shape (B,).
         jam: Whether the robot walks and does not get on, shape (B,).
         facing: Whether the head faces the entrance, against the route, shape (B,).
         free: Whether nothing is within reach ahead of the head, shape (B,).

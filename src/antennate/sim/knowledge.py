@@ -66,13 +66,15 @@ class Truths:
         self._routes: dict[int, Floats | None] = {}
         self._ticks: dict[int, int] = {}
         self._walked: dict[int, list[Floats]] = {}
+        self._headings: dict[int, list[float]] = {}
         self._side: Ints = np.zeros(batch, np.int64)
         self._jam, self._facing, self._free = np.zeros((3, batch), dtype=bool)
         self._map: Floats = np.full(batch, math.nan)
 
     def begin(self, row: int, scene: SceneInstance) -> None:
         """A trial begins in a row."""
-        self._routes[row], self._ticks[row], self._walked[row] = _route_of(scene), 0, []
+        self._routes[row], self._ticks[row] = _route_of(scene), 0
+        self._walked[row], self._headings[row] = [], []
 
     def look(self, row: int, world: Any, maneuver: int) -> None:
         """Look at a row before a tick of its trial.
@@ -93,13 +95,14 @@ class Truths:
 
     def _look(self, row: int, world: World, maneuver: int) -> None:
         head, heading = world.head[:2].copy(), world.heading
+        self._headings[row] = [*self._headings[row], heading][-self._looks :]
         self._jam[row] = self._is_jammed(row, head, maneuver)
         if "free" in self._kinds:
             self._free[row] = is_free(world)
         route = self._routes[row]
         if route is not None:
             self._map[row] = angle_ahead(route, head, heading)
-            self._side[row] = side_ahead(route, head, heading)
+            self._side[row] = side_ahead(route, head, mean_direction(self._headings[row]))
             self._facing[row] = is_facing(route, head, heading)
 
     def _is_jammed(self, row: int, head: Floats, maneuver: int) -> bool:
@@ -109,6 +112,11 @@ class Truths:
         walked = [*self._walked[row], head][-self._looks - 1 :]
         self._walked[row] = walked
         return len(walked) > self._looks and math.dist(walked[0], head) < JAM_GAIN
+
+
+def mean_direction(headings: Sequence[float]) -> float:
+    """The mean of directions, as of a head that swings over a gait cycle [rad]."""
+    return math.atan2(sum(map(math.sin, headings)), sum(map(math.cos, headings)))
 
 
 def side_ahead(route: Floats, head: Floats, heading: float) -> int:
