@@ -1,12 +1,11 @@
 """The time series of one trial: what was read, decided and commanded at each control tick.
 
-A file is either `.npz`, NumPy's zip of arrays (never pickled objects), or `.csv`, one row for each
-tick after a first line that holds format and meta data. Both give back every bit of every number.
+A file is `.npz`, NumPy's zip of arrays (never pickled objects), and gives back every bit of every
+number; `to_dataframe` makes a table for other programs.
 """
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import zipfile
@@ -27,8 +26,6 @@ from antennate.notebook import html
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
 FORMAT = "antennate time series 1"
-NAMED = "antennate time series 2"
-"""The format of a CSV file whose columns are named by side and axis, not numbered as in 1."""
 _LARGEST_FILE = 1 << 30
 _ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
     "t": ((), np.float64),
@@ -48,14 +45,11 @@ _ENDS: dict[str, tuple[str, ...]] = {
     "head": ("x", "y"),
 }
 """What the columns of the last axis are called; those of others are numbered, head first."""
-_MAY_BE_EMPTY = ("yaw", "antenna", "pitch")
 _UNUSABLE = (
     *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
-    *(csv.Error, zlib.error, zipfile.BadZipFile),
+    *(zlib.error, zipfile.BadZipFile),
 )
 """What damaged files make the standard library and NumPy raise."""
-_MOST_COLUMNS = 1000
-_INDEX = {"left": "0", "right": "1", "x": "0", "y": "1"}
 _SHOWN_COLUMNS = (
     *("ticks [%]", "level left", "level right", "contact left [%]", "contact right [%]"),
 )
@@ -159,17 +153,13 @@ class TimeSeries:
         The names are `t`, `counts_left`, `counts_right`, …, `head_x`, `head_y`; joints along the
         body are numbered, head first: `yaw_0`, `leg_5_right`.
         """
-        return self._columns(_ENDS)
-
-    def _columns(self, ends: Mapping[str, tuple[str, ...]]) -> dict[str, Floats | Ints]:
-        """The columns, with names for the last index of some arrays."""
         found: dict[str, Floats | Ints] = {}
         for name in _ARRAYS:
             values = getattr(self, name)
             for index in np.ndindex(values.shape[1:]):
                 words = [name, *map(str, index)]
-                if index and index[-1] < len(ends.get(name, ())):
-                    words[-1] = ends[name][index[-1]]
+                if index and index[-1] < len(_ENDS.get(name, ())):
+                    words[-1] = _ENDS[name][index[-1]]
                 found["_".join(words)] = values[(slice(None), *index)]
         return found
 
@@ -182,15 +172,19 @@ class TimeSeries:
         return from_columns(self.columns())
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
-        """Write the series to a file that ends in `.npz` or `.csv`.
+        """Write the series to a file that ends in `.npz`.
 
         Raises:
             BadInputError: The path is none, or the file has another ending.
             OutputError: There is such a file and it may not be replaced, or it cannot be written.
         """
         path = checks.path("path", path)
-        data = self._npz() if _ending(path) == ".npz" else self._csv().encode()
-        write_whole(path, data, overwrite)
+        _require_npz(path)
+        file = io.BytesIO()
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        head = json.dumps({"format": FORMAT, "meta": dict(self.meta)})
+        np.savez_compressed(file, allow_pickle=False, header=np.array(head), **arrays)
+        write_whole(path, file.getvalue(), overwrite)
 
     @classmethod
     def load(cls, path: str | Path) -> TimeSeries:
@@ -201,31 +195,13 @@ class TimeSeries:
                 series.
         """
         path = checks.path("path", path)
-        read = _from_npz if _ending(path) == ".npz" else _from_csv
+        _require_npz(path)
         data = read_limited(path, _LARGEST_FILE)
         try:
-            return read(data)
+            return _from_npz(data)
         except _UNUSABLE as error:
             why = " ".join(str(error).split())
             raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
-
-    def _head(self, form: str) -> str:
-        return json.dumps({"format": form, "meta": dict(self.meta)})
-
-    def _npz(self) -> bytes:
-        file = io.BytesIO()
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        np.savez_compressed(file, allow_pickle=False, header=np.array(self._head(FORMAT)), **arrays)
-        return file.getvalue()
-
-    def _csv(self) -> str:
-        file = io.StringIO()
-        file.write(f"# {self._head(NAMED)}\n")
-        writer = csv.writer(file, lineterminator="\n")
-        columns = self.columns()
-        writer.writerow(columns)
-        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-        return file.getvalue()
 
 
 class TimeSeriesRecorder:
@@ -268,15 +244,14 @@ class TimeSeriesRecorder:
         return TimeSeries(**arrays, meta=dict(meta))
 
 
-def _ending(path: Path) -> str:
-    if path.suffix not in (".npz", ".csv"):
-        raise BadInputError(f"{path}: expected a name that ends in .npz or .csv")
-    return path.suffix
+def _require_npz(path: Path) -> None:
+    if path.suffix != ".npz":
+        raise BadInputError(f"{path}: expected a name that ends in .npz")
 
 
 def _meta(text: str) -> dict[str, Any]:
     head = json.loads(text)
-    if not isinstance(head, dict) or head.get("format") not in (FORMAT, NAMED):
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
         raise ValueError("another format")
     meta = head.get("meta")
     if not isinstance(meta, dict):
@@ -296,33 +271,3 @@ def _from_npz(data: bytes) -> TimeSeries:
         if values.dtype != (wanted := np.dtype(_ARRAYS[name][1])):
             raise ValueError(f"{name} of type {values.dtype} in place of {wanted}")
     return TimeSeries(**arrays, meta=meta)
-
-
-def _from_csv(data: bytes) -> TimeSeries:
-    first, _, rest = data.decode("utf-8").partition("\n")
-    meta = _meta(first.removeprefix("#"))
-    lines = csv.reader(io.StringIO(rest))
-    header = next(lines, [])
-    if len(header) > _MOST_COLUMNS:
-        raise ValueError(f"{len(header)} columns")
-    rows = list(lines)
-    for number, row in enumerate(rows, start=3):
-        if len(row) != len(header):
-            raise ValueError(f"{len(row)} cells in line {number}, not {len(header)}")
-    cells = np.array(rows, dtype=str).reshape(len(rows), len(header))
-    held: dict[str, list[int]] = {name: [] for name in _ARRAYS}
-    for place, column in enumerate(header):
-        if (name := column.split("_")[0]) not in held:
-            raise ValueError(f"an unknown column {column!r}")
-        held[name].append(place)
-    arrays: dict[str, Any] = {}
-    for name, places in held.items():
-        if not places and name not in _MAY_BE_EMPTY:
-            raise ValueError(f"no {name}")
-        last = header[places[-1]].split("_")[1:] if places else ["-1"]
-        shape = (len(rows), *(1 + int(_INDEX.get(index, index)) for index in last))
-        arrays[name] = cells[:, places].astype(_ARRAYS[name][1]).reshape(shape)
-    series = TimeSeries(**arrays, meta=meta)
-    if header not in (list(series.columns()), list(series._columns({}))):
-        raise ValueError("columns in another order")
-    return series
