@@ -16,7 +16,7 @@ A reading that cannot be used still means HOLD. While it holds, the time of a ma
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -36,7 +36,7 @@ turn in that round [s], each (n,), a turn to the right positive."""
 _BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn")
 """What an escape depends on where nothing was touched before."""
 _KNOWING_ESCAPE = ("lost_time", "return_time")
-"""And where a simulation tells it more."""
+"""And where a simulation tells it that it faces the entrance, or a map."""
 
 
 class TimedRule:
@@ -50,10 +50,8 @@ class TimedRule:
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.escape.turn_offset
         self._ticks = max(1, round(control.timed.walk_time / control.period))
-        names = (*_BLIND_ESCAPE, *_KNOWING_ESCAPE)
-        read = EscapeParams(**{name: getattr(control.escape, name) for name in names})
-        always = read.model_copy(update={"retry_time": math.inf})
-        self._escape = Escape(always, batch, control.period)
+        self._escape_params, self._told = control.escape, False
+        self._escape = Escape(self._read(_BLIND_ESCAPE), batch, control.period)
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:
@@ -64,6 +62,14 @@ class TimedRule:
     def know(self, knowledge: Knowledge) -> None:
         """Take what a simulation knows, for the escape."""
         self._escape.knowledge = knowledge
+        if not self._told and (knowledge.facing is not None or knowledge.map is not None):
+            self._escape.params = self._read((*_BLIND_ESCAPE, *_KNOWING_ESCAPE))
+            self._told = True
+
+    def _read(self, names: Iterable[str]) -> EscapeParams:
+        """An escape with some numbers of the control, whose turns always alternate."""
+        read = EscapeParams(**{name: getattr(self._escape_params, name) for name in names})
+        return read.model_copy(update={"retry_time": math.inf})
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`; of the readings it only matters whether they can be used."""

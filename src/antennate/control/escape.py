@@ -26,13 +26,14 @@ class Escape:
     """The escape of each row: its maneuver, when that ends, and the side of the last turn.
 
     Attributes:
+        params: Its numbers.
         knowledge: What a simulation knows of the rows; nothing on a robot.
     """
 
     knows = KNOWABLE
 
     def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
-        self._params = params
+        self.params = params
         self._memory_gain = period / params.memory_time
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
         self._until: Floats = np.zeros(batch)
@@ -81,9 +82,9 @@ class Escape:
         stuck = walking & stuck_by(self.knowledge, stuck)
         if np.count_nonzero(stuck):
             self._back_off(stuck, before, t)
-        lost = walking & self._turned & (t - self._felt > self._params.lost_time)
+        lost = walking & self._turned & (t - self._felt > self.params.lost_time)
         if self.knowledge.facing is not None:
-            walked = t - self._until > self._params.lost_time
+            walked = t - self._until > self.params.lost_time
             lost = lost | (walking & ~stuck & self.knowledge.facing & walked)
         if np.count_nonzero(lost):
             self._return(lost, t)
@@ -102,7 +103,7 @@ class Escape:
         return np.where((before == 0.0).all(axis=1, keepdims=True), self.touch, before)
 
     def _back_off(self, rows: Bools, touch: Floats, t: Floats) -> None:
-        params = self._params
+        params = self.params
         again = (t - self._ended < params.retry_time) & params.alternate
         away = touch[:, LEFT] >= touch[:, RIGHT]
         if params.first_turn == "right":
@@ -112,7 +113,7 @@ class Escape:
         self._to(rows, int(Maneuver.REVERSE), t + params.reverse_time)
 
     def _turn(self, rows: Bools, t: Floats) -> None:
-        params = self._params
+        params = self.params
         until = t + params.turn_time * np.where(self._again, params.second_turn, 1.0)
         if self.knowledge.map is not None:
             until = t + params.return_time
@@ -124,7 +125,7 @@ class Escape:
     def _return(self, rows: Bools, t: Floats) -> None:
         """Turn back, opposite to the last turn, and forget that turn."""
         right = self._known_side(~self._right)
-        self._to(rows, _turn_to(right), t + self._params.return_time)
+        self._to(rows, _turn_to(right), t + self.params.return_time)
         self._ended = np.where(rows, -np.inf, self._ended)
         self._turned &= ~rows
 
