@@ -21,11 +21,6 @@ from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.warp import run_trials_on_warp
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.outcome import Traverse, WallTrial
-from antennate.experiments.wall.run import every, run_trial
-from antennate.experiments.wall.warp import run_trials_on_warp as run_walls_on_warp
-from antennate.params.bench import WallParams
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
@@ -43,11 +38,6 @@ from antennate.types import AntennaFrame, Floats, JointCommand
 CONTROL, PHYSICS = ControlParams(), PhysicsParams()
 SHORT = TunnelConfig(time_limit=5.0, tunnel=TunnelParams(segments=(0.3,), turns_deg=(), strewn=0))
 ROOM = Limits(rows=240, contacts=60)
-WALL = WallConfig(
-    profiles=("stiff", "descending"),
-    trials=2,
-    wall=WallParams(travel=0.045, start=0.02, speed=0.02),
-)
 
 
 @pytest.fixture
@@ -227,7 +217,7 @@ def test_other_experiments_have_no_batches(
 ) -> None:
     out = str(tmp_path / "run")
     assert main(["touch", "--engine", "warp", "--trials", "1", "--out", out]) == 2
-    assert "expected tunnel, wall or a study of one of them" in capsys.readouterr().err
+    assert "expected tunnel or a study of it" in capsys.readouterr().err
 
 
 def test_a_study_of_another_experiment_has_no_batches(
@@ -236,12 +226,7 @@ def test_a_study_of_another_experiment_has_no_batches(
     study = tmp_path / "springs.toml"
     study.write_text('experiment = "springs"\n[vary]\nwire_mm = [0.4, 0.5]\n')
     assert main(["study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")]) == 2
-    assert "study of one of them; springs has none" in capsys.readouterr().err
-
-
-def test_the_compiled_chain_has_no_batches() -> None:
-    with pytest.raises(ConfigError, match="solver: expected mujoco with --engine warp"):
-        run_walls_on_warp(WALL.model_copy(update={"solver": "chain"}), [("stiff", 0)], print)
+    assert "study of it; springs has none" in capsys.readouterr().err
 
 
 def test_batches_keep_no_logs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -251,64 +236,21 @@ def test_batches_keep_no_logs(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert "warp, which keeps no logs" in capsys.readouterr().err
 
 
-Passages = dict[tuple[str, int], tuple[WallTrial, Traverse | None]]
-
-
-def walls_on_both(config: WallConfig, **more: Any) -> tuple[Passages, Passages]:
-    """Rows and passages of all trials, on the CPU engine and on Warp."""
-    trials = every(config)
-    gpu: Passages = {}
-    run_walls_on_warp(config, trials, lambda i, found: gpu.update({trials[i]: found}), **more)
-    return {trial: run_trial(config, *trial) for trial in trials}, gpu
-
-
 @pytest.mark.slow
-def test_walls_are_passed_as_on_the_cpu_engine(warp: Any) -> None:
-    cpu, gpu = walls_on_both(WALL, device="cpu", batch=3)
-    assert gpu.keys() == cpu.keys()
-    for trial, (theirs, _) in cpu.items():
-        ours = gpu[trial][0]
-        assert math.isclose(ours.flex_max_deg, theirs.flex_max_deg, abs_tol=0.2)
-        assert math.isclose(ours.force_mean_n, theirs.force_mean_n, rel_tol=0.3)
-    for profile in WALL.profiles:
-        theirs, ours = cpu[profile, 0][1], gpu[profile, 0][1]
-        assert theirs is not None
-        assert ours is not None
-        assert (ours.base == theirs.base).all()
-        assert (ours.boulders == theirs.boulders).all(), "those that fill the counts are left out"
-        near = ours.base < 0.003  # sticking and slipping parts the paths after that
-        assert np.abs(ours.flex - theirs.flex)[near].max() < 0.02, "before paths part"
-        assert ours.shapes.shape == theirs.shapes.shape
-        assert np.abs(ours.shapes[0] - theirs.shapes[0]).max() < 2e-4
-    assert all(found[1] is None for (_, number), found in gpu.items() if number)
-
-
-@pytest.mark.slow
-def test_walls_without_room_are_invalid(warp: Any) -> None:
-    tight = Limits(rows=1, contacts=12)
-    config = WALL.model_copy(update={"trials": 1, "profiles": ("stiff",)})
-    _, gpu = walls_on_both(config, device="cpu", limits=tight)
-    row, seen = gpu["stiff", 0]
-    assert (row.outcome, seen) == ("invalid", None)
-    assert "dropped contacts (NEFC): limits of 1 rows" in row.reason
-
-
-@pytest.mark.slow
-def test_a_study_of_walls_runs_in_batches_and_goes_on(
+def test_a_study_runs_in_batches_and_goes_on(
     warp: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study, out = tmp_path / "walls.toml", tmp_path / "run"
+    study, out = tmp_path / "widths.toml", tmp_path / "run"
     study.write_text(
-        'experiment = "wall"\ntrials = 1\n[vary]\n"antenna.friction" = [0.2, 0.4]\n'
-        '[settings]\nprofiles = ["stiff"]\n[settings.wall]\n'
-        "travel = 0.025\nstart = 0.001\njam_travel = 0.002\nspeed = 0.1\n"
+        'experiment = "tunnel"\ntrials = 1\n[vary]\n"tunnel.free_width" = [0.4, 0.5]\n'
+        '[settings]\ncontrollers = ["open"]\ntime_limit = 0.3\n'
+        "[settings.tunnel]\nsegments = [0.3]\nturns_deg = []\nstrewn = 0\n"
     )
     told = ["study", str(study), "--engine", "warp:cpu", "--out", str(out), "--no-figures"]
     assert main(told) == 0
     with (out / "trials.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [(row["point"], row["status"]) for row in rows] == [("0", "ok"), ("1", "ok")]
-    assert rows[0]["force_mean_n"] != rows[1]["force_mean_n"]
     before = (out / "trials.csv").read_bytes()
     assert main(told) == 0
     assert (out / "trials.csv").read_bytes() == before

@@ -31,7 +31,7 @@ class RunOptions(ResultOptions):
     )
     engine: str = option(
         LOCAL,
-        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel, wall and studies of them "
+        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel and studies of it "
         f"also {', '.join(BATCHED)}",
         "ENGINE",
     )

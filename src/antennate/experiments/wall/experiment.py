@@ -71,7 +71,7 @@ CAPTIONS = {
 EXPERIMENT = Experiment.of_folder(
     *(__name__, WallConfig, wall.run, tables, sentence),
     filmed=True,
-    trials=Trials("profile", wall.every, wall.run_rows, 1, WallTrial, wall.run_on_device),
+    trials=Trials("profile", wall.every, wall.run_rows, 1, WallTrial),
     measures=measures.PROFILE,
     viewed=lambda config, on_step, on_row, view, logs: wall.run(config, 1, on_step, on_row, view),
     check=require_solver,

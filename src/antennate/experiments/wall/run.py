@@ -23,7 +23,7 @@ from antennate.sim import chain
 from antennate.sim.bench import Bench, Watch, unwatched
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.pool import Workers, gather
-from antennate.studies.work import Fail, Failure, no_failure
+from antennate.studies.work import Failure
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.simulation import SimulationView
 
@@ -87,34 +87,6 @@ def run_trial(
     return row, seen if trial == 0 else None
 
 
-def run_on_device(
-    config: WallConfig,
-    trials: Sequence[Trial],
-    emit: Callable[[int, Any], None],
-    device: str | None,
-) -> None:
-    """As `run_rows`, on a GPU.
-
-    Raises:
-        ConfigError: There is none, or another solver is chosen.
-    """
-    tasks: list[_Task] = [(config, *trial) for trial in trials]
-    _run_batched(tasks, lambda i, found: emit(i, found[0]), no_failure, device)
-
-
-def _run_batched(
-    tasks: Sequence[_Task],
-    emit: Callable[[int, tuple[WallTrial, Traverse | None]], None],
-    fail: Fail,
-    device: str | None,
-) -> None:
-    """The same with passages; what fails is an invalid row, and nothing is told to `fail`."""
-    from antennate.experiments.wall.warp import run_trials_on_warp
-
-    trials = [(profile, trial) for _, profile, trial in tasks]
-    run_trials_on_warp(tasks[0][0], trials, emit, device=device)
-
-
 def _run_viewed(
     tasks: Sequence[_Task], on_step: OnStep, on_row: OnRow, view: SimulationView
 ) -> Iterator[tuple[WallTrial, Traverse | None]]:
@@ -165,7 +137,7 @@ def run(
 
     if view is None:
         how = {"on_result": lambda item: on_row(item[0]), "lost": lost}
-        found = gather(run_trial, tasks, workers, on_step, batched=_run_batched, **how)
+        found = gather(run_trial, tasks, workers, on_step, **how)
     else:
         found = list(_run_viewed(tasks, on_step, on_row, view))
     found.sort(key=lambda item: config.profiles.index(item[0].profile))
