@@ -58,13 +58,13 @@ DRIVEN = (("closed", 1, math.inf), ("paper", 0, 600.0))
 
 
 def antennate(words: str, *more: str | Path) -> None:
-    """Run a command; 2 is no failure, as of a replay of a damaged log."""
+    """Run a command, which must succeed."""
     done = subprocess.run(
         [*ANTENNATE, *words.split(), *map(str, more)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    if done.returncode not in (0, 2):
+    if done.returncode:
         sys.exit(f"{words}: {done.returncode}: {done.stderr.decode()[-2000:]}")
 
 
@@ -178,9 +178,9 @@ def main(folder: Path, wanted: list[str]) -> None:
         for count in (1, 2):
             parts[f"{name}-{count}"] = lambda f, w=words, c=count: run(w, f, "--workers", str(c))
     parts |= {"killed": killed, "logged": logged, "twin": served, "drive": driven}
+    if unknown := [each for each in wanted if each not in parts and f"{each}-1" not in parts]:
+        sys.exit(f"expected parts of {', '.join(parts)}, found {', '.join(unknown)}")
     names = [name for name in parts if not wanted or name in wanted or name[:-2] in wanted]
-    if wanted and not names:
-        sys.exit(f"expected parts of {', '.join(parts)}, found {', '.join(wanted)}")
     for name in names:
         began = time.monotonic()
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -183,8 +183,8 @@ def _place(route: Floats, at: float) -> tuple[Floats, Floats]:
 def _route_of(scene: SceneInstance) -> Floats | None:
     """Corners of the centre line of a scene [m], shape (n, 2), None if it has none."""
     try:
-        found: Any = getattr(scene, "route", None)
-        route = None if found is None else np.asarray(found, float)
+        line: Any = getattr(scene, "route", None)
+        route = None if line is None else np.asarray(line, float)
     except Exception as error:
         raise SceneError(f"scene: route raised {raised(error)}") from error
     if route is None:

@@ -137,9 +137,9 @@ def run(
 
     if view is None:
         how = {"on_result": lambda item: on_row(item[0]), "lost": lost}
-        found = gather(run_trial, tasks, workers, on_step, **how)
+        passages = gather(run_trial, tasks, workers, on_step, **how)
     else:
-        found = list(_run_viewed(tasks, on_step, on_row, view))
-    found.sort(key=lambda item: config.profiles.index(item[0].profile))
-    examples = {row.profile: seen for row, seen in found if seen is not None}
-    return WallOutcome(config, [row for row, _ in found], examples)
+        passages = list(_run_viewed(tasks, on_step, on_row, view))
+    passages.sort(key=lambda item: config.profiles.index(item[0].profile))
+    examples = {row.profile: seen for row, seen in passages if seen is not None}
+    return WallOutcome(config, [row for row, _ in passages], examples)

@@ -47,38 +47,3 @@ def obstacle_forces(
         return
     if own[first] + own[second] > 0:
         wp.atomic_add(total, world, force[world, row])
-
-
-@wp.kernel
-def plane_forces(
-    count: wp.array[int],
-    owner: wp.array[int],
-    geoms: wp.array[wp.vec2i],
-    frame: wp.array[wp.mat33],
-    address: wp.array2d[int],
-    force: wp.array2d[float],
-    antenna: wp.array[int],
-    total: wp.array2d[float],
-    touches: wp.array[int],
-):
-    """Force of obstacles on the antenna, summed by world, and how many press; a thread a contact.
-
-    For elliptic cones and contacts of three dimensions, as those of the bench.
-    """
-    contact = wp.tid()
-    if contact >= count[0]:
-        return
-    world, row = owner[contact], address[contact, 0]
-    if row < 0 or row >= force.shape[1]:
-        return
-    local = wp.vec3(force[world, row], 0.0, 0.0)
-    for i in range(1, 3):
-        along = address[contact, i]
-        if along >= 0 and along < force.shape[1]:
-            local[i] = force[world, along]
-    pushed = wp.transpose(frame[contact]) * local
-    sign = 2.0 * float(antenna[geoms[contact][1]]) - 1.0
-    wp.atomic_add(total, world, 0, sign * pushed[0])
-    wp.atomic_add(total, world, 1, sign * pushed[1])
-    if force[world, row] > 0.0:
-        wp.atomic_add(touches, world, 1)
