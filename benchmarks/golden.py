@@ -34,7 +34,7 @@ ALONE = {
     "gait": "gait --cycles 2 --settling-cycles 1 --sweep-points 4",
     "gait_hexapod": "gait --robot hexapod --cycles 2 --settling-cycles 1 --sweep-points 4",
     "calibrate": "calibrate",
-    "force": "force --profiles stiff descending --traverses 4 --loads 6 --place-step 0.25",
+    "force": "force --profiles stiff descending --traverses 6 --loads 6 --place-step 0.25",
 }
 """Runs without workers, or whose trials are few."""
 POOLED = {

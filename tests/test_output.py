@@ -17,8 +17,9 @@ from terminal import Terminal
 from antennate.cli import main
 from antennate.cli.output import Output
 from antennate.cli.results import print_table
+from antennate.control.readings import short_names
 from antennate.experiments.tunnel.experiment import tables
-from antennate.messages import extra, short_names
+from antennate.messages import extra
 from antennate.studies.measures import Table
 
 ROOT = Path(__file__).parents[1]

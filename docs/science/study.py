@@ -21,9 +21,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from antennate.control.readings import short_names
 from antennate.experiments.tunnel.run import TunnelConfig, run
 from antennate.figures import INK, WIDTH, above, canvas, render, styled
-from antennate.messages import short_names
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent

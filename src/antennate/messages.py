@@ -51,34 +51,11 @@ def extra(name: str) -> str:
     )
 
 
-def short_names(controllers: Iterable[str]) -> dict[str, str]:
-    """A label for each controller: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME.
-
-    Where two share it, FILE.py:NAME, and all of it where they share that. Readings that are not its
-    own, as of `closed@delayed:0.5`, stay behind it.
-    """
-    names = list(dict.fromkeys(controllers))
-    ends = [{name: _end(name, mark) for name in names} for mark in ":/"]
-    return {
-        name: next((e[name] for e in ends if list(e.values()).count(e[name]) == 1), name)
-        for name in names
-    }
-
-
-def _end(name: str, mark: str) -> str:
-    """What follows the last such mark in the name of a controller, with its readings."""
-    readings = _READINGS.search(name)
-    at = readings.start() if readings else len(name)
-    return name[:at].rpartition(mark)[2] + name[at:]
-
-
 def shown(value: Any) -> str:
     """A value as Python writes it, in one short line."""
     return shortened(repr(value))
 
 
-_READINGS = re.compile(r"@(none|swapped|yoked|delayed:[^/@]+)$")
-"""Readings of a condition, behind the name of its controller."""
 _RENAMED = {"arms": ("controllers", "profiles")}
 """New names of what had another one in version 1."""
 

@@ -21,6 +21,7 @@ from antennate.cli.keys import pressed_keys
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import PageOptions, page_of
+from antennate.control.readings import short_names
 from antennate.errors import ConfigError, LogError, OutputError
 from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
@@ -34,7 +35,7 @@ from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.cures import what_to_do
-from antennate.messages import short_names, typed
+from antennate.messages import typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Measure, Table

@@ -15,9 +15,9 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, log_of, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
-from antennate.control.readings import OWN, YOKED, Readings, condition
+from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
-from antennate.messages import one_line, short_names, shortened
+from antennate.messages import one_line, shortened
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View

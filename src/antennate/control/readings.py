@@ -105,6 +105,26 @@ def parts_of(name: str) -> tuple[str, str]:
     return name, OWN
 
 
+def short_names(conditions: Iterable[str]) -> dict[str, str]:
+    """A label for each condition: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME.
+
+    Where two share it, FILE.py:NAME, and all of it where they share that. Readings that are not its
+    own, as of `closed@delayed:0.5`, stay behind it.
+    """
+    parts = {name: parts_of(name) for name in conditions}
+    ends = [
+        {
+            name: condition(each.rpartition(mark)[2], readings)
+            for name, (each, readings) in parts.items()
+        }
+        for mark in ":/"
+    ]
+    return {
+        name: next((e[name] for e in ends if list(e.values()).count(e[name]) == 1), name)
+        for name in parts
+    }
+
+
 def about_readings(names: Iterable[str]) -> list[str]:
     """What the readings of these conditions are, a line for each kind."""
     kinds = dict.fromkeys(parts_of(name)[1].partition(":")[0] for name in names)

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
+from antennate.control.readings import short_names
 from antennate.control.registry import RIVAL, about, compared
 from antennate.experiments.tunnel import measures
 from antennate.experiments.tunnel import run as tunnel
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, few, successes

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from antennate.control.readings import short_names
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.messages import short_names
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.world import World
 from antennate.telemetry.film import Film, WalkRecorder

@@ -52,16 +52,9 @@ class Passage:
         ways = {"down": -GRAVITY, "up": GRAVITY, "off": 0.0}
         return 0.0, ways[self.config.wall.gravity]
 
-    def bench(self, further: int = 0) -> Bench:
-        """The bench at the trial's start.
-
-        Args:
-            further: Spheres beyond the end of the wall, out of reach.
-        """
-        last, pitch = self.balls[-1], self.config.wall.sphere_diameter
-        more = [Ball(last.x, last.y + pitch * (i + 1), last.radius) for i in range(further)]
-        physics = self.config.physics
-        model = compile_bench(physics, self.antenna, [*self.balls, *more], self.pull)
+    def bench(self) -> Bench:
+        """The bench at the trial's start."""
+        model = compile_bench(self.config.physics, self.antenna, self.balls, self.pull)
         for i, factor in enumerate(self.factors):
             joint = model.joint(f"antenna/hinge{i}")
             joint.stiffness *= factor
