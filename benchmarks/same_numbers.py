@@ -20,7 +20,7 @@ RENAMED = {
     "fate_after_start": ("outcome_after_start",),
     "status": ("outcome",),
 }
-KEYS = ("arm", "controller", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
+KEYS = ("point", "arm", "controller", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
 VERSIONED = ("schema",)
 SHOWN = 10
 
@@ -43,6 +43,8 @@ def differing_rows(old: list[dict[str, str]], new: list[dict[str, str]]) -> tupl
             lines.append(f"column {column} is missing, new columns: {', '.join(new[0])}")
     keys = [k for k in KEYS if k in names]
     by_key = {tuple(row[k] for k in keys): row for row in old}
+    if len(by_key) < len(old):
+        lines.append(f"{len(old)} rows have {len(by_key)} different values of {', '.join(keys)}")
     count = 0
     for row in new:
         key = tuple(row[names[k]] for k in keys)
