@@ -20,7 +20,18 @@ RENAMED = {
     "fate_after_start": ("outcome_after_start",),
     "status": ("outcome",),
 }
-KEYS = ("point", "arm", "controller", "kind", "wall", "speed_m_s", "profile", "condition", "trial", "side")
+KEYS = (
+    "point",
+    "arm",
+    "controller",
+    "kind",
+    "wall",
+    "speed_m_s",
+    "profile",
+    "condition",
+    "trial",
+    "side",
+)
 VERSIONED = ("schema",)
 SHOWN = 10
 
