@@ -20,6 +20,8 @@ IMAGES = Path(__file__).parent / "images"
 DRAWS = 12
 """Draws of `corridors`, seeds 0 to 11."""
 COLUMNS = 3
+BAR = 0.5
+"""Bar of the scale [m]."""
 
 
 def main() -> None:
@@ -47,7 +49,7 @@ def told(scene: Tunnel) -> str:
 
 @style.styled
 def picture(name: str, scenes: Iterable[tuple[str, Tunnel]]) -> None:
-    """Scenes side by side, each in its own scale, the start at the circle."""
+    """Scenes side by side, each with a bar of its scale, the start at the circle."""
     scenes = list(scenes)
     rows = -(-len(scenes) // COLUMNS)
     figure = style.canvas(style.WIDTH, 1.75 * rows)
@@ -69,6 +71,13 @@ def show(panel: Axes, scene: Tunnel) -> None:
     panel.plot(*scene.route.T, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 2)))
     panel.plot(*scene.exit.T, color=style.INK, linewidth=0.8, linestyle=(0, (2, 2)))
     panel.plot(*scene.route[0], color=style.INK, marker="o", markersize=4)
+    right, low = np.concatenate(scene.walls).max(axis=0)[0], panel.dataLim.y0
+    below = low - 0.08 * max(panel.dataLim.width, panel.dataLim.height)
+    panel.plot([right - BAR, right], [below, below], color=style.INK, linewidth=2.0)
+    panel.annotate(
+        *(f"{BAR} m", (right - BAR, below), (-3, 0)),
+        textcoords="offset points", ha="right", va="center", fontsize=6,
+    )  # fmt: skip
     panel.set_aspect("equal")
     panel.margins(0.08)
 
