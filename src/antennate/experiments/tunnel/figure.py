@@ -122,23 +122,23 @@ def _panels(
     sizes = [side * width / max(side[0] for side in sides) for side in sides]
     across = style.WIDTH - room + beside * width
     in_line = max(1, int(across // 2))
-    low = _AXIS + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
+    top = _HEAD + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
     down = [size[1] for size in sizes for _ in range(lines)]
     gap = _AXIS + _HEAD if len(sides) == 1 else _TICKS + (_HEAD if lines > 1 else _TITLE)
-    high = low + sum(down) + (len(down) - 1) * gap + _HEAD
+    high = top + sum(down) + (len(down) - 1) * gap + _AXIS
     figure = Figure(figsize=(across, high))
     panels = np.empty((len(sides), columns), object)
     for j, i in np.ndindex(panels.shape):
         line = j * lines + i // beside
         left = _LEFT + i % beside * (width + _BETWEEN)
-        base = high - _HEAD - sum(down[: line + 1]) - line * gap
+        base = high - top - sum(down[: line + 1]) - line * gap
         shape = left / across, base / high, sizes[j][0] / across, sizes[j][1] / high
         panels[j, i] = panel = figure.add_axes(shape)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(visible=False)
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MultipleLocator(step))
-    figure.legend(handles=handles, loc="lower center", ncols=in_line)
+    figure.legend(handles=handles, loc="upper center", ncols=in_line)
     return figure, panels
 
 
