@@ -180,12 +180,17 @@ def main(folders: list[Path]) -> None:
         table.writeheader()
         table.writerows(cell[trial] for cell in rows.values() for trial in sorted(cell))
     (HERE / "corridors.png").write_bytes(render(figure_of(rows))["png"])
+    written("corridors", tables(result))
+
+
+def written(part: str, lines: list[str]) -> None:
+    """Put tables into their place on the page, between two comments."""
     page = HERE / "corridors.md"
-    begin, rest = page.read_text().split("<!-- corridors: ")
+    begin, rest = page.read_text().split(f"<!-- {part}: ")
     head, rest = rest.split("\n", 1)
-    _, end = rest.split("<!-- end of corridors -->")
-    text = "\n".join(tables(result))
-    page.write_text(f"{begin}<!-- corridors: {head}\n{text}\n<!-- end of corridors -->{end}")
+    _, end = rest.split(f"<!-- end of {part} -->")
+    text = "\n".join(lines)
+    page.write_text(f"{begin}<!-- {part}: {head}\n{text}\n<!-- end of {part} -->{end}")
 
 
 if __name__ == "__main__":
