@@ -11,9 +11,9 @@ from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial, require_room, scene_of
-from antennate.twin.driven_servo import factory_new
 from antennate.twin.passage import Passage
 from antennate.twin.robot import TwinRobot
+from antennate.twin.servos import factory_new
 from antennate.twin.touch import TouchStimulus
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from antennate.hardware.dynamixel.packets import (
+from antennate.dxl.packets import (
     BEFORE_BODY,
     BROADCAST,
     HEADER,

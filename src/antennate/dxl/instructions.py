@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antennate.hardware.dynamixel.packets import (
+from antennate.dxl.packets import (
     BROADCAST,
     HEADER,
     LAST_ID,
@@ -17,7 +17,7 @@ from antennate.hardware.dynamixel.packets import (
     StatusError,
     crc16,
 )
-from antennate.twin.registers import Servo
+from antennate.dxl.servo import Servo
 
 CONTROL_TABLE_BACKUP = 0x20
 """Instruction that stores registers, or restores them."""
@@ -44,7 +44,7 @@ def answer(t: float, servo: Servo, packet: Packet) -> Status | None:
     quiet = packet.id == BROADCAST or is_shadow(servo, packet)
     if packet.instruction == Instruction.PING:
         data = b"".join(
-            servo.table[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
+            servo.model[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
         )
         return None if is_shadow(servo, packet) else status(servo, StatusError.NONE, data)
     if packet.instruction == Instruction.READ:
