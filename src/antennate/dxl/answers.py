@@ -56,12 +56,12 @@ class Span:
 
 
 MOTION = Span(126, 10, spare=12)
-"""Load or current (2 bytes), velocity (4) and position (4) of both models; up to 147 all is
+"""Load or current (2 bytes), velocity (4) and position (4) of all models; up to 147 all is
 defined, so that more may be read."""
 POSITION = Span(132, 4, spare=12)
-"""The position of both models."""
+"""The position of all models."""
 DRIVE = Span(124, 12, spare=12)
-"""PWM (2 bytes), load or current, velocity and position of both models."""
+"""PWM (2 bytes), load or current, velocity and position of all models."""
 _MOST_ECHOES = 8
 """Requests whose echo may still come: more than are sent before the master reads again."""
 _GAP = 0.002

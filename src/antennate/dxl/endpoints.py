@@ -39,7 +39,7 @@ _NONSENSE = (TypeError, ValueError, KeyError, struct.error)
 
 
 class Endpoint(Protocol):
-    """The twin's side of a wire; `select` takes it."""
+    """The server's side of a wire; `select` takes it."""
 
     @property
     def path(self) -> str:

@@ -17,7 +17,7 @@ _READS = 6
 """Reads until a servo is taken for one that answers nothing but pings: answers that collide are by
 chance whole once in 2^16 (assumed)."""
 _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
-"""What differs between two servos of one id: the tick and the position, in both models."""
+"""What differs between two servos of one id: the tick and the position, in all models."""
 _SPARE = {"torque_enable": 1, "goal_position": 12, "present_position": 12}
 
 State = Literal["ok", "broken", "collides", "mute"]

@@ -1,7 +1,7 @@
 """The motor of a servo that stands alone, and what makes its drive: the loops of the manuals.
 
-The motor is that of the simulated robot: a torque-speed line through stall torque and unloaded
-speed, both in proportion to the supply, and the inertia at its output; its horn carries nothing.
+The motor is a torque-speed line through stall torque and unloaded speed of its rating, both in
+proportion to the supply, and the inertia at its output; its horn carries nothing.
 That gives a time constant of 12 ms (XC430). Without torque the gear stops the shaft, and nothing
 turns it. The loops run once a millisecond (assumed) with the gains of the manuals. Feedforward
 gains have the divisor of the manuals, 4; that the speed and the acceleration of the profile count
