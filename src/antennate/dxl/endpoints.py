@@ -34,7 +34,7 @@ _NAMED = {
 }
 _LONGEST = 64
 """Most bytes of a command that has no end: those of RFC 2217 for settings have six."""
-_NONSENSE = (TypeError, ValueError, KeyError, struct.error)
+_BAD_COMMAND = (TypeError, ValueError, KeyError, struct.error)
 """What pyserial raises upon commands that are none."""
 
 
@@ -142,7 +142,7 @@ class TcpEndpoint:
             ) from None
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
-        self._rest = b""
+        self._unsent = b""
         self._ready = selectors.DefaultSelector()
         self._ready.register(self._listener, selectors.EVENT_READ)
         self.path = f"{self.scheme}://{host}:{self._listener.getsockname()[1]}"
@@ -167,7 +167,7 @@ class TcpEndpoint:
             return came
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._client, self._rest = client, b""
+        self._client, self._unsent = client, b""
         self._ready.register(client, selectors.EVENT_READ)
         self._begin()
         return came
@@ -177,10 +177,10 @@ class TcpEndpoint:
         if self._client is None:
             return
         try:
-            if self._rest:
-                self._rest = self._rest[self._client.send(self._rest) :]
-            if not self._rest:
-                self._rest = data[self._client.send(data) :]
+            if self._unsent:
+                self._unsent = self._unsent[self._client.send(self._unsent) :]
+            if not self._unsent:
+                self._unsent = data[self._client.send(data) :]
         except BlockingIOError:
             return
         except OSError:
@@ -310,7 +310,7 @@ class Rfc2217Endpoint(TcpEndpoint):
         came = super()._receive(client)
         try:
             data = b"".join(self._manager.filter(came)) if came else b""
-        except _NONSENSE:
+        except _BAD_COMMAND:
             self._part(client)
             return b""
         if len(self._manager.suboption or b"") > _LONGEST:

@@ -23,7 +23,7 @@ CONTROL_TABLE_BACKUP = 0x20
 """Instruction that stores registers, or restores them."""
 _CLEAR = b"\x01DXL\x22"
 _STORE, _RESTORE = b"\x01CTRL", b"\x02CTRL"
-_KEPT = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
+_RESET_EXCEPTIONS = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
 """What a factory reset leaves as it is, by its parameter."""
 _RESET_ALL = 0xFF
 
@@ -100,9 +100,9 @@ def _change(t: float, servo: Servo, packet: Packet) -> StatusError:
         return StatusError.NONE
     if kind == Instruction.CLEAR and params == _CLEAR:
         return servo.clear_turns()
-    if kind == Instruction.FACTORY_RESET and params and params[0] in _KEPT:
+    if kind == Instruction.FACTORY_RESET and params and params[0] in _RESET_EXCEPTIONS:
         if packet.id != BROADCAST or params[0] != _RESET_ALL:
-            servo.factory_reset(t, _KEPT[params[0]])
+            servo.factory_reset(t, _RESET_EXCEPTIONS[params[0]])
         return StatusError.NONE
     if kind == CONTROL_TABLE_BACKUP and params == _STORE:
         return servo.store_backup()

@@ -30,7 +30,7 @@ BOOT_TIME = 0.25
 _ROOM_TEMPERATURE = 25
 _TORQUE_AT_START, _RAM_AT_START = 1, 2
 """Bits of Startup Configuration."""
-_TOLD = frozenset(
+_REPORTED = frozenset(
     {"moving", "moving_status", "present_pwm", "present_load", "present_current"}
     | {"present_velocity", "present_position", "velocity_trajectory", "position_trajectory"}
 )
@@ -66,7 +66,7 @@ class Servo:
         self.plugged = True
         self.registered: tuple[int, bytes] | None = None
         self.trouble: Trouble | None = None
-        self._moved, self._told = True, -1
+        self._moved, self._reported = True, -1
         self._t = self._fed = self._boot = t
         self.set("id", servo)
         self.set("firmware_version", model.firmware)
@@ -76,8 +76,8 @@ class Servo:
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        if name in _TOLD:
-            self._tell()
+        if name in _REPORTED:
+            self._report()
         return self.memory.get(name)
 
     def set(self, name: str, value: int) -> None:
@@ -166,7 +166,7 @@ class Servo:
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
-        self._tell()
+        self._report()
         return self.memory.read(address, length)
 
     def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
@@ -305,9 +305,9 @@ class Servo:
         self._refresh()
         self._moved = True
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         """Let registers tell what the shaft does, if it or a register has changed since."""
-        if self._moved or self._told != self.memory.version:
+        if self._moved or self._reported != self.memory.version:
             self._refresh()
-            self._moved, self._told = False, self.memory.version
+            self._moved, self._reported = False, self.memory.version
             self.motion.show(self._t)
