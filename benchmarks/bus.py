@@ -31,12 +31,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from antennate.hardware.dynamixel.answers import POSITION, Answer, Timing, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
+from antennate.dxl.answers import POSITION, Answer, Timing, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.models import XC430_W240, XL330_M288
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 from antennate.hardware.ports.serial_port import SerialPort
-from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.registers import Servo
 
 IDS = tuple(range(1, 20))
 BAUD = 1_000_000

@@ -18,12 +18,12 @@ import numpy as np
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
+from antennate.dxl.model import FULL_DRIVE
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.joints import Joints
 from antennate.params.safety import FollowingParams
-from antennate.robots.servos import FULL_DRIVE
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
 from antennate.types import AntennaFrame, Controller, JointCommand

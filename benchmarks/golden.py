@@ -112,7 +112,7 @@ def take(received: dict[int, bytearray], patience: float = 0.0) -> bool:
 
 def packets_of(tick: int) -> bytes:
     """What the robot is told in a tick: legs and yaw that swing; each tenth, where they are."""
-    from antennate.hardware.dynamixel import packets
+    from antennate.dxl import packets
     from antennate.robots.spec import RobotSpec
 
     robot = RobotSpec()

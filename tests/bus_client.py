@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
-from antennate.hardware.dynamixel.answers import MOTION, Timing
-from antennate.hardware.dynamixel.bus import Bus
+from antennate.dxl.answers import MOTION, Timing
+from antennate.dxl.bus import Bus
 from antennate.hardware.ports.serial_port import SerialPort
 from antennate.hardware.safety import torque
 

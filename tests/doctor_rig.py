@@ -10,8 +10,8 @@ from lockstep import BoardPort, LockstepClock
 from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import apply, plan
-from antennate.hardware.ports.port import Port
 from antennate.hardware.robot import DoctorConfig
+from antennate.port import Port
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot

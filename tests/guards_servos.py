@@ -23,19 +23,19 @@ import test_twin_robot
 from guard_tools import Guard, after, around, constant, given, put
 from lockstep import SimulatedWire
 
+from antennate.dxl import bus, inquiry, packets, parser
+from antennate.dxl.answers import PendingRequests, Timing, Value
+from antennate.dxl.model import FULL_DRIVE
+from antennate.dxl.models import XC430_W240
 from antennate.hardware import joints, settings
 from antennate.hardware.driving import dry_run, session
-from antennate.hardware.dynamixel import actuators, bringup, bus, inquiry, monitor, packets, parser
+from antennate.hardware.dynamixel import actuators, bringup, monitor
 from antennate.hardware.dynamixel import leg_turns as turns
-from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
-from antennate.hardware.dynamixel.pending import PendingRequests
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.ports import serial_port
 from antennate.hardware.safety import torque
 from antennate.params.safety import FollowingParams
-from antennate.robots.servos import FULL_DRIVE
 from antennate.robots.spec import RobotSpec
 
 does_wrong = (

@@ -30,10 +30,10 @@ from antennate.hardware.driving.signals import StopOnce
 from antennate.hardware.driving.supervised_controller import SupervisedController
 from antennate.hardware.dynamixel import monitor
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import deadlines, torque
 from antennate.hardware.safety.causes import Outputs
 from antennate.hardware.safety.supervisor import Supervisor
+from antennate.port import PortError
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.twin.bus import ServoBus
+from antennate.dxl.servo_bus import ServoBus
 from antennate.twin.faults import Faults
 from antennate.twin.robot import ROUNDING, TwinRobot
 

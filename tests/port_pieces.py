@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.hardware.ports.port import PortError
+from antennate.port import PortError
 
 
 class Pieces:

@@ -9,7 +9,7 @@ import threading
 import time
 import tty
 
-from antennate.twin.bus import ServoBus
+from antennate.dxl.servo_bus import ServoBus
 
 _CHUNK = 4096
 

@@ -8,15 +8,15 @@ import mujoco
 import numpy as np
 from manual_tables import Page
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.packets import Status
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import TABLES
+from antennate.dxl import packets
+from antennate.dxl.driven import DrivenServo
+from antennate.dxl.models import MODELS_BY_NUMBER
+from antennate.dxl.packets import Status
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 from antennate.robots.servos import ServoParams, XL330Params
 from antennate.sim.servo_drives import ServoDrives
-from antennate.twin.bus import ServoBus
-from antennate.twin.driven_servo import DrivenServo
-from antennate.twin.registers import Servo
 
 NONE, RESULT_FAIL, INSTRUCTION, CRC, RANGE, LENGTH, LIMIT, ACCESS = range(8)
 """Numbers of the errors of a status packet, from the manual."""
@@ -41,7 +41,7 @@ class Bench:
 
     def __init__(self, page: Page, position: float = 2048.0, others: int = 0) -> None:
         self.page = page
-        table = TABLES[page.model]
+        table = MODELS_BY_NUMBER[page.model]
         self.servo = self.make(1, position)
         more = [Servo(table, 2 + n, position) for n in range(others)]
         self.bus = self.wire([self.servo, *more])
@@ -49,7 +49,7 @@ class Bench:
 
     def make(self, servo: int, position: float) -> Servo:
         """The servo that is looked at."""
-        return Servo(TABLES[self.page.model], servo, position)
+        return Servo(MODELS_BY_NUMBER[self.page.model], servo, position)
 
     def wire(self, servos: list[Servo]) -> ServoBus:
         """What the servos are on."""
@@ -144,7 +144,7 @@ class DrivenBench(Bench):
 
     def make(self, servo: int, position: float) -> Servo:
         """A servo whose shaft the physics moves."""
-        made = DrivenServo(TABLES[self.page.model], servo, position)
+        made = DrivenServo(MODELS_BY_NUMBER[self.page.model], servo, position)
         made.motion.params = DRIVEN[self.page.model]
         self.divisor = made.motion.params.gain_divisor
         return made

@@ -7,8 +7,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES
-from antennate.twin.registers import Servo
+from antennate.dxl.model import POSITION_UNIT
+from antennate.dxl.models import MODELS_BY_NUMBER
+from antennate.dxl.servo import Servo
 
 RATE = 250.0
 """Samples a second."""
@@ -16,7 +17,7 @@ RATE = 250.0
 
 def of_twin(path: Path, model: int, p_gain: int, amplitude: float, seconds: float = 6.0) -> Path:
     """A servo of the twin without load follows a sine that grows faster, as a recording."""
-    table = TABLES[model]
+    table = MODELS_BY_NUMBER[model]
     servo = Servo(table, 1, 2048.0)
     for name, value in (
         ("return_delay_time", 0),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from lockstep import SimulatedWire
 
-from antennate.hardware.dynamixel.answers import MOTION, Answer, Span, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288
-from antennate.twin.bus import ServoBus
-from antennate.twin.registers import Servo
+from antennate.dxl.answers import MOTION, Answer, Span, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.models import XC430_W240, XL330_M288
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 
 IDS = list(range(1, 20))
-MODELS = {i: (XC430_W240 if i <= 17 else XL330_M288).model for i in IDS}
+MODELS = {i: (XC430_W240 if i <= 17 else XL330_M288).number for i in IDS}
 
 
 def servos() -> list[Servo]:

@@ -9,19 +9,20 @@ from dataclasses import dataclass, field
 
 from lockstep import SimulatedWire
 
+from antennate.dxl.model import BAUD_RATES
+from antennate.dxl.models import MODELS_BY_NUMBER
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import BadInputError
-from antennate.hardware.dynamixel.tables import BAUD_RATES, TABLES
-from antennate.hardware.ports.port import Port
+from antennate.port import Port
 from antennate.robots.spec import RobotSpec
-from antennate.twin.bus import ServoBus
-from antennate.twin.registers import Servo
 
 ROBOT = RobotSpec()
 
 
 def new_servo(model: int, at: float = 2048.0) -> Servo:
     """A servo of the factory: id 1, 57600 bit/s, all registers at the manual's defaults."""
-    return Servo(TABLES[model], 1, position=at)
+    return Servo(MODELS_BY_NUMBER[model], 1, position=at)
 
 
 class Box:

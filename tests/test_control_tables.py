@@ -12,7 +12,7 @@ import pytest
 from manual_tables import PAGES, Page, Row
 from servo_bench import ACCESS, LENGTH, LIMIT, NONE, RANGE, Bench
 
-from antennate.hardware.dynamixel.tables import TABLES
+from antennate.dxl.models import MODELS_BY_NUMBER
 
 ROWS = [(page, row) for page in PAGES for row in page.rows.values()]
 NAMES = [f"{page.name}-{row.name}" for page, row in ROWS]
@@ -29,7 +29,7 @@ def write(page: Page, row: Row, value: int, size: int | None = None) -> int:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_our_table_has_the_registers_of_the_manual_and_no_others(page: Page) -> None:
-    table = TABLES[page.model]
+    table = MODELS_BY_NUMBER[page.model]
     assert table.name == page.name
     assert table.modes == page.modes
     ours = {r.address: (r.name, r.size, r.signed, r.writable) for r in table.registers.values()}
@@ -165,7 +165,7 @@ def test_the_table_is_that_of_the_official_sdk_for_the_firmware_that_a_servo_say
     bench = Bench(page)
     (pinged,) = bench.ask(1)
     theirs = rows_of_the_sdk(page.model, pinged.data[2])
-    ours = {row.address: row for row in TABLES[page.model].registers.values()}
+    ours = {row.address: row for row in MODELS_BY_NUMBER[page.model].registers.values()}
     assert len(theirs) > 50
     for address, (size, title) in theirs.items():
         assert address in ours, title

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from doctor_rig import ROBOT, Patient, wrong
 
+from antennate.dxl.packets import StatusError
+from antennate.dxl.servo import Servo
 from antennate.hardware.doctor import board_checks
 from antennate.hardware.doctor.board_survey import BoardSurvey
 from antennate.hardware.doctor.check import grouped, ids_text
@@ -15,16 +17,14 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.ports.errors import OpenError
 from antennate.params.doctor import DoctorParams
-from antennate.twin.registers import Servo
 
 
 def memory(patient: Patient) -> list[dict[str, int]]:
     """Registers of all servos up to the goals, without those that time changes."""
     return [
-        {r.name: servo.get(r.name) for r in servo.table.registers.values() if r.address < 120}
+        {r.name: servo.get(r.name) for r in servo.model.registers.values() if r.address < 120}
         for servo in patient.robot.servos
     ]
 

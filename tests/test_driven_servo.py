@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from antennate.dxl.driven import DrivenServo
 from antennate.twin.config import TwinConfig, watched
-from antennate.twin.driven_servo import DrivenServo
 from antennate.twin.robot import TwinRobot
 
 PWM, CURRENT_POSITION = 16, 5
@@ -28,13 +28,13 @@ def standing(robot: TwinRobot, mode: int, place: int = 0) -> DrivenServo:
     """A servo in a mode, with torque; the first one of the yaw joints without a place."""
     servo = robot.servos[place]
     for name, value in (("operating_mode", mode), ("torque_enable", 1)):
-        register = servo.table[name]
+        register = servo.model[name]
         assert servo.write(register.address, register.encode(value)) == 0
     return servo
 
 
 def put(servo: DrivenServo, name: str, value: int) -> None:
-    register = servo.table[name]
+    register = servo.model[name]
     assert servo.write(register.address, register.encode(value)) == 0
 
 

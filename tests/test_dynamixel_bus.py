@@ -10,8 +10,8 @@ import pytest
 from lockstep import SimulatedWire
 from servo_rig import IDS, MODELS, Rig, positions
 
-from antennate.hardware.dynamixel import bringup, packets
-from antennate.hardware.dynamixel.answers import (
+from antennate.dxl import packets
+from antennate.dxl.answers import (
     MOTION,
     POSITION,
     SILENT,
@@ -21,15 +21,16 @@ from antennate.hardware.dynamixel.answers import (
     Timing,
     Value,
 )
+from antennate.dxl.bus import Bus
+from antennate.dxl.models import XL330_M288
+from antennate.dxl.packets import Status, StatusError
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
+from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.monitor import ServoMonitor
-from antennate.hardware.dynamixel.packets import Status, StatusError
-from antennate.hardware.dynamixel.tables import XL330_M288
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import torque
-from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.registers import Servo
+from antennate.port import PortError
 
 LIMIT = 0.010 + 1e-9
 TRUE = {i: 100 * i for i in IDS}
@@ -472,7 +473,7 @@ def test_B15_missing_wrong_double_and_strange_servos_are_named_within_3_s() -> N
 
 def test_B15_two_models_with_one_id_are_not_called_silent() -> None:
     rig = Rig()
-    assert rig.servo(3).table is not XL330_M288
+    assert rig.servo(3).model is not XL330_M288
     rig.twin.servos.append(Servo(XL330_M288, 3))
     with pytest.raises(BringUpError, match="id 3: no answer is whole: two servos"):
         bringup.require(rig.bus, MODELS)

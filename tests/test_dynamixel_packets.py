@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.hardware.dynamixel import packets, tables
-from antennate.hardware.dynamixel.packets import (
+from antennate.dxl import packets
+from antennate.dxl.instructions import fast_pieces
+from antennate.dxl.model import ServoModel, hardware_errors
+from antennate.dxl.models import MODELS_BY_NUMBER, XC430_W240, XL330_M288
+from antennate.dxl.packets import (
     HEADER,
     LONGEST,
     Instruction,
@@ -19,8 +22,7 @@ from antennate.hardware.dynamixel.packets import (
     Status,
     StatusError,
 )
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.twin.instructions import fast_pieces
+from antennate.dxl.parser import Parser
 
 GOLDEN = Path(__file__).parents[2] / "shared/data/dxl_golden_packets/golden_packets.json"
 needs_golden = pytest.mark.skipif(not GOLDEN.exists(), reason="golden packets not present")
@@ -285,8 +287,8 @@ def test_what_cannot_be_sent_is_refused() -> None:
         packets.write(1, 0, bytes(1100))
 
 
-@pytest.mark.parametrize("table", tables.TABLES.values(), ids=lambda table: table.name)
-def test_a_table_has_no_overlaps_and_its_defaults_are_in_range(table: tables.Table) -> None:
+@pytest.mark.parametrize("table", MODELS_BY_NUMBER.values(), ids=lambda table: table.name)
+def test_a_table_has_no_overlaps_and_its_defaults_are_in_range(table: ServoModel) -> None:
     end = 0
     for register in table.registers.values():
         assert register.address >= end
@@ -297,15 +299,15 @@ def test_a_table_has_no_overlaps_and_its_defaults_are_in_range(table: tables.Tab
         if register.default is not None and register.name != "secondary_id":
             assert register.low is None or register.low <= register.default
             assert register.high is None or register.default <= register.high
-    assert table["model_number"].default == table.model
+    assert table["model_number"].default == table.number
 
 
 def test_the_tables_differ_where_the_manuals_do() -> None:
-    """A few cells read from the two pages named in `tables`."""
-    xc, xl = tables.XC430_W240, tables.XL330_M288
+    """A few cells read from the two pages named in their files."""
+    xc, xl = XC430_W240, XL330_M288
     assert (xc["velocity_limit"].default, xl["velocity_limit"].default) == (306, 445)
     assert (xc["shutdown"].default, xl["shutdown"].default) == (0x34, 0x35)
     assert xc["present_load"].address == xl["present_current"].address == 126
     assert xl["goal_current"].address == 102
     assert xc["goal_position"].address == xl["goal_position"].address == 116
-    assert tables.hardware_errors(0x34) == ["overheating", "electrical shock", "overload"]
+    assert hardware_errors(0x34) == ["overheating", "electrical shock", "overload"]

@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lockstep import SimulatedWire
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import MOTION, SILENT, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.echo import Echo
-from antennate.hardware.dynamixel.packets import Status
+from antennate.dxl import packets
+from antennate.dxl.answers import MOTION, SILENT, Echo, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.packets import Status
+from antennate.dxl.servo_bus import ServoBus
 from antennate.robots.spec import RobotSpec
-from antennate.twin.bus import ServoBus
-from antennate.twin.driven_servo import servos_of
+from antennate.twin.servos import servos_of
 
 IDS = RobotSpec().ids
 GOAL = 116

@@ -46,3 +46,10 @@ def test_examples_are_short_and_say_what_they_are(path: Path) -> None:
     text = path.read_text()
     assert len(text.splitlines()) <= 60
     assert text.startswith('"""')
+
+
+def test_virtual_servos_are_moved_over_tcp(tmp_path: Path) -> None:
+    out = ran("servo_bus", tmp_path).splitlines()
+    assert out[0].endswith("[1, 2, 3]")
+    assert out[1].endswith("{1: 2048, 2: 2048, 3: 2048}")
+    assert out[3].endswith("{1: 2148, 2: None, 3: 2348}")

@@ -23,7 +23,7 @@ from antennate.errors import LogError, reason
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.session import Session
-from antennate.hardware.ports.port import PortError
+from antennate.port import PortError
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.writer import LogWriter

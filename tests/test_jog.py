@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from setup_rig import ROBOT, Box
 
-from antennate.hardware.dynamixel.bus import Bus
+from antennate.dxl.bus import Bus
 from antennate.hardware.setup.jog import Jog
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of

@@ -11,8 +11,8 @@ from setup_rig import ROBOT, Box
 from test_jog import Ready
 
 from antennate.cli import jog, main
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.setup.jog import Jog
+from antennate.port import PortError
 
 Typed = Callable[[], list[str]]
 

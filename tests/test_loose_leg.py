@@ -10,14 +10,14 @@ import pytest
 import servo_rig
 from test_turns import Walk
 
+from antennate.dxl.packets import StatusError
+from antennate.dxl.servo import Servo
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.leg_turns import LegTurns
-from antennate.hardware.dynamixel.packets import StatusError
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
 from antennate.robots.spec import RobotSpec
-from antennate.twin.registers import Servo
 from antennate.types import Floats
 
 LEG = 6

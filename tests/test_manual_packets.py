@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from servo_rig import Rig
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import Refused, Span
-from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status, StatusError
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import XC430_W240
-from antennate.twin.bus import ServoBus
-from antennate.twin.registers import Servo
+from antennate.dxl import packets
+from antennate.dxl.answers import Refused, Span
+from antennate.dxl.models import XC430_W240
+from antennate.dxl.packets import BROADCAST, Instruction, Packet, Status, StatusError
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 
 ASKED: dict[str, tuple[str, int, Instruction, str]] = {
     "ping": ("FF FF FD 00 01 03 00 01 19 4E", 1, Instruction.PING, ""),

@@ -14,8 +14,8 @@ import pytest
 from pty_server import PtyServer
 from servo_rig import IDS, MODELS, servos
 
-from antennate.hardware.dynamixel.packets import ALERT
-from antennate.twin.bus import Fault, ServoBus, Trouble
+from antennate.dxl.packets import ALERT
+from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 
 POSITION, GOAL = 132, 116
 TRUE = [100 * i for i in IDS]

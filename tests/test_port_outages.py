@@ -10,18 +10,18 @@ from lockstep import BoardPort
 from twin_rig import rig
 
 from antennate.control.loop import run_loop
+from antennate.dxl.answers import Timing
+from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
-from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
-from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.deadlines import ANSWER
+from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 

@@ -23,8 +23,8 @@ from antennate.hardware.driving.connect import await_board
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.frame import encode_request
 from antennate.hardware.ports import reconnecting
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.ports.reconnecting import RETRY, Reconnecting
+from antennate.port import PortError
 
 pytest.importorskip("serial")
 

@@ -12,18 +12,18 @@ from servo_rig import Rig as Servos
 from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
+from antennate.dxl.answers import SILENT, Answer, Span
+from antennate.dxl.packets import Instruction, StatusError
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
-from antennate.hardware.dynamixel.answers import SILENT, Answer, Span
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.monitor import ServoMonitor
-from antennate.hardware.dynamixel.packets import Instruction, StatusError
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.causes import Cause, State
-from antennate.twin.bus import Fault, Trouble
+from antennate.port import PortError
 from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)

@@ -11,9 +11,9 @@ from recorded import leaves
 from servo_process import Served, served
 
 from antennate.cli.twin import command
+from antennate.dxl import packets
+from antennate.dxl.parser import Parser
 from antennate.errors import AntennateError, BadInputError, ConfigError
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.parser import Parser
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.orders import Orders
@@ -143,7 +143,7 @@ def test_a_homing_offset_moves_the_present_position_of_a_standing_servo_at_once(
     ):
         twin.advance(twin.t + 0.1)
         for servo in twin.bus.servos:
-            row = servo.table[register]
+            row = servo.model[register]
             assert servo.write(row.address, row.encode(value)) == 0
             present = int.from_bytes(servo.read(132, 4)[1], "little", signed=True)
             assert present == actual[servo] + shift

@@ -20,15 +20,16 @@ from unittest.mock import MagicMock
 import pytest
 from pty_server import PtyServer
 
-from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288, XL430_W250, Table
-from antennate.twin.bus import ServoBus
-from antennate.twin.registers import Servo
+from antennate.dxl.model import ServoModel
+from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 
 RPM = 0.229
 FACTORY_BAUD = 57_600
 
 
-def servos(*tables: Table, million: bool = False) -> list[Servo]:
+def servos(*tables: ServoModel, million: bool = False) -> list[Servo]:
     """New servos with ids from 1 on, at 57600 bit/s or at a million."""
     made = [Servo(table, n, position=1000.0 + 300 * n) for n, table in enumerate(tables, 1)]
     for servo in made:
@@ -58,7 +59,7 @@ class Moving(PtyServer):
 
 
 @contextmanager
-def served(*tables: Table, million: bool = False) -> Iterator[Moving]:
+def served(*tables: ServoModel, million: bool = False) -> Iterator[Moving]:
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-4)
     with Moving(ServoBus(servos(*tables, million=million))) as server:

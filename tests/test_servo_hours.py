@@ -13,15 +13,15 @@ from hardware_rig import Ticker
 from lockstep import SimulatedWire
 from servo_rig import IDS, Rig, positions, servos
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import POSITION, Value
-from antennate.hardware.dynamixel.bus import Bus
+from antennate.dxl import packets
+from antennate.dxl.answers import POSITION, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.packets import LONGEST, Packet
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 from antennate.hardware.dynamixel.monitor import ServoMonitor
-from antennate.hardware.dynamixel.packets import LONGEST, Packet
-from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.safety.causes import Cause, State
-from antennate.twin.bus import ServoBus
-from antennate.twin.registers import Servo
 
 GOAL = 116
 
@@ -36,7 +36,7 @@ class Standing(Servo):
 def standing() -> list[Servo]:
     made: list[Servo] = []
     for servo in servos():
-        still = Standing(servo.table, servo.get("id"), servo.position)
+        still = Standing(servo.model, servo.get("id"), servo.position)
         still.set("return_delay_time", 0)
         made.append(still)
     return made

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from test_servo_clients import Moving, served, stub
 
-from antennate.hardware.dynamixel.tables import XC430_W240, XL330_M288, XL430_W250
+from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
 
 PAGE = Path(__file__).parents[1] / "docs" / "servo-twin.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(), flags=re.DOTALL)

@@ -12,6 +12,10 @@ from pty_server import PtyServer
 from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
+from antennate.dxl.packets import Instruction, StatusError
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.driving.adapter import require_quick
 from antennate.hardware.driving.config import DriveConfig
@@ -21,20 +25,16 @@ from antennate.hardware.driving.report import Report
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import STOPS
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.packets import Instruction, StatusError
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Cause, State
 from antennate.params.control import ControlParams
 from antennate.params.safety import TouchCheckParams
+from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
-from antennate.twin.bus import Fault, Trouble
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.twin.registers import Servo
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 DRY = 0.3
@@ -103,7 +103,7 @@ def at(when: float, demand: str) -> Callable[[Rig, float], None]:
 def written(made: Rig) -> list[dict[str, int]]:
     """All that can be written of each servo."""
     return [
-        {r.name: servo.get(r.name) for r in servo.table.registers.values() if r.writable}
+        {r.name: servo.get(r.name) for r in servo.model.registers.values() if r.writable}
         for servo in made.robot.servos
     ]
 

@@ -8,18 +8,18 @@ from collections.abc import Callable
 import pytest
 from twin_rig import rig
 
+from antennate.dxl.driven import DrivenServo
+from antennate.dxl.models import XC430_W240
+from antennate.dxl.packets import StatusError
+from antennate.dxl.servo import Servo
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.safety.causes import State
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
-from antennate.twin.driven_servo import DrivenServo
-from antennate.twin.registers import Servo
 
 COUNTS = math.ceil(1.25 * 4.5 / (0.229 * 2 * math.pi / 60))
 """A quarter more than the 4.5 rad/s of goals, in units of 0.229 rev/min: 235."""

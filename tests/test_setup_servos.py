@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from setup_rig import ROBOT, Box, Script, new_servo
 
+from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.doctor.fix import Change
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.setup.assembly import Assembly
 from antennate.hardware.setup.person import Quit, SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from setup_rig import ROBOT, Box, Script
 
+from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.setup.person import Quit, SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group

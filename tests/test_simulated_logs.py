@@ -21,11 +21,11 @@ from log_ticks import HEADER
 
 import antennate
 from antennate.cli import main
+from antennate.dxl import packets
 from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.run import GaitStudyConfig, run
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import run as cross
-from antennate.hardware.dynamixel import packets
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec

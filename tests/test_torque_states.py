@@ -15,19 +15,19 @@ from servo_rig import servos
 from soak_rig import SHORTEST, Source
 from torque_writes import GOAL, Written, watch
 
+from antennate.dxl.answers import Timing
+from antennate.dxl.bus import Bus
+from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.dynamixel.answers import Timing
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.causes import Outputs, State
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
+from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
-from antennate.twin.bus import Fault, ServoBus, Trouble
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 PERIOD = 0.01

@@ -10,6 +10,7 @@ import pytest
 from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
+from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
@@ -18,7 +19,6 @@ from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
-from antennate.twin.bus import Fault, Trouble
 from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, JointCommand
 

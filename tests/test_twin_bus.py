@@ -14,25 +14,26 @@ import pytest
 from pty_server import PtyServer
 from servo_rig import IDS, MODELS, Rig, positions, servos
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.packets import Status, StatusError
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import TABLES, XC430_W240, XL330_M288, Table
-from antennate.hardware.ports.port import PortError
-from antennate.twin.bus import Fault, ServoBus, Trouble
-from antennate.twin.registers import BOOT_TIME, Servo
+from antennate.dxl import packets
+from antennate.dxl.answers import MOTION, Timing, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import ServoModel
+from antennate.dxl.models import MODELS_BY_NUMBER, XC430_W240, XL330_M288
+from antennate.dxl.packets import Status, StatusError
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import BOOT_TIME, Servo
+from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
+from antennate.port import PortError
 
 GOAL, TORQUE, WATCHDOG = 116, 64, 98
 
 
 def put(servo: Servo, name: str, value: int) -> StatusError:
-    register = servo.table[name]
+    register = servo.model[name]
     return servo.write(register.address, register.encode(value))
 
 
-def moving(goal: int = 4000, table: Table = XC430_W240) -> Servo:
+def moving(goal: int = 4000, table: ServoModel = XC430_W240) -> Servo:
     servo = Servo(table, 1, position=0.0)
     assert put(servo, "torque_enable", 1) == StatusError.NONE
     assert put(servo, "goal_position", goal) == StatusError.NONE
@@ -42,8 +43,8 @@ def moving(goal: int = 4000, table: Table = XC430_W240) -> Servo:
 # one servo
 
 
-@pytest.mark.parametrize("table", TABLES.values(), ids=lambda table: table.name)
-def test_a_new_servo_has_the_values_of_the_manual(table: Table) -> None:
+@pytest.mark.parametrize("table", MODELS_BY_NUMBER.values(), ids=lambda table: table.name)
+def test_a_new_servo_has_the_values_of_the_manual(table: ServoModel) -> None:
     servo = Servo(table, 1)
     for register in table.registers.values():
         if register.default is not None:

@@ -9,13 +9,14 @@ import pytest
 from twin_rig import Rig, rig
 
 from antennate.cli import main
+from antennate.dxl import packets
+from antennate.dxl.faults import Noise
+from antennate.dxl.packets import Instruction
+from antennate.dxl.parser import Parser
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.session import Session
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.packets import Instruction
-from antennate.hardware.dynamixel.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
@@ -24,7 +25,6 @@ from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.converter import Converter
 from antennate.twin.faults import Faults, read
-from antennate.twin.noise import Noise
 from antennate.twin.robot import TwinRobot
 
 IDS = RobotSpec().ids

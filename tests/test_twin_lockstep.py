@@ -11,8 +11,8 @@ import tty
 import numpy as np
 from lockstep import BoardPort, LockstepClock
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.parser import Parser
+from antennate.dxl import packets
+from antennate.dxl.parser import Parser
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.robots.spec import RobotSpec

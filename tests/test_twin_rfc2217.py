@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 
 from antennate.cli import main
-from antennate.hardware.dynamixel import packets
+from antennate.dxl import packets
 from antennate.hardware.esp32 import frame
 from antennate.twin.config import TwinConfig, watched
 
 serial = pytest.importorskip("serial")
 
-from antennate.twin.rfc2217 import Rfc2217Endpoint  # noqa: E402
+from antennate.dxl.endpoints import Rfc2217Endpoint  # noqa: E402
 
 IAC, SB, SE, COM_PORT, SET_CONTROL = 255, 250, 240, 44, 5
 """Bytes of Telnet (RFC 854) and of RFC 2217."""

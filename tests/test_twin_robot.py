@@ -21,7 +21,7 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World
-from antennate.twin.passage import Passage
+from antennate.twin.config import Passage
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 

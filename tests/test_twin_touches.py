@@ -13,10 +13,10 @@ from test_drive_processes import ANTENNATE
 from twin_rig import rig
 
 from antennate.antenna.sensor import counts
+from antennate.dxl import packets
 from antennate.errors import BadInputError
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.dynamixel import packets
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.config import TwinConfig

@@ -13,7 +13,7 @@ WATCHED = {64, 98, *range(100, 120)}
 """Torque enable, bus watchdog, and all goals and profiles (e-manual of the XC430-W240)."""
 TORQUE, GOAL = 64, 116
 _WRITE, _REG_WRITE, _SYNC_WRITE, _BULK_WRITE = 0x03, 0x04, 0x83, 0x93
-_BELOW = {"torque_writes", "lockstep", "antennate.hardware.dynamixel.bus"}
+_BELOW = {"torque_writes", "lockstep", "antennate.dxl.bus"}
 """Modules below the one that decides what is written."""
 
 

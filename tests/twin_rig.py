@@ -15,22 +15,22 @@ from lockstep import BoardPort, LockstepClock
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
+from antennate.dxl.answers import Timing
+from antennate.dxl.bus import Bus
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.dynamixel.answers import Timing
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.ports.port import Port
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
+from antennate.port import Port
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
 from antennate.twin.config import TwinConfig, watched
@@ -208,7 +208,7 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
         board.poll(clock.now())
-    bringup.require(bus, {servo.get("id"): servo.table.model for servo in robot.servos})
+    bringup.require(bus, {servo.get("id"): servo.model.number for servo in robot.servos})
     torque.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
     torque.enable(bus, spec.ids)

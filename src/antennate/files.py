@@ -10,16 +10,21 @@ import re
 import secrets
 import shutil
 import stat
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from antennate.errors import AntennateError, BadInputError, OutputError
+from antennate.errors import AntennateError, BadInputError, ConfigError, OutputError
 
 _RANDOM = 8
 """Random bytes in the name of a file that is not whole yet."""
 _BLOCK = 1 << 20
 """Bytes that are read at a time."""
+_MOST_DOTS = 100
+"""Most dots on a line of TOML; keys of thousands of parts keep its reader busy for minutes."""
+TOO_LONG = "expected numbers of at most 4300 digits, found more"
+"""Python's own limit for whole numbers."""
 _UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
 
 
@@ -99,6 +104,28 @@ def decoded(path: Path, data: bytes, error: type[BadInputError] = BadInputError)
         raise error(
             f"{path}: expected UTF-8 text, found byte {data[cause.start]:#04x} at {cause.start}"
         ) from None
+
+
+def read_toml(path: Path, largest: int) -> dict[str, Any]:
+    """The tables of a TOML file of at most `largest` bytes.
+
+    Raises:
+        ConfigError: The file cannot be read, is larger, or is no TOML.
+    """
+    text = decoded(path, read_limited(path, largest, ConfigError), ConfigError)
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.count(".") > _MOST_DOTS:
+            raise ConfigError(
+                f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
+            )
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: expected TOML, found: {error}") from None
+    except ValueError:
+        raise ConfigError(f"{path}: {TOO_LONG}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
 
 def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:

@@ -12,11 +12,11 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, typed_keys
 from antennate.cli.options import option
 from antennate.cli.status import StatusLine, write
+from antennate.dxl.bus import Bus
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety.deadlines import JOG_PERIOD

@@ -11,10 +11,10 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.addresses import RobotFileOptions, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.dxl.model import EXTENDED_MODE
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import Params
 from antennate.robots.parts import bill
-from antennate.robots.servos import EXTENDED_MODE
 from antennate.robots.spec import RobotSpec
 from antennate.robots.supply import Rail, Supply, servos_of, supply
 from antennate.studies.formats import to_csv

@@ -14,9 +14,9 @@ from antennate.cli.options import option
 from antennate.cli.person import TerminalPerson
 from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
+from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.ports import opener_of
-from antennate.hardware.dynamixel.tables import model_name
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.setup import ports

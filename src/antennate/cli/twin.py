@@ -20,22 +20,19 @@ from antennate.cli.options import fields_of, flag_of, found, option
 from antennate.cli.progress import stop_signals
 from antennate.cli.twin_kept import Kept, KeptOptions
 from antennate.cli.view_options import PageOptions, page_of
+from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, reason
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
-from antennate.twin.config import TwinConfig, watched
-from antennate.twin.endpoints import Endpoint
+from antennate.twin.config import Passage, TwinConfig, watched
 from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
-from antennate.twin.passage import Passage
-from antennate.twin.rfc2217 import Rfc2217Endpoint
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
-from antennate.twin.tcp import TcpEndpoint
 from antennate.twin.udp import UdpEndpoint
 from antennate.types import AntennaFrame
 

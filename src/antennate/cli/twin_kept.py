@@ -18,8 +18,7 @@ from antennate.files import write_whole
 from antennate.sim.world import World
 from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.twin_log import TwinLog, header_of
-from antennate.twin.config import TwinConfig
-from antennate.twin.passage import Passage
+from antennate.twin.config import Passage, TwinConfig
 from antennate.twin.robot import TwinRobot
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
 """The real world: bytes from the antenna board, bytes to and from the servos.
 
-With the twin the only place for `serial`.
+With `dxl.endpoints` the only place for `serial`.
 """

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from antennate.dxl.bus import Tally
 from antennate.errors import AntennateError
 from antennate.hardware.tracebacks import Tracebacks
 from antennate.robots.spec import RobotSpec
@@ -14,24 +15,6 @@ from antennate.types import JointCommand
 
 class ActuatorError(AntennateError):
     """Actuators are not fit to be moved, or did not do what they were told; says which and why."""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What became of the answers of actuators.
-
-    Attributes:
-        misses: Requests to one of them without a right answer.
-        stale: Answers that were right but came too late, and were thrown away.
-        drained: Bytes thrown away before a request.
-        echoes: Requests that the adapter gave back.
-    """
-
-    misses: int = 0
-    stale: int = 0
-    bad_crc: int = 0
-    drained: int = 0
-    echoes: int = 0
 
 
 @dataclass(slots=True)

@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
+from antennate.dxl.model import MOST_TICKS, POSITION_UNIT, TICKS_A_TURN
 from antennate.errors import AntennateError
 from antennate.hardware.settings import profile_velocities
-from antennate.robots.servos import MOST_TICKS, TICKS_A_TURN
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Ints, JointCommand
-
-_STEP = 2.0 * math.pi / TICKS_A_TURN
 
 
 class CommandError(AntennateError):
@@ -64,7 +62,7 @@ class Joints:
 
     def reach(self, time: float) -> Floats:
         """Ticks that each joint may go in a time [s], shape (n,)."""
-        return self._fastest * time / _STEP
+        return self._fastest * time / POSITION_UNIT
 
     def align(self, ticks: Ints | Floats, command: JointCommand) -> None:
         """Count whole turns of legs so that a command is nearest to where they stand [ticks]."""
@@ -77,11 +75,11 @@ class Joints:
 
     def positions(self, angles: Floats) -> Floats:
         """Positions, not rounded [ticks], of joint angles [rad], both of shape (n,)."""
-        return np.asarray(self._zero + self._sign * angles / _STEP)
+        return np.asarray(self._zero + self._sign * angles / POSITION_UNIT)
 
     def angles(self, ticks: Ints | Floats) -> Floats:
         """Joint angles [rad] at positions [ticks], both of shape (n,)."""
-        return np.asarray((ticks - self._zero) * self._sign * _STEP)
+        return np.asarray((ticks - self._zero) * self._sign * POSITION_UNIT)
 
     def command(self, ticks: Ints | Floats) -> JointCommand:
         """The command of one robot at these positions [ticks], shape (n,)."""

@@ -12,8 +12,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from antennate.hardware.dynamixel.tables import POSITION_UNIT, TABLES, VELOCITY_UNIT
-from antennate.robots.servos import TICKS_A_TURN
+from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN, VELOCITY_UNIT
+from antennate.dxl.models import MODELS_BY_NUMBER
 from antennate.robots.spec import RobotSpec
 
 _ROOM = 1.25
@@ -54,7 +54,10 @@ def settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
 
 def profile_velocities(robot: RobotSpec) -> dict[int, int]:
     """Profile velocity by id [0.229 rev/min]: `fastest` of its group with some room."""
-    limits = {i: TABLES[model]["velocity_limit"].default or 0 for i, model in robot.models.items()}
+    limits = {
+        i: MODELS_BY_NUMBER[model]["velocity_limit"].default or 0
+        for i, model in robot.models.items()
+    }
     return {
         servo: min(math.ceil(_ROOM * fastest / VELOCITY_UNIT), limits[servo])
         for servo, fastest in zip(robot.ids, robot.fastest, strict=True)
@@ -76,7 +79,9 @@ def wrong(known: Mapping[str, Mapping[int, int]], robot: RobotSpec) -> list[str]
 def _velocity_limits(robot: RobotSpec) -> dict[int, Setting]:
     """A servo refuses a profile that is faster than its velocity limit."""
     velocities = profile_velocities(robot)
-    limits = {servo: TABLES[robot.models[servo]]["velocity_limit"] for servo in velocities}
+    limits = {
+        servo: MODELS_BY_NUMBER[robot.models[servo]]["velocity_limit"] for servo in velocities
+    }
     return {
         servo: Setting(least, limits[servo].high or 0, limits[servo].default or 0)
         for servo, least in velocities.items()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -11,16 +10,12 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 
 from antennate.errors import ConfigError
-from antennate.files import decoded, read_limited
+from antennate.files import TOO_LONG, read_toml
 from antennate.params.base import Params
 from antennate.params.faults import describe, group_of
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a configuration file."""
-_MOST_DOTS = 100
-"""Most dots on a line of it; keys of thousands of parts would keep the reader busy for minutes."""
-_TOO_LONG = "expected numbers of at most 4300 digits, found more"
-"""Python's own limit for whole numbers."""
 
 Config = TypeVar("Config", bound=Params)
 
@@ -39,32 +34,15 @@ def read_file(path: Path, model: type[Config]) -> Config:
     Raises:
         ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
     """
-    table = with_bases(_table_of(path), model, path.parent)
+    table = with_bases(read_toml(path, LARGEST_FILE), model, path.parent)
     try:
         text = json.dumps(table, default=str)
     except ValueError:  # of TOML's whole numbers in other bases
-        raise ConfigError(f"{path}: {_TOO_LONG}") from None
+        raise ConfigError(f"{path}: {TOO_LONG}") from None
     try:
         return model.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise ConfigError(f"{path}: {describe(error, model)}") from None
-
-
-def _table_of(path: Path) -> dict[str, Any]:
-    text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
-    for number, line in enumerate(text.splitlines(), 1):
-        if line.count(".") > _MOST_DOTS:
-            raise ConfigError(
-                f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
-            )
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: expected TOML, found: {error}") from None
-    except ValueError:
-        raise ConfigError(f"{path}: {_TOO_LONG}") from None
-    except RecursionError:
-        raise ConfigError(f"{path}: expected plain tables, found them nested too deeply") from None
 
 
 def with_bases(table: Mapping[str, Any], model: type[BaseModel], folder: Path) -> dict[str, Any]:

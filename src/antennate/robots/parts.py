@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from antennate.robots.servos import ServoParams
+from antennate.dxl.model import Rating, ServoModel
 from antennate.robots.spec import RobotSpec
 from antennate.robots.supply import PLUG, Supply, servos_of, supply
 
@@ -37,22 +37,22 @@ def bill(robot: RobotSpec) -> list[Part]:
 
 
 def _servos(robot: RobotSpec) -> list[Part]:
-    found: Counter[tuple[type[ServoParams], str]] = Counter()
+    found: Counter[tuple[ServoModel, str]] = Counter()
     names = [name for name, _, count in robot.groups for _ in range(count)]
     for servo, name in zip(servos_of(robot), names, strict=True):
-        found[type(servo), name] += 1
+        found[servo.servo, name] += 1
     cables = len(robot.ids) + 1
     return [
         *(
-            Part(count, f"DYNAMIXEL {kind.product}", name, _rating(kind))
-            for (kind, name), count in found.items()
+            Part(count, f"DYNAMIXEL {model.name}", name, _rating(model.rating))
+            for (model, name), count in found.items()
         ),
         Part(cables, "cable with three wires, JST EHR-03 at both ends", "servo bus", f"{PLUG:g} A"),
     ]
 
 
-def _rating(kind: type[ServoParams]) -> str:
-    return f"{kind.voltage:g} V, {kind.stall_current:g} A stalled"
+def _rating(rating: Rating) -> str:
+    return f"{rating.voltage:g} V, {rating.stall_current:g} A stalled"
 
 
 def _electronics(robot: RobotSpec) -> list[Part]:

@@ -11,12 +11,12 @@ u and τ are 0. Only numbers go in and come out; any number of servos and record
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.robots.servos import FULL_DRIVE, TICKS_A_TURN, ServoParams
+from antennate.dxl.model import position_gain
+from antennate.robots.servos import ServoParams
 from antennate.types import Bools, Floats
 
 NAMES = (
@@ -79,7 +79,7 @@ def replay(values: Floats, course: Course, every: int = 1) -> Floats:
         every: Only every so many times are kept.
     """
     divisor, stall, fastest, armature, dry, loaded = values.T[:, :, None]
-    gain = course.p_gain / divisor * TICKS_A_TURN / (2 * math.pi) / FULL_DRIVE
+    gain = position_gain(course.p_gain, divisor)
     inertia = armature + course.inertia
     braking = stall / fastest
     faded = np.exp(-STEP * braking / inertia)  # share of a speed that braking leaves after a step

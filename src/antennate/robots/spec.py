@@ -13,6 +13,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from antennate import checks
+from antennate.dxl.model import EXTENDED_MODE, POSITION_MODE
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
@@ -27,7 +28,7 @@ from antennate.robots.joints import (
     PitchParams,
     YawParams,
 )
-from antennate.robots.servos import EXTENDED_MODE, POSITION_MODE, ServoName, ServosParams
+from antennate.robots.servos import ServoName, ServosParams
 from antennate.robots.sides import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]

@@ -12,8 +12,7 @@ from antennate.sim.world import World
 from antennate.telemetry import film
 from antennate.telemetry.film import MOST_PICTURES, Film, WalkRecorder
 from antennate.telemetry.strip import Band
-from antennate.twin.config import TwinConfig
-from antennate.twin.passage import Passage
+from antennate.twin.config import Passage, TwinConfig
 from antennate.twin.robot import TwinRobot
 
 _TOUCHES = {0: ("free", "#DDDDDD"), 1: ("touches", "#222222")}

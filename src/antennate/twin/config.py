@@ -1,7 +1,9 @@
-"""What `antennate twin` serves: the simulated robot at the start of a trial."""
+"""What `antennate twin` serves: the simulated robot in a trial, and how far it has come."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import ClassVar
 
 from antennate.params.base import Params, number, paths_of
@@ -9,11 +11,20 @@ from antennate.params.control import GaitParams
 from antennate.params.gaits import LiftParams
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
+from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import TrialConfig, draw_trial, require_room, scene_of
-from antennate.twin.driven_servo import factory_new
-from antennate.twin.passage import Passage
+from antennate.sim.trial import (
+    LOOK_EVERY,
+    Judge,
+    TrialConfig,
+    draw_trial,
+    progress_of,
+    require_room,
+    scene_of,
+)
+from antennate.sim.world import World
 from antennate.twin.robot import TwinRobot
+from antennate.twin.servos import factory_new
 from antennate.twin.touch import TouchStimulus
 
 
@@ -68,6 +79,56 @@ class TwinConfig(TrialConfig):
     battery: BatteryParams = BatteryParams()
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
+
+
+class Passage:
+    """Follows the head through a scene.
+
+    Args:
+        scene: Where the robot walks.
+
+    Attributes:
+        progress: How far the head has come [m].
+        passed: Time of walking at which the head passed the exit [s], inf before.
+        on_pass: Called when it does.
+        on_tick: Called with the world after every tick.
+    """
+
+    def __init__(self, scene: SceneInstance) -> None:
+        self._scene = scene
+        self.on_pass: Callable[[], None] = lambda: None
+        self.on_tick: Callable[[World], None] = lambda world: None
+        self.reset()
+
+    def reset(self) -> None:
+        """The robot stands at the start again."""
+        self._ticks, self._judge = 0, Judge(self._scene)
+        self.progress = 0.0
+        self.passed = math.inf
+
+    def watch(self, world: World) -> None:
+        """Look at the world after a tick.
+
+        Raises:
+            SceneError: The scene does not answer as its protocol says.
+        """
+        self.on_tick(world)
+        self._ticks += 1
+        if self._ticks % LOOK_EVERY:
+            return
+        head = world.head[:2]
+        self.progress = progress_of(self._scene, head)
+        if self.passed == math.inf and self._judge.look(head) == "success":
+            self.passed = world.t
+            self.on_pass()
+
+    @property
+    def summary(self) -> str:
+        """The same in one sentence."""
+        length = self._scene.length
+        if self.passed < math.inf:
+            return f"the head passed the exit after {self.passed:.1f} s of walking"
+        return f"the head came {min(self.progress, length):.2f} m of {length:.2f} m"
 
 
 def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, Passage]:

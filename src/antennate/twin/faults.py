@@ -10,16 +10,16 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from antennate.dxl.faults import Fault, Trouble
+from antennate.dxl.model import MOST_TICKS
+from antennate.dxl.models import XC430_W240
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import BadInputError
-from antennate.hardware.dynamixel.tables import XC430_W240
 from antennate.hardware.esp32.frame import FULL_SCALE
-from antennate.robots.servos import MOST_TICKS
-from antennate.twin.bus import ServoBus
 from antennate.twin.converter import SIDES
-from antennate.twin.registers import Servo
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox
-from antennate.twin.trouble import Fault, Trouble
 
 _FORM = re.compile(
     r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|wire)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
@@ -232,5 +232,5 @@ def _break_servo(servo: Servo, demand: Demand, t: float) -> None:
         servo.misread(int(demand.size))
     elif demand.what in _HARDWARE:
         servo.fail(_HARDWARE[demand.what])
-    elif demand.what in servo.table.registers:
+    elif demand.what in servo.model.registers:
         servo.set(demand.what, int(demand.size))

@@ -11,23 +11,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from antennate.dxl.faults import Noise
+from antennate.dxl.model import POSITION_UNIT
+from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import SimulationError
-from antennate.hardware.dynamixel.tables import POSITION_UNIT
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
-from antennate.twin.battery import Battery
-from antennate.twin.bus import ServoBus
 from antennate.twin.converter import Converter
-from antennate.twin.driven_servo import DrivenServo, servos_of
-from antennate.twin.noise import Noise
-from antennate.twin.orders import Plugging
-from antennate.twin.push import Pushes
+from antennate.twin.orders import Plugging, Pushes
+from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
 from antennate.twin.touch import TouchStimulus
-from antennate.twin.visit import Visit
 from antennate.types import Floats
 
 GREETING_PERIOD = 1.0

@@ -3,97 +3,51 @@
 from __future__ import annotations
 
 import math
-import select
-import time
+import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import Self
+from concurrent.futures import Future, ThreadPoolExecutor
 
-from antennate.twin.bus import ServoBus
-from antennate.twin.endpoints import Endpoint, Terminal
+from antennate.dxl.endpoints import Endpoint, Terminal
+from antennate.dxl.server import LONGEST_WAIT, Server
+from antennate.dxl.servo_bus import ServoBus
+from antennate.hardware.driving.priority import claim
 from antennate.twin.faults import Faults
 from antennate.twin.orders import Orders
-from antennate.twin.physics import Physics
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servo_box import ServoBox
+from antennate.types import Floats
 
-_LONGEST = 1.0
-"""Longest wait before `go_on` is asked again [s]."""
-_LUMP = 0.00025
-"""Replies leave in lumps of this time [s]: two microframes of USB, as a fast adapter does."""
-_PERIOD = 0.01
-"""Servos without a robot move on at least so often [s]."""
+_SWITCH = 0.00005
+"""Longest time that one thread keeps the other from Python [s]; the physics itself does not."""
 
 
-class _Server:
-    """Serves a bus in real time while it is entered and run; subclasses say what moves.
+class _OrderedServer(Server):
+    """A server that also takes orders.
 
     Args:
         bus: The servos; only the server touches them.
-        endpoints: By name; `bus` is the one of the servos. They are closed on leaving.
+        endpoint: Of the servos; it is closed on leaving.
+        others: Further endpoints by name, likewise.
         orders: Where orders come from, if they do.
     """
 
     def __init__(
-        self, bus: ServoBus, endpoints: Mapping[str, Endpoint], orders: Orders | None
+        self,
+        bus: ServoBus,
+        endpoint: Endpoint | None,
+        others: Mapping[str, Endpoint],
+        orders: Orders | None,
     ) -> None:
-        self._wire, self._endpoints, self._orders = bus, endpoints, orders
-        self._bus = endpoints["bus"]
+        super().__init__(bus, endpoint, others)
+        self._orders = orders
 
-    @property
-    def paths(self) -> dict[str, str]:
-        """Addresses of the endpoints."""
-        return {name: endpoint.path for name, endpoint in self._endpoints.items()}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for endpoint in self._endpoints.values():
-            endpoint.close()
-
-    def run(self, go_on: Callable[[float], bool]) -> None:
-        """Serve until `go_on`, told the time since then [s], returns False."""
-        begin = time.monotonic()
-        while go_on(now := time.monotonic() - begin):
-            ready = self._select(self._wait(now))
-            now = time.monotonic() - begin
-            self._move(ready, now)
-            self._take_orders(ready, now)
-            self._receive(ready, now)
-            if replies := self._wire.transmit(time.monotonic() - begin):
-                self._bus.write(replies)
-
-    def _select(self, wait: float) -> Sequence[object]:
-        """What is ready to be read within a time [s]."""
-        orders = [] if self._orders is None else self._orders.files
-        return select.select([*self._endpoints.values(), *self._bells(), *orders], [], [], wait)[0]
-
-    def _receive(self, ready: Sequence[object], now: float) -> None:
-        if self._bus in ready:
-            self._wire.master_baud = self._bus.baud()
-            self._wire.receive(now, self._bus.read())
+    def _files(self) -> Sequence[int]:
+        return () if self._orders is None else self._orders.files
 
     def _take_orders(self, ready: Sequence[object], now: float) -> None:
         if self._orders is not None and any(file in ready for file in self._orders.files):
             self._orders.take(lambda text: self._order(text, now))
-
-    def _wait(self, now: float) -> float:
-        """Time until something happens by itself [s]."""
-        reply = self._wire.next_time()
-        lump = math.inf if reply is None else max(reply - now, _LUMP)
-        return max(min(self._next() - now, lump, _LONGEST), 0.0)
-
-    def _bells(self) -> Sequence[int]:
-        """Files that say that something has moved."""
-        return ()
-
-    def _next(self) -> float:
-        """When something moves by itself [s]."""
-        raise NotImplementedError
-
-    def _move(self, ready: Sequence[object], now: float) -> None:
-        """Let everything move until now [s], and send what that makes."""
-        raise NotImplementedError
 
     def _order(self, text: str, now: float) -> None:
         """Carry out one order.
@@ -104,7 +58,50 @@ class _Server:
         raise NotImplementedError
 
 
-class ServoServer(_Server):
+class Physics:
+    """Runs the ticks of a robot while it is entered.
+
+    Attributes:
+        bell: Handle that can be read when a tick is over.
+    """
+
+    def __init__(self, robot: TwinRobot) -> None:
+        self._robot = robot
+        self._thread = ThreadPoolExecutor(1, "twin-physics", initializer=claim)
+        self._tick: Future[Floats | None] | None = None
+        self.bell, self._ring = os.pipe()
+        self._switch = sys.getswitchinterval()
+
+    def __enter__(self) -> Physics:
+        sys.setswitchinterval(_SWITCH)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._thread.shutdown()
+        sys.setswitchinterval(self._switch)
+        os.close(self.bell)
+        os.close(self._ring)
+
+    @property
+    def busy(self) -> bool:
+        """A tick has begun and not ended."""
+        return self._tick is not None
+
+    def begin(self) -> None:
+        """Begin the next tick; the bell rings when `end` may be called."""
+        pulls = self._robot.begin_tick()
+        self._tick = self._thread.submit(self._robot.move, pulls)
+        self._tick.add_done_callback(lambda _: os.write(self._ring, b"x"))
+
+    def end(self) -> None:
+        """Take what the physics gave; raises what it raised."""
+        os.read(self.bell, 1)
+        tick, self._tick = self._tick, None
+        if tick is not None:
+            self._robot.end_tick(tick.result())
+
+
+class ServoServer(_OrderedServer):
     """Serves servos without a robot.
 
     Args:
@@ -121,24 +118,23 @@ class ServoServer(_Server):
         bus: Endpoint | None = None,
         orders: Orders | None = None,
     ) -> None:
-        super().__init__(box.bus, {"bus": bus or Terminal()}, orders)
-        self._box, self._faults, self._due = box, faults, 0.0
-
-    def _next(self) -> float:
-        return self._due
+        super().__init__(box.bus, bus, {}, orders)
+        self._box, self._faults = box, faults
 
     def _move(self, ready: Sequence[object], now: float) -> None:
-        if now >= self._due:
-            self._faults.apply(self._box, now)
-            self._box.advance(now)
-            self._due = max(self._due + _PERIOD, now)
+        super()._move(ready, now)
+        self._take_orders(ready, now)
+
+    def _advance(self, now: float) -> None:
+        self._faults.apply(self._box, now)
+        self._box.advance(now)
 
     def _order(self, text: str, now: float) -> None:
         self._box.advance(now)
         self._box.on_order(text)
 
 
-class TwinServer(_Server):
+class TwinServer(_OrderedServer):
     """Serves a robot: its board and its servos.
 
     Args:
@@ -160,10 +156,9 @@ class TwinServer(_Server):
         bus: Endpoint | None = None,
         orders: Orders | None = None,
     ) -> None:
-        endpoints = {"esp32": board or Terminal(), "bus": bus or Terminal()}
-        super().__init__(robot.bus, endpoints, orders)
+        self._board = board or Terminal()
+        super().__init__(robot.bus, bus, {"esp32": self._board}, orders)
         self._robot, self._faults = robot, faults
-        self._board = endpoints["esp32"]
         robot.converter.radio = self._board.path.startswith("udp://")
         self._physics: Physics | None = None
         self.late = 0.0
@@ -183,7 +178,7 @@ class TwinServer(_Server):
         self._wire.on_goals = self._step
         self._board.write(robot.take())
         while go_on(robot.t):
-            ready = self._select(_LONGEST)
+            ready = self._select(LONGEST_WAIT)
             self._take_orders(ready, robot.t)
             self._receive(ready, robot.t)
             if self._bus in ready:
@@ -195,8 +190,9 @@ class TwinServer(_Server):
         self._faults.apply(self._robot, self._robot.due)
         self._robot.advance(self._robot.due)
 
-    def _bells(self) -> Sequence[int]:
-        return () if self._physics is None else (self._physics.bell,)
+    def _files(self) -> Sequence[int]:
+        bells = () if self._physics is None else (self._physics.bell,)
+        return (*bells, *super()._files())
 
     def _next(self) -> float:
         busy = self._physics is not None and self._physics.busy
@@ -214,6 +210,7 @@ class TwinServer(_Server):
             self._faults.apply(robot, now)
             physics.begin()
         self._read_board(ready)
+        self._take_orders(ready, now)
 
     def _read_board(self, ready: Sequence[object]) -> None:
         if self._board in ready:

@@ -7,20 +7,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from antennate.dxl.model import BAUD_RATES, POSITION_UNIT
+from antennate.dxl.models import MODELS, servo_model
+from antennate.dxl.servo import Servo
+from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import ConfigError
-from antennate.hardware.dynamixel.tables import BAUD_RATES, POSITION_UNIT, TABLES
 from antennate.params.base import Params, number
 from antennate.params.reading import from_values, read_file
-from antennate.twin.bus import ServoBus
-from antennate.twin.orders import Plugging
-from antennate.twin.push import Pushes
-from antennate.twin.registers import Servo
+from antennate.twin.orders import Plugging, Pushes
 
-MODELS = {table.name.lower().removesuffix("-t"): table for table in TABLES.values()}
-"""Control tables by the names that a list of servos uses."""
 MIDDLE = 2048
 """Position at the angle 0 [ticks]."""
-_FORM = re.compile(r"(?P<id>\d{1,3}):(?P<model>[a-z0-9-]+?)(@(?P<baud>\d+))?(x(?P<count>\d{1,3}))?")
+_FORM = re.compile(
+    r"(?P<id>\d{1,3}):(?P<model>[a-z0-9-]+?|.+?\.toml)(@(?P<baud>\d+))?(x(?P<count>\d{1,3}))?"
+)
 _FACTORY = "datasheet: as delivered"
 
 
@@ -28,7 +28,7 @@ class ServoEntry(Params):
     """One servo of a list: all else is as delivered."""
 
     model: str = number("xc430-w240", "1", "assumed: the robot's")
-    """Its model."""
+    """Its model, or a file with one."""
     id: int = number(1, "1", _FACTORY, ge=0, le=252)
     """Its id."""
     baud: int = number(57_600, "bit/s", _FACTORY, gt=0)
@@ -46,10 +46,11 @@ class ServoEntry(Params):
         Raises:
             ConfigError: There is no such model, or it has no such speed.
         """
-        table = _known(self.model, MODELS, "model")
-        most = table["baud_rate"].high or 0
+        own = self.model.endswith(".toml")
+        model = servo_model(self.model) if own else _known(self.model, MODELS, "model")
+        most = model["baud_rate"].high or 0
         codes = {baud: code for code, baud in enumerate(BAUD_RATES[: most + 1])}
-        servo = Servo(table, self.id, self.position)
+        servo = Servo(model, self.id, self.position)
         servo.set("baud_rate", _known(self.baud, codes, f"speed of {self.model}"))
         return servo
 
@@ -75,8 +76,14 @@ def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
     Raises:
         ConfigError: It is neither.
     """
-    if len(words) == 1 and words[0].endswith(".toml"):
-        return read_file(Path(words[0]), ServoList).servo
+    if len(words) == 1 and words[0].endswith(".toml") and not _FORM.fullmatch(words[0]):
+        file = Path(words[0])
+        return tuple(
+            entry.model_copy(update={"model": str(file.parent / entry.model)})
+            if entry.model.endswith(".toml")
+            else entry
+            for entry in read_file(file, ServoList).servo
+        )
     entries: list[dict[str, Any]] = []
     for word in words:
         match = _FORM.fullmatch(word)

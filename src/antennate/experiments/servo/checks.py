@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from antennate.dxl.model import POSITION_UNIT
 from antennate.errors import BadInputError
-from antennate.robots.servos import TICKS_A_TURN, ServoParams
+from antennate.robots.servos import ServoParams
 from antennate.types import Bools, Floats
 
 GRAVITY = 9.80665
@@ -59,7 +60,7 @@ def check_course(path: Path, t: Floats, position: Floats, goal: Floats, servo: S
     if slow > _COARSEST:
         raise BadInputError(
             f"{path}: expected positions in radians, whose smallest step is "
-            f"{2 * math.pi / TICKS_A_TURN:.4f}, found steps of {slow:.4g}; are these degrees or "
+            f"{POSITION_UNIT:.4f}, found steps of {slow:.4g}; are these degrees or "
             "ticks?"
         )
     speed, most = _peak_speed(t, position), _FASTEST * servo.no_load_speed

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT
 from antennate.errors import BadInputError
 from antennate.experiments.servo.checks import FEWEST, GRAVITY, check_course
 from antennate.experiments.servo.fitting import Data
 from antennate.files import decoded, read_limited
 from antennate.messages import shown
 from antennate.robots.servo_model import STEP, Course
-from antennate.robots.servos import FULL_DRIVE, TICKS_A_TURN, ServoParams
+from antennate.robots.servos import ServoParams
 from antennate.types import Bools, Floats
 
 _LARGEST_FILE = 100_000_000
@@ -69,7 +70,7 @@ class Recording:
         That is the median of gain times position error over the drive, at rest and well within
         full drive.
         """
-        error = (self.goal - self.position) * TICKS_A_TURN / (2.0 * math.pi)
+        error = (self.goal - self.position) / POSITION_UNIT
         size = abs(self.drive)
         useful = self.torque & (size > 0.05 * FULL_DRIVE) & (size < 0.9 * FULL_DRIVE)
         useful &= abs(np.gradient(self.position, self.t)) < _SLOW

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antennate.dxl.model import FULL_DRIVE
 from antennate.experiments.servo.checks import GRAVITY
 from antennate.experiments.servo.fitting import EVERY, Data
 from antennate.experiments.servo.recording import Recording
 from antennate.robots.servo_model import STEP
-from antennate.robots.servos import FULL_DRIVE
 from antennate.types import Bools, Floats
 
 _FULL = 0.99

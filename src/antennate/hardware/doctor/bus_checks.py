@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from statistics import median
 
+from antennate.dxl.inquiry import FOUND, State
+from antennate.dxl.models import MODELS_BY_NUMBER, model_name
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text
 from antennate.hardware.doctor.register_checks import FIX, register_findings
-from antennate.hardware.dynamixel.inquiry import CURE, FOUND, State
-from antennate.hardware.dynamixel.tables import TABLES, model_name
+from antennate.hardware.dynamixel.bringup import CURE
 from antennate.hardware.robot import DoctorConfig
 from antennate.robots.spec import RobotSpec
 
@@ -33,7 +34,7 @@ def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, st
     yield _ids(bus, robot), "ids", ids_text(robot.ids)
     yield _answers(bus), "answers", "one whole answer of each"
     yield _models(bus, robot), "models", grouped(robot.models, model_name)
-    newest = ", ".join(f"{t.name} {t.fast_read_firmware}" for t in TABLES.values())
+    newest = ", ".join(f"{t.name} {t.fast_read_firmware}" for t in MODELS_BY_NUMBER.values())
     yield _firmware(bus), "firmware", f"from {newest} on"
     if not bus.registers.keys() & set(robot.ids):
         return
@@ -117,7 +118,11 @@ def _models(bus: BusSurvey, robot: RobotSpec) -> Finding:
 def _firmware(bus: BusSurvey) -> Finding:
     here = bus.here.values()
     versions = {s.servo: s.firmware for s in here if s.firmware is not None}
-    least = {s.servo: TABLES[s.model].fast_read_firmware for s in here if s.model in TABLES}
+    least = {
+        s.servo: MODELS_BY_NUMBER[s.model].fast_read_firmware
+        for s in here
+        if s.model in MODELS_BY_NUMBER
+    }
     old = [servo for servo, version in versions.items() if version < least.get(servo, 0)]
     cure = f"{ids_text(old)}: update with DYNAMIXEL Wizard; older ones take no fast reads"
     return Finding(grouped(versions), "warn" if old else "ok", cure)

@@ -8,13 +8,14 @@ from dataclasses import asdict, dataclass, field
 from statistics import median
 from typing import Any
 
+from antennate.dxl import inquiry, packets
+from antennate.dxl.answers import MOTION, Timing, Value
+from antennate.dxl.bus import PING_DATA, Bus
+from antennate.dxl.inquiry import PINGS, Present
+from antennate.dxl.model import RETURN_DELAY_UNIT
+from antennate.dxl.models import XC430_W240
+from antennate.dxl.packets import OVERHEAD
 from antennate.hardware.doctor.check import Opener
-from antennate.hardware.dynamixel import inquiry, packets
-from antennate.hardware.dynamixel.answers import MOTION, Timing, Value
-from antennate.hardware.dynamixel.bus import PING_DATA, Bus
-from antennate.hardware.dynamixel.inquiry import PINGS, Present
-from antennate.hardware.dynamixel.packets import OVERHEAD
-from antennate.hardware.dynamixel.tables import RETURN_DELAY_UNIT, XC430_W240
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.params.doctor import DoctorParams

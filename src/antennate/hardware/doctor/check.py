@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, NamedTuple, TypeVar
 
-from antennate.hardware.ports.port import Port
+from antennate.port import Port
 
 Grade = Literal["ok", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]

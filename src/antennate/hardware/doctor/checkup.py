@@ -12,8 +12,8 @@ from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
 from antennate.hardware.doctor.check import Grade, Opener, Row, worst
 from antennate.hardware.doctor.ports import latency_row, port_row
 from antennate.hardware.esp32.board import BOARD_BAUD
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.robot import DoctorConfig
+from antennate.port import PortError
 
 
 @dataclass(slots=True)

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from antennate.dxl.bus import Bus
+from antennate.dxl.inquiry import look, read_some
+from antennate.dxl.model import BAUD_RATES
+from antennate.dxl.models import XC430_W240
 from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import look, read_some
-from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240
 from antennate.hardware.safety import torque
 from antennate.hardware.settings import Setting
 from antennate.robots.spec import RobotSpec

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
+from antennate.dxl.model import RETURN_DELAY_UNIT, WATCHDOG_UNIT, hardware_errors
+from antennate.dxl.models import XC430_W240
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, worst
-from antennate.hardware.dynamixel.tables import (
-    RETURN_DELAY_UNIT,
-    WATCHDOG_UNIT,
-    XC430_W240,
-    hardware_errors,
-)
 from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.settings import settings
 
@@ -100,7 +96,7 @@ def _shutdown(bus: BusSurvey, config: DoctorConfig, servo: int, bits: int) -> Gr
 def _supply(bus: BusSurvey, config: DoctorConfig, servo: int, value: int) -> Grade:
     registers, limits, volt = bus.registers[servo], config.limits, _VOLT * value
     low, high = registers.get("min_voltage_limit", 0), registers.get("max_voltage_limit", 0xFFFF)
-    body = bus.here[servo].model == XC430_W240.model
+    body = bus.here[servo].model == XC430_W240.number
     if not low <= value <= high or (body and volt < limits.supply_hold):
         return "bad"
     return "warn" if body and volt < limits.supply_warn else "ok"

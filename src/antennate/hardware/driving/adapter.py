@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from statistics import median
 
+from antennate.dxl.answers import Timing, Value
+from antennate.dxl.bus import Bus
 from antennate.hardware.doctor.ports import latency_row
-from antennate.hardware.dynamixel.answers import Timing, Value
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.ports.port import Port
 from antennate.params.doctor import DoctorParams
+from antennate.port import Port
 
 _PINGS = 5
 """Number of pings that are timed: two late ones do not move their median (assumed)."""

@@ -9,6 +9,10 @@ from typing import Any
 
 from antennate.control.knowledge import require_own_senses
 from antennate.control.registry import make_controller
+from antennate.dxl.answers import Timing
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import hardware_errors
+from antennate.dxl.models import XC430_W240
 from antennate.errors import BadInputError
 from antennate.hardware import settings
 from antennate.hardware.driving.adapter import require_quick
@@ -16,21 +20,18 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.dynamixel.answers import Timing
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.joints import Joints
 from antennate.hardware.ports.finder import finder
-from antennate.hardware.ports.port import Port, PortError
 from antennate.hardware.ports.reconnecting import Reconnecting
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
+from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 

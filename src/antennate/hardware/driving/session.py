@@ -28,12 +28,12 @@ from antennate.hardware.driving.supervised_controller import SupervisedControlle
 from antennate.hardware.driving.timing import LoopTiming
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import CommandError
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety import deadlines
 from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params.safety import SupervisorParams
+from antennate.port import PortError
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand
 
 

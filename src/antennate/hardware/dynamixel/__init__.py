@@ -1,1 +1,1 @@
-"""DYNAMIXEL servos: Protocol 2.0, control tables, and the master of a half-duplex bus."""
+"""The DYNAMIXEL servos of a robot as its actuators: bring-up, torque, turns, what they do wrong."""

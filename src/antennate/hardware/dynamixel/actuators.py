@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from antennate.dxl.bus import Bus
 from antennate.errors import AntennateError
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.bus import Bus
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.dynamixel.monitor import ServoMonitor

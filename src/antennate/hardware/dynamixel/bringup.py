@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from antennate.dxl import inquiry
+from antennate.dxl.bus import Bus
+from antennate.dxl.inquiry import Present, State
+from antennate.dxl.model import Register
+from antennate.dxl.models import XC430_W240, model_name
 from antennate.hardware.actuators import ActuatorError
-from antennate.hardware.dynamixel import inquiry
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import Present
-from antennate.hardware.dynamixel.tables import XC430_W240, Register, model_name
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 
 _READS = 10
 """Tries until a servo is given up that is asked: 1 s, so that a computer which stands still for a
 while is no silent servo (assumed)."""
+_OWN_ID = "leave one of them alone on the bus and give it its own id with `antennate setup`"
+CURE: Mapping[State, str] = {
+    "ok": "",
+    "broken": f"look at its cable and plugs; if there are two, {_OWN_ID}",
+    "collides": _OWN_ID,
+    "mute": "switch its supply off and on",
+}
+"""What a person does about it."""
 
 
 class BringUpError(ActuatorError):
@@ -50,7 +59,7 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
         states = {one.state for one in seen.values() if one and one.state != "ok"}
         raise BringUpError(
             f"expected {len(expected)} servos, found {fit} fit; {why}",
-            "; ".join(cure for state, cure in inquiry.CURE.items() if state in states),
+            "; ".join(cure for state, cure in CURE.items() if state in states),
         )
 
 

@@ -23,12 +23,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT
 from antennate.hardware.actuators import JointFaults, Margins
-from antennate.hardware.dynamixel.tables import POSITION_UNIT
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.deadlines import WATCHDOG
 from antennate.params.safety import FollowingParams
-from antennate.robots.servos import FULL_DRIVE
 from antennate.types import Floats
 
 _GOALS = 3

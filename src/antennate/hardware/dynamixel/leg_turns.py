@@ -15,14 +15,14 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
+from antennate.dxl.bus import Bus
+from antennate.dxl.inquiry import read_once
+from antennate.dxl.model import TICKS_A_TURN, Register
+from antennate.dxl.models import XC430_W240
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import read_once
-from antennate.hardware.dynamixel.tables import XC430_W240, Register
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import READ_LEG
-from antennate.robots.servos import TICKS_A_TURN
 from antennate.types import Floats
 
 _TORQUE = XC430_W240["torque_enable"]

@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 
+from antennate.dxl.answers import DRIVE, POSITION, Answer, Span, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import hardware_errors
+from antennate.dxl.models import XC430_W240
 from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorState, JointFaults
-from antennate.hardware.dynamixel.answers import DRIVE, POSITION, Answer, Span, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240, hardware_errors
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.safety.deadlines import READ_ALL, READ_ONE, SUPPLY_AGE, WATCHDOG_COUNTS
+from antennate.port import PortError
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]

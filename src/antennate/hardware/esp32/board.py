@@ -12,7 +12,7 @@ from antennate.hardware.esp32.clock import DeviceClock, SampleState, Timed
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
 from antennate.hardware.esp32.wire import Hello, Sample, objections
-from antennate.hardware.ports.port import Port, PortError
+from antennate.port import Port, PortError
 from antennate.types import Floats
 
 BOARD_BAUD = 115_200

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from antennate.hardware.ports.holder import holders
-from antennate.hardware.ports.port import PortError
+from antennate.port import PortError
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _DENIED = (errno.EACCES, errno.EPERM)

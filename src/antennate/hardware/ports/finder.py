@@ -6,9 +6,9 @@ from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.ports.port import Line
 from antennate.messages import extra
 from antennate.params.network import NetworkParams
+from antennate.port import Line
 
 
 def finder(

@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 from antennate.errors import reason
-from antennate.hardware.ports.port import Line, Port, PortError
+from antennate.port import Line, Port, PortError
 
 RETRY = 0.2
 """Time between two looks for a port that is gone [s]; short beside the handling of a plug

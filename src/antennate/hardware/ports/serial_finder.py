@@ -8,8 +8,8 @@ from typing import Any
 
 from serial.tools import list_ports
 
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.ports.serial_port import SerialPort
+from antennate.port import PortError
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from contextlib import AbstractContextManager
 import serial
 
 from antennate.hardware.ports.errors import explain
-from antennate.hardware.ports.port import Port, PortError, port_errors
+from antennate.port import Port, PortError, port_errors
 
 _FAILURES = (OSError, TypeError, ValueError, termios.error)
 """What pyserial raises; it lets some through as they are."""

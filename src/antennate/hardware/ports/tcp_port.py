@@ -6,7 +6,7 @@ import select
 import socket
 from contextlib import AbstractContextManager
 
-from antennate.hardware.ports.port import Port, PortError, port_errors
+from antennate.port import Port, PortError, port_errors
 
 _OPENING_TIME = 3.0
 """Longest wait for a connection [s]: a lost packet of the handshake is sent again after 1 and 3

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 from antennate.errors import reason
 from antennate.hardware.esp32.verifier import Bucket, Verifier
-from antennate.hardware.ports.port import Port, PortError
 from antennate.params.network import NetworkParams
+from antennate.port import Port, PortError
 
 _LONGEST = 256
 """More than any datagram of a board [bytes]; what is longer is cut, and then refused."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
+from antennate.dxl.model import WATCHDOG_UNIT
 from antennate.errors import ConfigError
-from antennate.hardware.dynamixel.tables import WATCHDOG_UNIT
 from antennate.params.safety import SupervisorParams
 
 READ_ONE = 0.003

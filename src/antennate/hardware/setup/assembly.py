@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 from antennate.hardware.doctor.fix import Change
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.setup.person import Person, SetupError, agrees, confirm
 from antennate.hardware.setup.servos import Joint, OwnedError, ServoSetup
+from antennate.port import PortError
 
 Keep = Callable[[tuple[str, ...]], None]
 """Keeps the names of the joints that are done."""

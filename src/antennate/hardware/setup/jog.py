@@ -11,25 +11,26 @@ import contextlib
 import math
 from typing import NamedTuple
 
-from antennate.hardware import settings
-from antennate.hardware.dynamixel import bringup, inquiry
-from antennate.hardware.dynamixel.answers import Answer, Refused, Span, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import (
+from antennate.dxl import inquiry
+from antennate.dxl.answers import Answer, Refused, Span, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import (
     POSITION_UNIT,
-    TABLES,
+    TICKS_A_TURN,
     VELOCITY_UNIT,
     WATCHDOG_UNIT,
     Register,
     hardware_errors,
 )
-from antennate.hardware.ports.port import PortError
+from antennate.dxl.models import MODELS_BY_NUMBER
+from antennate.hardware import settings
+from antennate.hardware.dynamixel import bringup
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import Joint
 from antennate.params.setup import JogParams
-from antennate.robots.servos import TICKS_A_TURN
+from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 
 _LOST = 10
@@ -65,7 +66,7 @@ class Jog:
     def __init__(self, bus: Bus, robot: RobotSpec, joint: Joint, params: JogParams) -> None:
         at = robot.joint_names.index(joint.name)
         self.joint, self._bus, self._params = joint, bus, params
-        self._table = TABLES[joint.model]
+        self._table = MODELS_BY_NUMBER[joint.model]
         self._rules = {
             name: rules[joint.servo]
             for name, rules in settings.settings(robot).items()
@@ -87,7 +88,7 @@ class Jog:
         if (seen := inquiry.look(bus, servo)) and seen.state != "ok":
             raise SetupError(
                 f"expected {self.joint} to answer, found: {inquiry.FOUND[seen.state]}; "
-                f"{inquiry.CURE[seen.state]}"
+                f"{bringup.CURE[seen.state]}"
             )
         bringup.require_models(bus, {servo: self.joint.model})
         self._require_settings()

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from antennate.hardware.ports.port import PortError
 from antennate.hardware.setup.person import Person, SetupError, confirm
+from antennate.port import PortError
 
 Listing = Callable[[], frozenset[str]]
 _NAMES = Path("/dev/serial/by-id")

@@ -11,13 +11,14 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from typing import NamedTuple
 
+from antennate.dxl.bus import Bus
+from antennate.dxl.inquiry import FOUND, Present, look, read_some
+from antennate.dxl.model import BAUD_RATES
+from antennate.dxl.models import XC430_W240, model_name
 from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.inquiry import FOUND, Present, look, read_some
-from antennate.hardware.dynamixel.tables import BAUD_RATES, XC430_W240, model_name
 from antennate.hardware.settings import Setting
 from antennate.hardware.setup.person import SetupError
 from antennate.robots.spec import RobotSpec

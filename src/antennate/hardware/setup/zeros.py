@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antennate.hardware.dynamixel.answers import POSITION, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240
+from antennate.dxl.answers import POSITION, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
+from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
 from antennate.params.setup import SetupParams
 from antennate.robots.joints import QUARTER, STRAIGHT
-from antennate.robots.servos import TICKS_A_TURN
 from antennate.robots.spec import GroupName, RobotSpec
 from antennate.types import Ints
 
@@ -32,7 +32,6 @@ _PERIOD = 0.05
 """Time between two readings [s]."""
 _LOST = 20
 """Readings in a row that one servo may miss: a second (assumed)."""
-_STEP = 2.0 * math.pi / TICKS_A_TURN
 _SENSES: Mapping[GroupName, str] = {
     "yaw": "swing the part behind it to the robot's right",
     "legs": "turn it as a wheel rolls forward",
@@ -61,8 +60,9 @@ class HornNote(NamedTuple):
 
     def __str__(self) -> str:
         away = self.zero - STRAIGHT
+        degrees = math.degrees(away * POSITION_UNIT)
         return (
-            f"{self.joint}: zero {self.zero} is {away:+d} ticks ({math.degrees(away * _STEP):+.1f} "
+            f"{self.joint}: zero {self.zero} is {away:+d} ticks ({degrees:+.1f} "
             f"deg) from the middle {STRAIGHT}, about {self.teeth} of its horn's teeth; put the "
             "horn on anew with its mark at the mark of the shaft, or keep it and lose that much of "
             "its way"
@@ -160,7 +160,7 @@ class Zeroing:
         """
         count = max(2, round(self._params.hold / _PERIOD))
         readings = np.array([now for _, now in zip(range(count), self._positions, strict=False)])
-        moved = np.ptp(readings, axis=0) * _STEP
+        moved = np.ptp(readings, axis=0) * POSITION_UNIT
         if moved.max() > self._params.still:
             worst = int(moved.argmax())
             raise SetupError(
@@ -222,7 +222,7 @@ class Zeroing:
                 if answer in _KEEP:
                     return _KEEP[answer]
                 person.say(f"expected s, r or q, found {repr(answer[:20]) if answer else 'Enter'}")
-            moved = (now - before) * _STEP
+            moved = (now - before) * POSITION_UNIT
             person.show(f"{name}: {now[at]} ticks, moved {math.degrees(moved[at]):+6.1f} deg")
             if abs(moved[at]) >= self._params.turn:
                 sign = 1 if moved[at] > 0 else -1

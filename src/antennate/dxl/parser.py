@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from antennate.hardware.dynamixel.packets import (
+from antennate.dxl.packets import (
     BEFORE_BODY,
     BROADCAST,
     HEADER,
@@ -34,38 +34,38 @@ class Parser:
 
     def __init__(self) -> None:
         self.counters = Counters()
-        self._kept = b""
+        self._buffer = b""
 
     @property
     def pending(self) -> int:
         """Bytes of a packet that is not complete."""
-        return len(self._kept)
+        return len(self._buffer)
 
     def reset(self) -> None:
         """Give up the packet that is not complete."""
-        self._skip(len(self._kept))
+        self._skip(len(self._buffer))
 
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by these bytes; wrong ones are counted and left out."""
-        found: list[Packet] = []
+        complete: list[Packet] = []
         for begin in range(0, len(data), LONGEST):
-            self._kept += data[begin : begin + LONGEST]
+            self._buffer += data[begin : begin + LONGEST]
             while (packet := self._next()) is not None:
-                found.append(packet)
-        return found
+                complete.append(packet)
+        return complete
 
     def _next(self) -> Packet | None:
         while True:
             self._find_header()
-            if len(self._kept) < BEFORE_BODY:
+            if len(self._buffer) < BEFORE_BODY:
                 return None
-            size = BEFORE_BODY + int.from_bytes(self._kept[5:7], "little")
+            size = BEFORE_BODY + int.from_bytes(self._buffer[5:7], "little")
             if not BEFORE_BODY + 3 <= size <= LONGEST:
                 self._skip(1)
-            elif len(self._kept) < size:
+            elif len(self._buffer) < size:
                 return None
-            elif crc16(self._kept[: size - 2]) != int.from_bytes(
-                self._kept[size - 2 : size], "little"
+            elif crc16(self._buffer[: size - 2]) != int.from_bytes(
+                self._buffer[size - 2 : size], "little"
             ):
                 self.counters.bad_crc += 1
                 self._skip(1)
@@ -73,18 +73,20 @@ class Parser:
                 return self._take(size)
 
     def _find_header(self) -> None:
-        start = self._kept.find(HEADER)
+        start = self._buffer.find(HEADER)
         if start < 0:
-            tail = next(n for n in (3, 2, 1, 0) if HEADER.startswith(self._kept[-n:] if n else b""))
-            start = max(len(self._kept) - tail, 0)
+            tail = next(
+                n for n in (3, 2, 1, 0) if HEADER.startswith(self._buffer[-n:] if n else b"")
+            )
+            start = max(len(self._buffer) - tail, 0)
         self._skip(start)
 
     def _skip(self, count: int) -> None:
         self.counters.skipped_bytes += count
-        self._kept = self._kept[count:]
+        self._buffer = self._buffer[count:]
 
     def _take(self, size: int) -> Packet:
-        whole, self._kept = self._kept[:size], self._kept[size:]
+        whole, self._buffer = self._buffer[:size], self._buffer[size:]
         body = whole[BEFORE_BODY : size - 2]
         servo, instruction = whole[4], body[0]
         if servo == BROADCAST and instruction == Instruction.STATUS:

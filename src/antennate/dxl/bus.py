@@ -16,18 +16,26 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import wraps
 from itertools import islice
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from antennate.hardware.actuators import Tally
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.answers import SILENT, Answer, Span, Timing, answer, cut
-from antennate.hardware.dynamixel.echo import Echo
-from antennate.hardware.dynamixel.packets import HEADER, OVERHEAD, Packet, Status, StatusError
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.pending import PendingRequests
-from antennate.hardware.ports.port import Port, PortError
+from antennate.dxl import packets
+from antennate.dxl.answers import (
+    SILENT,
+    Answer,
+    Echo,
+    PendingRequests,
+    Span,
+    Timing,
+    answer,
+    cut,
+    fitting,
+)
+from antennate.dxl.packets import HEADER, OVERHEAD, Status
+from antennate.dxl.parser import Parser
+from antennate.port import Port, PortError
 
 CHUNK = 1024
 _CHUNKS = 64
@@ -59,6 +67,24 @@ def exclusive(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
             return method(self, *args, **kwargs)
 
     return waiting
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of the answers of servos.
+
+    Attributes:
+        misses: Requests to one of them without a right answer.
+        stale: Answers that were right but came too late, and were thrown away.
+        drained: Bytes thrown away before a request.
+        echoes: Requests that the adapter gave back.
+    """
+
+    misses: int = 0
+    stale: int = 0
+    bad_crc: int = 0
+    drained: int = 0
+    echoes: int = 0
 
 
 class Bus:
@@ -343,17 +369,3 @@ class Bus:
         rest = self._echo.remove(part)
         self.tally.echoes = self._echo.requests
         return rest
-
-
-def fitting(packet: Packet, length: int, late: set[int]) -> Status | None:
-    """The status in a packet, if it can be the answer to a request for so many bytes.
-
-    `late` are ids whose late answers may still come: a refusal of theirs may be to the last one.
-    """
-    status = packets.as_status(packet)
-    if status is None:
-        return None
-    refused = status.error != StatusError.NONE and not status.data
-    if refused and length > 0 and status.id in late:
-        return None
-    return status if refused or len(status.data) == length else None

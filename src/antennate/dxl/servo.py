@@ -1,4 +1,4 @@
-"""One DYNAMIXEL servo as a register machine: what it stores, refuses and does. Time is an argument.
+"""One virtual servo as a register machine: what it stores, refuses and does. Time is an argument.
 
 Where the manuals are silent the worse case is assumed: torque on keeps an old goal, as reported in
 https://github.com/pollen-robotics/reachy_mini/issues/1136, and so does a Clear; a tripped bus
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
-from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import (
+from antennate.dxl.faults import Trouble
+from antennate.dxl.memory import TRIPPED, Memory, beyond_limits, refuses, shut_down
+from antennate.dxl.model import (
     CURRENT_MODE,
     GOALS,
     POSITION_MODE,
@@ -18,13 +19,10 @@ from antennate.hardware.dynamixel.tables import (
     TORQUE_BY_GOAL,
     WATCHDOG_UNIT,
     Register,
-    Table,
+    ServoModel,
 )
-from antennate.twin import rules
-from antennate.twin.memory import Memory
-from antennate.twin.motion import Motion, MotorMotion
-from antennate.twin.motor import RATINGS
-from antennate.twin.trouble import Trouble
+from antennate.dxl.motion import Motion, MotorMotion
+from antennate.dxl.packets import StatusError
 
 BOOT_TIME = 0.25
 """Time after a reboot in which it takes nothing [s]; assumed, the manual says nothing."""
@@ -32,7 +30,7 @@ BOOT_TIME = 0.25
 _ROOM_TEMPERATURE = 25
 _TORQUE_AT_START, _RAM_AT_START = 1, 2
 """Bits of Startup Configuration."""
-_TOLD = frozenset(
+_REPORTED = frozenset(
     {"moving", "moving_status", "present_pwm", "present_load", "present_current"}
     | {"present_velocity", "present_position", "velocity_trajectory", "position_trajectory"}
 )
@@ -43,13 +41,13 @@ class Servo:
     """One servo with its control table.
 
     Args:
-        table: Its model.
+        model: Its model.
         servo: Its id.
         position: Where its shaft is [ticks].
         t: Time of power-on [s].
 
     Attributes:
-        table: Its model.
+        model: Its model.
         memory: The control table.
         motion: Its shaft, and how it is moved.
         eeprom_writes: Registers of the EEPROM written so far.
@@ -58,26 +56,28 @@ class Servo:
         trouble: What is wrong with its answers.
     """
 
-    def __init__(self, table: Table, servo: int, position: float = 2048.0, t: float = 0.0) -> None:
-        self.table = table
-        self.memory = Memory(table)
+    def __init__(
+        self, model: ServoModel, servo: int, position: float = 2048.0, t: float = 0.0
+    ) -> None:
+        self.model = model
+        self.memory = Memory(model)
         self.motion = self._make_motion(position)
         self.eeprom_writes = 0
         self.plugged = True
         self.registered: tuple[int, bytes] | None = None
         self.trouble: Trouble | None = None
-        self._moved, self._told = True, -1
+        self._moved, self._reported = True, -1
         self._t = self._fed = self._boot = t
         self.set("id", servo)
-        self.set("firmware_version", table.firmware)
+        self.set("firmware_version", model.firmware)
         self._start(t)
 
-    # for the twin and for tests: anything goes
+    # for whoever runs it: anything goes
 
     def get(self, name: str) -> int:
         """The value of a register."""
-        if name in _TOLD:
-            self._tell()
+        if name in _REPORTED:
+            self._report()
         return self.memory.get(name)
 
     def set(self, name: str, value: int) -> None:
@@ -155,7 +155,7 @@ class Servo:
         trip = self._trip_time()
         if trip < t:
             self._move(trip)
-            self.set("bus_watchdog", rules.TRIPPED)
+            self.set("bus_watchdog", TRIPPED)
             self.motion.stopped = True
         self._move(t)
 
@@ -166,7 +166,7 @@ class Servo:
 
     def read(self, address: int, length: int) -> tuple[StatusError, bytes]:
         """Bytes of the table."""
-        self._tell()
+        self._report()
         return self.memory.read(address, length)
 
     def write(self, address: int, data: bytes, ram_only: bool = False) -> StatusError:
@@ -191,7 +191,7 @@ class Servo:
 
     def factory_reset(self, t: float, keep: tuple[str, ...]) -> None:
         """All registers as delivered but for those to keep; it starts anew."""
-        for name, register in self.table.registers.items():
+        for name, register in self.model.registers.items():
             if register.eeprom and register.writable and name not in keep:
                 self.eeprom_writes += 1
                 self.set(name, register.default or 0)
@@ -218,7 +218,7 @@ class Servo:
     ) -> tuple[StatusError, list[tuple[Register, int]]]:
         error, changes = self.memory.changes(address, data, locked=ram_only or self.torque)
         for register, value in changes:
-            error = error or rules.refuses(self.memory, register, value)
+            error = error or refuses(self.memory, register, value)
         return error, [] if error else changes
 
     def _make_motion(self, position: float) -> Motion:
@@ -227,7 +227,7 @@ class Servo:
     def _start(self, boot: float) -> None:
         startup = self.get("startup_configuration")
         self.memory.start(stored=bool(startup & _RAM_AT_START))
-        self.set("present_input_voltage", round(10 * RATINGS[self.table.model].voltage))
+        self.set("present_input_voltage", round(10 * self.model.rating.voltage))
         self.set("present_temperature", _ROOM_TEMPERATURE)
         self.registered = None
         self._boot = boot
@@ -243,7 +243,7 @@ class Servo:
         """Goals as after power-on and a change of the mode: full drive, but no motion."""
         mode = self.get("operating_mode")
         self.set("goal_pwm", 0 if mode == PWM_MODE else self.get("pwm_limit"))
-        if "goal_current" in self.table.registers:
+        if "goal_current" in self.model.registers:
             self.set("goal_current", 0 if mode == CURRENT_MODE else self.get("current_limit"))
         self.set("goal_velocity", 0)
         self.set("goal_position", round(self.position))
@@ -265,7 +265,7 @@ class Servo:
 
     def _raise_torque(self) -> None:
         """Torque comes on: in position mode it counts within one turn then."""
-        if rules.shut_down(self.memory):
+        if shut_down(self.memory):
             return
         if self.get("operating_mode") == POSITION_MODE:
             self.motion.rebase()
@@ -273,7 +273,7 @@ class Servo:
 
     def _change_mode(self) -> None:
         """Gains, profile and goals are reset; position mode counts within one turn."""
-        for name, register in self.table.registers.items():
+        for name, register in self.model.registers.items():
             if "gain" in name or name.startswith("profile_"):
                 self.set(name, register.default or 0)
         if self.get("operating_mode") == POSITION_MODE:
@@ -289,7 +289,7 @@ class Servo:
     def _refresh(self) -> None:
         """Take note of registers that have changed."""
         if self.motion.refresh(max(self._t, self._fed)):
-            if bits := rules.beyond_limits(self.memory):
+            if bits := beyond_limits(self.memory):
                 self.fail(bits)
             self.motion.refresh(max(self._t, self._fed))
 
@@ -305,9 +305,9 @@ class Servo:
         self._refresh()
         self._moved = True
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         """Let registers tell what the shaft does, if it or a register has changed since."""
-        if self._moved or self._told != self.memory.version:
+        if self._moved or self._reported != self.memory.version:
             self._refresh()
-            self._moved, self._told = False, self.memory.version
+            self._moved, self._reported = False, self.memory.version
             self.motion.show(self._t)

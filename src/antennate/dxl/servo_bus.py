@@ -16,15 +16,14 @@ from itertools import zip_longest
 
 import numpy as np
 
-from antennate.hardware.dynamixel import packets
-from antennate.hardware.dynamixel.packets import BROADCAST, Instruction, Packet, Status
-from antennate.hardware.dynamixel.parser import Parser
-from antennate.hardware.dynamixel.tables import BAUD_RATES, RETURN_DELAY_UNIT, XC430_W240
-from antennate.twin import instructions
-from antennate.twin.instructions import two_words
-from antennate.twin.noise import Noise
-from antennate.twin.registers import Servo
-from antennate.twin.trouble import Fault, Trouble, spoil
+from antennate.dxl import instructions, packets
+from antennate.dxl.faults import Fault, Noise, Trouble, spoil
+from antennate.dxl.instructions import two_words
+from antennate.dxl.model import BAUD_RATES, RETURN_DELAY_UNIT
+from antennate.dxl.models import XC430_W240
+from antennate.dxl.packets import BROADCAST, Instruction, Packet, Status
+from antennate.dxl.parser import Parser
+from antennate.dxl.servo import Servo
 
 _GIVE_UP = 0.01
 """Silence after which servos forget half a packet [s]: ten times the longest packet used."""
@@ -179,7 +178,7 @@ class ServoBus:
         known = {s.get("id"): s for s in reversed(present) if s.get("status_return_level")}
         for name, address, length in asked:
             servo = known.get(name)
-            if servo is None or servo.get("firmware_version") < servo.table.fast_read_firmware:
+            if servo is None or servo.get("firmware_version") < servo.model.fast_read_firmware:
                 break
             error, data = servo.read(address, length)
             chain.append((servo, instructions.status(servo, error, data.ljust(length, b"\0"))))

@@ -1,24 +1,50 @@
-"""The shaft of a servo that the physics moves: from registers to what its actuator does."""
+"""A virtual servo whose shaft a physics engine moves: what its actuator does, and what it tells."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from antennate.hardware.dynamixel.tables import (
+from antennate.dxl.memory import Memory
+from antennate.dxl.model import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
+    FULL_DRIVE,
+    POSITION_UNIT,
     PWM_MODE,
+    TICKS_A_TURN,
     VELOCITY_MODE,
     VELOCITY_UNIT,
+    ServoModel,
 )
-from antennate.robots.servos import TICKS_A_TURN, ServoParams
-from antennate.twin.memory import Memory
-from antennate.twin.motion import Motion, steepest
-from antennate.twin.motor import CREEP, FRICTION, FULL, LOOP, RATINGS
-from antennate.twin.planner import SPEED_UNIT
+from antennate.dxl.motion import Motion, steepest
+from antennate.dxl.motor import CREEP, FRICTION, LOOP
+from antennate.dxl.profile import SPEED_UNIT
+from antennate.dxl.servo import Servo
 
-_TICK = 2.0 * math.pi / TICKS_A_TURN
+
+class Drive(Protocol):
+    """What the engine takes for the motor of a servo; a `Rating` is one."""
+
+    @property
+    def stall_torque(self) -> float:
+        """Torque at standstill [N·m]."""
+        ...
+
+    @property
+    def no_load_speed(self) -> float:
+        """Speed unloaded [rad/s]."""
+        ...
+
+    @property
+    def armature(self) -> float:
+        """Inertia at the output [kg·m²]."""
+        ...
+
+    @property
+    def position_gain(self) -> float:
+        """Share of the full drive per radian of position error [1/rad]."""
+        ...
 
 
 class Pull(NamedTuple):
@@ -56,16 +82,17 @@ class DrivenMotion(Motion):
     """The shaft of a servo that the physics moves.
 
     Attributes:
-        params: Model of the servo in the physics.
+        params: Motor of the servo in the physics, by default that of its model.
         stands: Where a shaft without drive stays [ticks]; None while it is driven.
     """
 
-    params = ServoParams()
+    params: Drive
     stands: float | None = None
 
     def __init__(self, memory: Memory, position: float) -> None:
         super().__init__(memory, position)
-        self._new_gain = memory.table["position_p_gain"].default or 1
+        self.params = memory.model.rating
+        self._new_gain = memory.model["position_p_gain"].default or 1
 
     def move(self, t: float) -> bool:
         """The physics does, and says so in `feel`."""
@@ -101,7 +128,7 @@ class DrivenMotion(Motion):
         shaft.duty = shaft.load = 0.0
         if self.driven:
             shaft.duty = duty
-            shaft.load = duty - speed * _TICK / self.params.no_load_speed
+            shaft.load = duty - speed * POSITION_UNIT / self.params.no_load_speed
 
     def _begin(self) -> None:
         self._loops.total = 0.0
@@ -109,7 +136,7 @@ class DrivenMotion(Motion):
     def _wanted(self, t: float, period: float) -> Pull | None:
         """Its goal for the shaft, drives as the servo counts; None if friction holds the shaft."""
         if self.mode == PWM_MODE:
-            found = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL)
+            found = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL_DRIVE)
         elif self.mode == CURRENT_MODE:
             load = self._current()
             if self._stuck(load, period):
@@ -137,12 +164,13 @@ class DrivenMotion(Motion):
 
     def _current(self) -> float:
         """Goal Current as a share of the stall current."""
-        stall = 1e3 * RATINGS[self.memory.table.model].stall_current
+        model = self.memory.model
+        stall = model.counts_per_ampere * model.rating.stall_current
         return self.memory.get("goal_current") / stall
 
     def _stuck(self, load: float, period: float) -> bool:
         """Friction holds the shaft against a load, or stops it within the period."""
-        inertia = self.params.armature * abs(self._speed) * _TICK
+        inertia = self.params.armature * abs(self._speed) * POSITION_UNIT
         return abs(load) <= FRICTION and inertia <= FRICTION * self.params.stall_torque * period
 
     def _torque(self, load: float) -> Pull:
@@ -152,10 +180,10 @@ class DrivenMotion(Motion):
     def _with_current(self, pull: Pull, most: float, period: float) -> Pull:
         """A pull whose torque stays below a share of the stall torque."""
         speed = self._speed
-        turning = speed * _TICK / self.params.no_load_speed
+        turning = speed * POSITION_UNIT / self.params.no_load_speed
         away = self.sign * (pull.goal - self.shaft.position) - 0.5 * period * speed
-        drive = pull.gain * self.params.position_gain * away * _TICK + pull.push
-        drive -= pull.brake * speed * _TICK
+        drive = pull.gain * self.params.position_gain * away * POSITION_UNIT + pull.push
+        drive -= pull.brake * speed * POSITION_UNIT
         load = max(-self.limit, min(drive, self.limit)) - turning
         if abs(load) > most:
             return self._torque(math.copysign(most, load))
@@ -165,8 +193,8 @@ class DrivenMotion(Motion):
         """By the loop of velocity mode."""
         loops, speed = self._loops, self.plan.at(t)[1]
         loops.velocity((speed - self._speed) / SPEED_UNIT, period, self.limit)
-        gain = loops.vp / 128 / FULL
-        push = gain * speed / SPEED_UNIT + loops.total / FULL
+        gain = loops.vp / 128 / FULL_DRIVE
+        push = gain * speed / SPEED_UNIT + loops.total / FULL_DRIVE
         return Pull(self.shaft.position, 0.0, push, gain / VELOCITY_UNIT)
 
     def _to_position(self, t: float, period: float) -> Pull:
@@ -178,6 +206,61 @@ class DrivenMotion(Motion):
         ahead = self.ahead(loops, t, speed)
         if loops.i:
             loops.position(goal - self.position, speed - self._speed, period, self.limit, ahead)
-        brake = loops.d / 16 * LOOP / FULL
-        push = (loops.total + ahead) / FULL + brake * speed
-        return Pull(self.shaft_at(goal), loops.p / self._new_gain, push, brake / _TICK)
+        brake = loops.d / 16 * LOOP / FULL_DRIVE
+        push = (loops.total + ahead) / FULL_DRIVE + brake * speed
+        return Pull(self.shaft_at(goal), loops.p / self._new_gain, push, brake / POSITION_UNIT)
+
+
+class DrivenServo(Servo):
+    """A servo whose shaft the physics moves.
+
+    Args:
+        model: Its model.
+        servo: Its id.
+        position: Where its shaft is [ticks].
+        drive: Its motor in the physics, by default that of its model.
+    """
+
+    motion: DrivenMotion
+
+    def __init__(
+        self, model: ServoModel, servo: int, position: float = 2048.0, drive: Drive | None = None
+    ) -> None:
+        super().__init__(model, servo, position)
+        self.motion.params = drive or model.rating
+
+    def turn(self, turns: float) -> None:
+        """Let it have counted some turns more, as after a long walk; the joint stays."""
+        self._refresh()
+        self.motion.add_turns(turns)
+        self._show()
+
+    def carry(self, ticks: float) -> None:
+        """Let somebody turn the shaft there without torque; whole turns stay as counted."""
+        before = self.position
+        self.motion.turn_to(ticks)
+        self.turn(round((before - self.position) / TICKS_A_TURN))
+
+    def shaft(self, ticks: float, speed: float = 0.0, duty: float = 0.0) -> None:
+        """What the physics has done: position [ticks], speed [ticks/s], share of the drive."""
+        self._refresh()
+        self.motion.feel(ticks, speed, duty)
+        self._show()
+
+    def goal(self) -> float:
+        """Where it pulls the shaft to now [ticks]."""
+        return self.pull(self._t, 0.0).goal
+
+    def pull(self, t: float, period: float) -> Pull:
+        """How it pulls the shaft in the period [s] that ends at t [s]."""
+        self._refresh()
+        return self.motion.pull(t, period)
+
+    def feed_watchdog(self, t: float) -> None:
+        """An instruction packet was on the bus; all else waits for the next tick."""
+        if self._trip_time() < t:
+            self.advance(t)
+        self._fed = t
+
+    def _make_motion(self, position: float) -> Motion:
+        return DrivenMotion(self.memory, position)

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from antennate.hardware.dynamixel.answers import Answer, Span, Value
-from antennate.hardware.dynamixel.bus import Bus
-from antennate.hardware.dynamixel.tables import XC430_W240, Register
+from antennate.dxl.answers import Answer, Span, Value
+from antennate.dxl.bus import Bus
+from antennate.dxl.model import Register
+from antennate.dxl.models import XC430_W240
 
 PINGS = 3
 """Pings until an id is taken for silent; at 1 % loss three in a row are one in 10^6 (assumed)."""
@@ -16,7 +17,7 @@ _READS = 6
 """Reads until a servo is taken for one that answers nothing but pings: answers that collide are by
 chance whole once in 2^16 (assumed)."""
 _TICKS = Span(XC430_W240["realtime_tick"].address, 16)
-"""What differs between two servos of one id: the tick and the position, in both models."""
+"""What differs between two servos of one id: the tick and the position, in all models."""
 _SPARE = {"torque_enable": 1, "goal_position": 12, "present_position": 12}
 
 State = Literal["ok", "broken", "collides", "mute"]
@@ -29,14 +30,6 @@ FOUND: Mapping[State, str] = {
     "mute": "answers pings alone",
 }
 """What each state means, in words."""
-_OWN_ID = "leave one of them alone on the bus and give it its own id with `antennate setup`"
-CURE: Mapping[State, str] = {
-    "ok": "",
-    "broken": f"look at its cable and plugs; if there are two, {_OWN_ID}",
-    "collides": _OWN_ID,
-    "mute": "switch its supply off and on",
-}
-"""What a person does about it."""
 
 
 @dataclass(frozen=True, slots=True)

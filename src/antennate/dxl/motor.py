@@ -1,7 +1,7 @@
 """The motor of a servo that stands alone, and what makes its drive: the loops of the manuals.
 
-The motor is that of the simulated robot: a torque-speed line through stall torque and unloaded
-speed, both in proportion to the supply, and the inertia at its output; its horn carries nothing.
+The motor is a torque-speed line through stall torque and unloaded speed of its rating, both in
+proportion to the supply, and the inertia at its output; its horn carries nothing.
 That gives a time constant of 12 ms (XC430). Without torque the gear stops the shaft, and nothing
 turns it. The loops run once a millisecond (assumed) with the gains of the manuals. Feedforward
 gains have the divisor of the manuals, 4; that the speed and the acceleration of the profile count
@@ -13,24 +13,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from antennate.robots.servos import TICKS_A_TURN, ServoParams, XL330Params, XL430Params
-from antennate.twin.memory import Memory
+from antennate.dxl.memory import Memory
+from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT, Rating
 
 LOOP = 0.001
 """Period of the loops [s], for which their gains are meant."""
 STEP = 0.002
 """Longest step of a motor [s]."""
-FULL = 885
-"""PWM of the full drive."""
-_TICK = 2.0 * math.pi / TICKS_A_TURN
 FRICTION = 0.1
 """Torque by which the gear stops a shaft without drive, in stall torques (assumed)."""
 CREEP = 10.0
 """Speed below which friction holds a shaft [ticks/s]: a fifth of a degree in a quarter second."""
-
-
-RATINGS = {kind.model_number: kind for kind in (ServoParams(), XL330Params(), XL430Params())}
-"""By model number; datasheets at 11.1, 5.0 and 11.1 V, inertia of the XL430 as of the XC430."""
 
 
 class Shaft:
@@ -63,12 +56,12 @@ class Motor(Shaft):
         rating: Of its motor, at the recommended supply.
     """
 
-    def __init__(self, position: float, rating: ServoParams) -> None:
+    def __init__(self, position: float, rating: Rating) -> None:
         super().__init__(position)
         self.rating = rating
-        self._fastest = rating.no_load_speed / _TICK
+        self._fastest = rating.no_load_speed / POSITION_UNIT
         self._lag = rating.armature * rating.no_load_speed / rating.stall_torque
-        self._stop = FRICTION * rating.stall_torque / rating.armature / _TICK
+        self._stop = FRICTION * rating.stall_torque / rating.armature / POSITION_UNIT
         self._faded = math.exp(-STEP / self._lag)
 
     def drive(self, duty: float, dt: float, supply: float) -> None:
@@ -150,7 +143,7 @@ class Loops:
 
     def _limited(self, wanted: float, more: float, limit: float) -> float:
         """Within a limit; the sum grows only where that has an effect."""
-        full = limit * FULL
+        full = limit * FULL_DRIVE
         if abs(wanted) < full or wanted * more < 0.0:
             self.total = max(-full, min(self.total + more, full))
-        return max(-full, min(wanted, full)) / FULL
+        return max(-full, min(wanted, full)) / FULL_DRIVE

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antennate.hardware.dynamixel.packets import (
+from antennate.dxl.packets import (
     BROADCAST,
     HEADER,
     LAST_ID,
@@ -17,13 +17,13 @@ from antennate.hardware.dynamixel.packets import (
     StatusError,
     crc16,
 )
-from antennate.twin.registers import Servo
+from antennate.dxl.servo import Servo
 
 CONTROL_TABLE_BACKUP = 0x20
 """Instruction that stores registers, or restores them."""
 _CLEAR = b"\x01DXL\x22"
 _STORE, _RESTORE = b"\x01CTRL", b"\x02CTRL"
-_KEPT = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
+_RESET_EXCEPTIONS = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
 """What a factory reset leaves as it is, by its parameter."""
 _RESET_ALL = 0xFF
 
@@ -44,7 +44,7 @@ def answer(t: float, servo: Servo, packet: Packet) -> Status | None:
     quiet = packet.id == BROADCAST or is_shadow(servo, packet)
     if packet.instruction == Instruction.PING:
         data = b"".join(
-            servo.table[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
+            servo.model[r].encode(servo.get(r)) for r in ("model_number", "firmware_version")
         )
         return None if is_shadow(servo, packet) else status(servo, StatusError.NONE, data)
     if packet.instruction == Instruction.READ:
@@ -100,9 +100,9 @@ def _change(t: float, servo: Servo, packet: Packet) -> StatusError:
         return StatusError.NONE
     if kind == Instruction.CLEAR and params == _CLEAR:
         return servo.clear_turns()
-    if kind == Instruction.FACTORY_RESET and params and params[0] in _KEPT:
+    if kind == Instruction.FACTORY_RESET and params and params[0] in _RESET_EXCEPTIONS:
         if packet.id != BROADCAST or params[0] != _RESET_ALL:
-            servo.factory_reset(t, _KEPT[params[0]])
+            servo.factory_reset(t, _RESET_EXCEPTIONS[params[0]])
         return StatusError.NONE
     if kind == CONTROL_TABLE_BACKUP and params == _STORE:
         return servo.store_backup()

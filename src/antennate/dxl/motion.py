@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 
-from antennate.hardware.dynamixel.tables import (
+from antennate.dxl.memory import Memory
+from antennate.dxl.model import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
+    FULL_DRIVE,
     POSITION_MODE,
     PWM_MODE,
     REVERSED,
+    TICKS_A_TURN,
     VELOCITY_MODE,
 )
-from antennate.robots.servos import TICKS_A_TURN
-from antennate.twin.memory import Memory
-from antennate.twin.motor import FRICTION, FULL, LOOP, RATINGS, STEP, Loops, Motor, Shaft
-from antennate.twin.planner import POSITION_MODES, SPEED_UNIT, Planner
+from antennate.dxl.motor import FRICTION, LOOP, STEP, Loops, Motor, Shaft
+from antennate.dxl.profile import POSITION_MODES, SPEED_UNIT, Planner
 
 _MOST_OFFSET = 1_024
 """Largest homing offset that acts in position mode, from the manuals [ticks]."""
@@ -25,7 +26,7 @@ _STILL = 1.0
 
 def steepest(memory: Memory, time: float) -> float:
     """By how much PWM Slope lets the drive change in a time [s]; infinite without that register."""
-    if "pwm_slope" not in memory.table.registers:
+    if "pwm_slope" not in memory.model.registers:
         return math.inf
     volts = 0.1 * memory.get("present_input_voltage")
     return 1.977 * memory.get("pwm_slope") * time / volts if volts else math.inf
@@ -120,7 +121,7 @@ class Motion:
         self.mode, self.torque = get("operating_mode"), get("torque_enable") == 1
         offset = get("homing_offset")
         self._homing = 0 if self.mode == POSITION_MODE and abs(offset) > _MOST_OFFSET else offset
-        self.limit = abs(get("goal_pwm")) / FULL
+        self.limit = abs(get("goal_pwm")) / FULL_DRIVE
         now = (self.position, self.sign * self.shaft.speed)
         if self.plan.follow(t, self.driven, now, self._base):
             self._begin()
@@ -136,11 +137,14 @@ class Motion:
         show("present_velocity", round(speed))
         told = round(position) if self.frozen is None else self.frozen
         show("present_position", told + self.misread)
-        show("present_pwm", round(FULL * self.sign * shaft.duty))
+        show("present_pwm", round(FULL_DRIVE * self.sign * shaft.duty))
         load = max(-1.0, min(self.sign * shaft.load, 1.0))
-        table = self.memory.table
-        if "present_current" in table.registers:
-            show("present_current", round(1e3 * load * RATINGS[table.model].stall_current))
+        model = self.memory.model
+        if "present_current" in model.registers:
+            show(
+                "present_current",
+                round(model.counts_per_ampere * load * model.rating.stall_current),
+            )
         else:
             show("present_load", round(1e3 * load))
         ongoing = self.plan.show(t, position)
@@ -195,7 +199,7 @@ class MotorMotion(Motion):
         return True
 
     def _make_shaft(self, position: float) -> Shaft:
-        return Motor(position, RATINGS[self.memory.table.model])
+        return Motor(position, self.memory.model.rating)
 
     def _changed(self, t: float) -> None:
         super()._changed(t)
@@ -210,9 +214,14 @@ class MotorMotion(Motion):
         if self.stopped:
             return 0.0
         if self.mode == PWM_MODE:
-            return sign * get("goal_pwm") / FULL
+            return sign * get("goal_pwm") / FULL_DRIVE
         if self.mode == CURRENT_MODE:
-            load = sign * get("goal_current") / 1e3 / motor.rating.stall_current
+            load = (
+                sign
+                * get("goal_current")
+                / self.memory.model.counts_per_ampere
+                / motor.rating.stall_current
+            )
             duty = motor.needed(motor.after_friction(load), supply)
             return max(-self.limit, min(duty, self.limit))
         wanted, speed = self.plan.at(self._t)
@@ -222,7 +231,11 @@ class MotorMotion(Motion):
         ahead = self.ahead(self._loops, self._t, speed)
         duty = sign * self._loops.position(wanted - self.position, behind, dt, self.limit, ahead)
         if self.mode == CURRENT_POSITION_MODE:
-            most = abs(get("goal_current")) / 1e3 / motor.rating.stall_current
+            most = (
+                abs(get("goal_current"))
+                / self.memory.model.counts_per_ampere
+                / motor.rating.stall_current
+            )
             if most <= FRICTION:
                 duty = motor.needed(motor.after_friction(0.0), supply)
                 return max(-self.limit, min(duty, self.limit))

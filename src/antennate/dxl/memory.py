@@ -1,13 +1,35 @@
-"""The control table of one servo as bytes: where a register lies, and what may be read or written.
+"""The control table of one virtual servo as bytes: what may be read, what may be written where.
 
-Whether a value may be written is not known here, but who may write it where is. Where the manuals
-are silent, a read that touches an undefined byte is refused as a whole.
+Ranges are those of the manual, and limits by other registers. Where the manuals are silent, a read
+that touches an undefined byte is refused as a whole.
 """
 
 from __future__ import annotations
 
-from antennate.hardware.dynamixel.packets import StatusError
-from antennate.hardware.dynamixel.tables import GOALS, Register, Table
+import math
+
+from antennate.dxl.model import (
+    CURRENT_POSITION_MODE,
+    EXTENDED_MODE,
+    GOALS,
+    MOST_TICKS,
+    TIME_BASED,
+    Register,
+    ServoModel,
+)
+from antennate.dxl.packets import StatusError
+
+TRIPPED = -1
+"""Value of a bus watchdog that has stopped the servo."""
+_UNUSED_DRIVE_MODE = 2
+_VOLTAGE_ERROR, _HEAT_ERROR = 1, 4
+"""Bits of Hardware Error Status."""
+_LIMITS = {
+    "goal_velocity": "velocity_limit",
+    "goal_pwm": "pwm_limit",
+    "goal_current": "current_limit",
+    "profile_velocity": "velocity_limit",
+}
 
 
 class Memory:
@@ -17,19 +39,19 @@ class Memory:
     register that is written through indirect data has to be named there whole and in order.
 
     Args:
-        table: The model.
+        model: Its model.
 
     Attributes:
-        table: The model.
+        model: Its model.
         version: Counts the changes by `set`, so that what follows from them can be kept.
         settings: The same without changes of goals.
     """
 
-    def __init__(self, table: Table) -> None:
-        self.table = table
+    def __init__(self, model: ServoModel) -> None:
+        self.model = model
         self.version = self.settings = 0
         self._stored: bytes | None = None
-        registers = table.registers.values()
+        registers = model.registers.values()
         self._bytes = bytearray(max(r.address + r.size for r in registers))
         self._starts = {r.address: r for r in registers}
         self._where = {
@@ -90,7 +112,7 @@ class Memory:
 
     def start(self, stored: bool) -> None:
         """Let the RAM be as after power-on; that of the backup if `stored`."""
-        for register in self.table.registers.values():
+        for register in self.model.registers.values():
             if not register.eeprom:
                 self.set(register.name, register.default or 0)
         self.set("backup_ready", int(self._stored is not None))
@@ -104,14 +126,14 @@ class Memory:
 
     def restore(self, ram_only: bool = False) -> None:
         """Take from the backup what one has, if there is one."""
-        for register in self.table.registers.values():
+        for register in self.model.registers.values():
             if self._stored and _backed_up(register) and not (ram_only and register.eeprom):
                 where, _, _ = self._where[register.name]
                 self.set(register.name, register.decode(self._stored[where]))
 
     def _places(self, address: int, length: int) -> list[int]:
         """Where the bytes from an address on really lie."""
-        names = self.table.indirect
+        names = self.model.indirect
         return [
             int.from_bytes(self._bytes[names[a] : names[a] + 2], "little") if a in names else a
             for a in range(address, address + length)
@@ -122,3 +144,63 @@ def _backed_up(register: Register) -> bool:
     """A backup has the EEPROM, and of the RAM gains, profile and indirect addresses."""
     ram = ("gain", "profile_", "indirect_address_")
     return register.writable and (register.eeprom or any(part in register.name for part in ram))
+
+
+def refuses(memory: Memory, register: Register, value: int) -> StatusError:
+    """Why a value cannot be written, NONE if it can."""
+    name = register.name
+    locked = name in GOALS or (name == "bus_watchdog" and value != 0)
+    if locked and memory.get("bus_watchdog") == TRIPPED:
+        return StatusError.DATA_RANGE
+    least, most = _limits(memory, name)
+    if not least <= value <= most:
+        return StatusError.DATA_LIMIT
+    if not _in_range(memory, register, value):
+        return StatusError.DATA_RANGE
+    if name == "torque_enable" and value and shut_down(memory):
+        return StatusError.RESULT_FAIL
+    return StatusError.NONE
+
+
+def shut_down(memory: Memory) -> bool:
+    """An error that Shutdown selects has taken its torque; only a restart gives it back."""
+    return bool(memory.get("hardware_error_status") & memory.get("shutdown"))
+
+
+def beyond_limits(memory: Memory) -> int:
+    """Errors that are new because supply or temperature are beyond their limits, as bits."""
+    get, bits = memory.get, 0
+    if not get("min_voltage_limit") <= get("present_input_voltage") <= get("max_voltage_limit"):
+        bits |= _VOLTAGE_ERROR
+    if get("present_temperature") > get("temperature_limit"):
+        bits |= _HEAT_ERROR
+    return bits & ~get("hardware_error_status")
+
+
+def _in_range(memory: Memory, register: Register, value: int) -> bool:
+    """The table of the manual allows the value."""
+    if register.name == "operating_mode":
+        return value in memory.model.modes
+    if register.name == "drive_mode" and value & _UNUSED_DRIVE_MODE:
+        return False
+    if register.name == "protocol_type" and 2 < value < 20:
+        return False
+    low, high = register.low, register.high
+    return (low is None or value >= low) and (high is None or value <= high)
+
+
+def _limits(memory: Memory, name: str) -> tuple[float, float]:
+    """Bounds of a goal by another register."""
+    if name == "goal_position":
+        if memory.get("operating_mode") in (EXTENDED_MODE, CURRENT_POSITION_MODE):
+            return -MOST_TICKS, MOST_TICKS
+        return memory.get("min_position_limit"), memory.get("max_position_limit")
+    if name not in _LIMITS or (name == "profile_velocity" and time_based(memory)):
+        return -math.inf, math.inf
+    bound = memory.get(_LIMITS[name])
+    return -bound, bound
+
+
+def time_based(memory: Memory) -> bool:
+    """Profile registers are times [ms]."""
+    return bool(memory.get("drive_mode") & TIME_BASED)
