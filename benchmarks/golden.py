@@ -96,16 +96,16 @@ def logged(folder: Path) -> None:
         antennate("replay --controller paper", log, "--out", folder / f"paper-{name}")
 
 
-def take(received: dict[int, bytearray], patience: float = 0.0) -> bool:
-    """Take what has come to ports; whether any came within a time [s]."""
-    ready, _, _ = select.select(list(received), [], [], patience)
+def take(received: dict[int, bytearray], open_ports: set[int], patience: float = 0.0) -> bool:
+    """Take what has come to ports; whether any came within a time [s]. One that ended goes."""
+    ready, _, _ = select.select(list(open_ports), [], [], patience)
     for port in ready:
         try:
             data = os.read(port, 65536)
         except OSError:
             data = b""
-        if not data:  # the twin has ended
-            return False
+        if not data:
+            open_ports.discard(port)
         received[port] += data
     return bool(ready)
 
@@ -126,6 +126,19 @@ def packets_of(tick: int) -> bytes:
     return torque + asked + packets.sync_write(116, goals)
 
 
+def frames_of(data: bytes) -> list[bytes]:
+    """Frames of a board from its tenth sample on; when it is heard first is a matter of time."""
+    from antennate.hardware.esp32 import frame
+    from antennate.hardware.esp32.wire import Sample, parse
+
+    frames = [chunk for chunk in data.split(b"\0") if chunk]
+    for place, chunk in enumerate(frames):
+        body = frame.unstuff(chunk)
+        if body and isinstance(found := parse(body[: -frame.CRC_SIZE]), Sample) and found.seq == 10:
+            return frames[place : place + MINUTE - 100]
+    sys.exit(f"expected the tenth sample among {len(frames)} frames of the board, found none")
+
+
 def served(folder: Path) -> None:
     """What a twin in lock-step and its board send while a robot swings its joints for a minute."""
     folder.mkdir(parents=True)
@@ -135,6 +148,7 @@ def served(folder: Path) -> None:
         ports = json.loads(process.stdout.readline())
         board, bus = (os.open(ports[name], os.O_RDWR | os.O_NONBLOCK) for name in ("esp32", "bus"))
         received = {board: bytearray(), bus: bytearray()}
+        open_ports = set(received)
         for port in received:
             tty.setraw(port)
         for tick in range(MINUTE):
@@ -143,13 +157,12 @@ def served(folder: Path) -> None:
                 try:
                     packet = packet[os.write(bus, packet) :]
                 except BlockingIOError:
-                    take(received, 0.01)
-            take(received)
-        while take(received, 5.0):
+                    take(received, open_ports, 0.01)
+            take(received, open_ports)
+        while open_ports and take(received, open_ports, 5.0):
             pass
         process.wait(60)
-    frames = received[board].split(b"\0")[:MINUTE]  # how many more come is a matter of time
-    (folder / "board.bytes").write_bytes(b"\0".join(frames))
+    (folder / "board.bytes").write_bytes(b"\0".join(frames_of(received[board])))
     (folder / "bus.bytes").write_bytes(received[bus])
 
 
