@@ -70,9 +70,8 @@ def test_a_comment_behind_a_changed_value_stays() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "robot.yaw.zeros = [1]\n",
-        "robot = {yaw = {zeros = [1]}}\n",
         'robot = "mine.toml"\n',
+        "robot.yaw = 3\n",
         "a = [\n",
     ],
 )
@@ -82,6 +81,19 @@ def test_a_file_of_another_form_is_refused_and_stays(text: str, tmp_path: Path) 
     with pytest.raises(ConfigError, match=r"write by hand: robot\.yaw\.zeros = \[2\]"):
         change(file, {("robot", "yaw", "zeros"): [2]})
     assert file.read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("text", "changed"),
+    [
+        ("robot.yaw.zeros = [1] # mine\n", "robot.yaw.zeros = [2] # mine\n"),
+        ("robot = {yaw = {zeros = [1]}}\n", "robot = {yaw = {zeros = [2]}}\n"),
+        ("[robot]\n\n[control]\n\n[robot.yaw]\nzeros=[ 1 ]\n", None),
+    ],
+)
+def test_other_forms_of_a_table_stay(text: str, changed: str | None) -> None:
+    found = edited(text, {("robot", "yaw", "zeros"): [2]})
+    assert found == (changed or text.replace("zeros=[ 1 ]", "zeros=[2]"))
 
 
 def test_a_file_is_made_where_there_is_none(tmp_path: Path) -> None:
