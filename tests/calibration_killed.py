@@ -3,7 +3,7 @@
 Words: folder, number of kills, seed. Three of five kills come just before or after a call that
 touches a file, those of the calibration first; the others at random times. Prints one JSON object:
 how many such places the calibration has, at how many places it was killed, and of each kill which
-calibration is there, "old", "new" or what else.
+calibration is in the folder, or else in that of the old run, "old", "new" or what else.
 """
 
 import dataclasses
@@ -101,7 +101,13 @@ def killed(
     os.waitpid(process, 0)
     told = os.read(heard, 12)
     os.close(heard)
-    return told, (folder / NAME).read_bytes()
+    return told, calibration_of(folder).read_bytes()
+
+
+def calibration_of(folder: Path) -> Path:
+    """The file of the new run, or of the old one, which has another name by then."""
+    file = folder / NAME
+    return file if file.exists() else folder.with_name(f"{folder.name}.old") / NAME
 
 
 def main() -> None:
@@ -122,12 +128,13 @@ def main() -> None:
     points = [*inside, *outside][: max(len(inside), 3 * kills // 5)]
     left: list[str] = []
     for n in range(kills):
-        shutil.rmtree(folder)
+        for place in (folder, folder.with_name(f"{folder.name}.old")):
+            shutil.rmtree(place, ignore_errors=True)
         shutil.copytree(before, folder)
         point = points[n] if n < len(points) else None
         _, data = killed(folder, new, point, None if point else chance.uniform(0.0, took))
         try:
-            Calibration.load(folder / NAME)
+            Calibration.load(calibration_of(folder))
             left.append(names.get(data, "mixed"))
         except CalibrationError as error:
             left.append(str(error))

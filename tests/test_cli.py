@@ -485,8 +485,8 @@ def test_overwrite_leaves_nothing_old(capsys, tmp_path):
     (tmp_path / "run" / "notes.txt").write_text("mine")
     assert main([*QUICK, "--seed", "1", "--out", "run", "--overwrite"]) == 0
     assert json.loads((tmp_path / "run" / "result.json").read_text())["seed"] == 1
-    assert not list((tmp_path / "run" / "figures").iterdir())
-    assert (tmp_path / "run" / "notes.txt").read_text() == "mine"
+    assert not (tmp_path / "run" / "figures").exists()
+    assert (tmp_path / "run.old" / "notes.txt").read_text() == "mine"
 
 
 def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):

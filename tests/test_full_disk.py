@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from lockstep import BoardPort, LockstepClock
 from test_drive_processes import ANTENNATE, NO_SERVO, Drive, twin
-from test_simulated_logs import HEADER, rows, walked
+from test_simulated_logs import HEADER, in_rows, rows, walked
 
 from antennate.cli import main
 from antennate.errors import LogError, reason
@@ -24,11 +24,12 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.session import Session
 from antennate.port import PortError
-from antennate.telemetry.apart import LogProcess
+from antennate.telemetry.log_queue import LogQueue
 from antennate.telemetry.reader import LogReader, count
+from antennate.telemetry.rows import RowLog
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
-from antennate.types import JointCommand
+from antennate.types import Floats, JointCommand
 
 ROOM = 70_000
 """Largest file [byte]: as a disk that is full once the log is as long; the result is shorter."""
@@ -198,13 +199,13 @@ def test_a_reason_is_never_empty(error: Exception, said: str) -> None:
     assert reason(error) == said
 
 
-def test_a_log_of_another_process_says_once_why_it_has_failed(tmp_path: Path) -> None:
+def test_a_log_behind_a_queue_says_once_why_it_has_failed(tmp_path: Path) -> None:
     """While it is written, not only at its end."""
     path, told = tmp_path / "log.mcap", list[str]()
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
-        log = LogProcess(path, HEADER, told.append)
+        log = LogQueue(RowLog[Floats](path, HEADER, in_rows), told.append)
         end = time.monotonic() + 60.0
         for row in rows(6000):
             log.add(row)

@@ -398,7 +398,10 @@ def test_plot_draws_a_log_of_absurd_numbers(
         (["recover", "text", "--out", "new.mcap"], "no intact header"),
         (["recover", "cut.mcap", "--out", "new.mcap"], "expected intact ticks, found none"),
         (["recover", "gone.mcap", "--out", "drive.mcap", "--overwrite"], "gone.mcap: No such file"),
-        (["recover", "drive.mcap", "--out", "x.mcap", "--overwrite"], "found the folder x.mcap"),
+        (
+            ["recover", "drive.mcap", "--out", "x.mcap", "--overwrite"],
+            "x.mcap: expected a file or a new name, found a folder",
+        ),
         (["plot", "empty.mcap"], "expected a log with ticks, found none"),
         (["export", "empty.mcap"], "expected a log with ticks, found none"),
         (["export", "drive.mcap", "--out", "nowhere/a.csv"], "nowhere/a.csv: expected to write"),

@@ -77,7 +77,7 @@ def test_no_run_replaces_the_one_that_it_reads(
     for file in files[1:]:
         file.write_text("what was measured")
     names = [str(file.relative_to("run")) for file in files]
-    title = "# Files that this run wrote. --overwrite replaces these alone."
+    title = "# Files that this run wrote."
     Path("run/files.txt").write_text("\n".join([title, *names, ""]))
     before = [file.read_bytes() for file in files]
     assert main([*words, "--out", "run", "--overwrite"]) == 2

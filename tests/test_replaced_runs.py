@@ -1,7 +1,8 @@
-"""A run that replaces another one: the old one goes once the new one has something to keep."""
+"""A run with --overwrite: the folder NAME is renamed to NAME.old, and a new one begins."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -48,6 +49,11 @@ def _there(_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def files(place: str = "run") -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in Path(place).rglob("*") if path.is_file()}
+
+
+def contents(place: str | Path) -> dict[Path, bytes]:
+    """The same, by names within the folder."""
+    return {path.relative_to(place): data for path, data in files(str(place)).items()}
 
 
 def listed(place: Path, *names: str) -> None:
@@ -106,10 +112,17 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
     assert files() == before
 
 
-def test_a_run_that_replaces_another_leaves_nothing_of_it() -> None:
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
-    assert main(["springs", "--no-figures", "--out", "other"]) == 0
-    assert {path.name for path in files()} == {path.name for path in files("other")}
+@pytest.mark.parametrize("name", ["run", "run/", "./run", "sub/../run"])
+def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(name: str, tmp_path: Path) -> None:
+    Path("sub").mkdir()
+    for words in (["springs", "--no-figures"], ["robot"], WALL):
+        before = contents("run")
+        assert main([*words, "--out", name, "--overwrite"]) == 0
+        assert contents("run.old") == before
+        fresh = tmp_path / "fresh" / words[0]
+        assert main([*words, "--out", str(fresh)]) == 0
+        assert contents("run").keys() == contents(fresh).keys()
+    assert sorted(path.name for path in Path().iterdir()) == ["fresh", "run", "run.old", "sub"]
 
 
 def test_a_run_without_a_result_takes_the_place_of_none() -> None:
@@ -117,6 +130,7 @@ def test_a_run_without_a_result_takes_the_place_of_none() -> None:
     with RunDirectory.create("robot", "run", overwrite=True) as run:
         run.write("bom.csv", "part,count\n")
     assert files() == before
+    assert not Path("run.old").exists()
 
 
 def test_no_second_process_replaces_a_run_meanwhile() -> None:
@@ -136,42 +150,17 @@ def slow_study(free: int) -> subprocess.Popen[bytes]:
     return program(*words, "--workers", "1", "--no-figures", FREE=str(free))
 
 
-def test_killed_before_its_first_trial_the_old_run_is_there_again(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """For each command that is given its folder."""
-    before = files()
+def test_killed_before_its_first_trial_the_old_run_is_beside_it() -> None:
+    before = contents("run")
     killed_once(Path("begun"), slow_study(free=0))
-    shutil.copytree("run", "killed")
-    assert RunDirectory.open("run").rows()
-    assert files() == before
-    for words in (["log", "info"], ["replay"], ["view"]):
-        shutil.rmtree("run")
-        shutil.copytree("killed", "run")
-        assert main([*words, "run"]) == 2  # what this run has is none that can be read
-        assert "run/logs/descending-0.mcap" in capsys.readouterr().err
-        assert files() == before
-
-
-def test_the_log_of_a_killed_first_trial_is_read_and_not_removed(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """The old run is there again for the next command that takes the folder."""
-    before = files()
-    killed_once(Path("begun"), slow_study(free=0))
-    new = Path("run/logs/open-0.mcap")
-    new.parent.mkdir(exist_ok=True)
-    new.write_bytes(b"a log that was begun")
-    listed(Path("run"), "logs/open-0.mcap")
-    for words in (["log", "info"], ["log", "recover"], ["replay"], ["view"]):
-        assert main([*words, "run"]) == 2  # it is no whole log
-        assert "run/logs/open-0.mcap" in capsys.readouterr().err
-        assert new.read_bytes() == b"a log that was begun"
-    assert RunDirectory.open("run").rows()
-    assert files() == before
+    assert contents("run.old") == before
+    assert RunDirectory.open("run.old").rows()
+    assert slow_study(free=9).wait(120) == 0
+    assert len(RunDirectory.open("run").rows()) == 3
 
 
 def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
+    before = contents("run")
     killed_once(Path("begun"), slow_study(free=1))
     process = program(
         *["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", "--no-figures"],
@@ -179,8 +168,7 @@ def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
     )
     assert process.wait(120) == 0
     assert len(RunDirectory.open("run").rows()) == 3
-    assert not list(Path("run").rglob(".*"))
-    assert not Path("run/logs/descending-0.mcap").exists()
+    assert contents("run.old") == before
 
 
 KILLED = """
@@ -203,30 +191,65 @@ sys.exit(main(["springs", "--no-figures", "--out", "run", "--overwrite"]))
 
 
 @pytest.mark.parametrize("first", [1, 2, 3])
-def test_killed_at_any_change_of_a_file_one_whole_run_is_there(first: int) -> None:
-    """The old one or the new one, with nothing of the other, and nothing hidden."""
+def test_killed_at_any_change_of_a_file_the_old_run_is_whole(first: int) -> None:
+    """Under one of both names; and the same command ends, whatever the killed one left."""
+    assert main(["springs", "--out", "older"]) == 0
     shutil.copytree("run", "old")
-    before = {path.relative_to("old"): data for path, data in files("old").items()}
-    seen = set[str]()
-    for kill in range(first, 60, 9):
+    before, seen = contents("old"), set[str]()
+    for kill in range(first, 75, 9):
         shutil.rmtree("run")
+        shutil.rmtree("run.old", ignore_errors=True)
         shutil.copytree("old", "run")
+        shutil.copytree("older", "run.old")
         done = subprocess.run([sys.executable, "-c", KILLED, str(kill)], capture_output=True)
         assert done.returncode in (0, -signal.SIGKILL), done.stderr
-        RunDirectory.open("run").result()
-        found = {path.relative_to("run"): data for path, data in files().items()}
-        if found == before:
-            seen.add("old")
-            continue
-        seen.add("new")
-        names = {str(path) for path in found if not path.name.startswith(".")}
-        assert names <= {"config.toml", "versions.json", "command.txt", "result.json"} | {
-            *("points.csv", "trials.csv", "report.html", "trials.partial.jsonl"),
-            *("trials.store.jsonl", "files.txt"),
-        }
+        (whole,) = (name for name in ("run", "run.old") if contents(name) == before)
+        seen.add(whole)
         assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+        assert RunDirectory.open("run").result()
         assert not [path for path in Path("run").iterdir() if path.name.startswith(".")]
-    assert seen == {"old", "new"}
+    assert seen == {"run", "run.old"}
+
+
+def test_a_file_system_without_room_costs_no_old_run() -> None:
+    """No file can have a single byte; the folder has its name again."""
+    before = files()
+    code = """
+import resource, sys
+from antennate.cli import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+sys.exit(main(["springs", "--out", "run", "--overwrite"]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert files() == before
+    assert not Path("run.old").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the administrator may write everywhere")
+def test_a_parent_that_cannot_be_written_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree("run", "run.old")
+    before = files(".")
+    Path().chmod(0o555)
+    code = main(["springs", "--out", "run", "--overwrite"])
+    Path().chmod(0o755)
+    assert code == 2
+    assert capsys.readouterr().err.endswith("run, found: Permission denied\n")
+    assert files(".") == before
+
+
+@pytest.mark.parametrize("place", [".", "..", "../run", "sub/.."])
+def test_the_working_directory_is_not_renamed(
+    place: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("run/sub").mkdir()
+    monkeypatch.chdir("run/sub" if place == ".." else "run")
+    before = files(".")
+    assert main(["springs", "--out", place, "--overwrite"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{place}: expected a folder to rename, found the working directory" in line
+    assert files(".") == before
 
 
 def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
@@ -236,9 +259,8 @@ def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
     listed(Path("run"), "figures/a.svg")
     for name in [*ours, *theirs]:
         Path("run", name).write_text("half of a file")
-    words = ["springs", "--no-figures", "--out", "run"]
-    assert main([*words, "--overwrite"]) == 0
-    assert [name for name in [*ours, *theirs] if Path("run", name).exists()] == theirs
+    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert [name for name in [*ours, *theirs] if Path("run.old", name).exists()] == theirs
 
 
 def test_the_file_that_configures_a_run_is_refused_in_its_folder(
@@ -250,6 +272,27 @@ def test_the_file_that_configures_a_run_is_refused_in_its_folder(
         (line,) = capsys.readouterr().err.splitlines()
         assert "expected another folder than that of run/config.toml, found run" in line
         assert files() == before
+
+
+@pytest.mark.parametrize("place", ["run", "run/sub", "run.old", "run.old/figures"])
+def test_what_is_read_is_not_renamed_or_removed(
+    place: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file of the user in the folder, or any in what an earlier overwrite left."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    Path(place).mkdir(exist_ok=True, parents=True)
+    Path(place, "mine.toml").write_text("coil_mm = 3.0\n")
+    Path(place, "code.py").write_text(SLOW)
+    Path("plan.toml").write_text(
+        f'experiment = "{place}/code.py:trial"\nplan = "grid"\n[vary]\nx = [0.5]\n'
+    )
+    before = files(".")
+    for words in (["springs", "--config", f"{place}/mine.toml"], ["study", "plan.toml"]):
+        more = ["--trust-code"] if words[0] == "study" else []
+        assert main([*words, *more, "--out", "run", "--overwrite"]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"expected another folder than that of {place}/" in line
+        assert files(".") == before
 
 
 def test_a_run_directory_reads_and_writes_only_its_own(tmp_path: Path) -> None:
@@ -292,40 +335,87 @@ def test_overwrite_takes_a_run_of_ours_alone(
     assert [path.name for path in files("theirs")] == ["mine.png"]
 
 
-@pytest.mark.parametrize("more", [["--overwrite"], ["--resume"]])
-def test_what_somebody_laid_into_a_run_stays_there(more: list[str]) -> None:
-    theirs = ["notes.txt", "figures/mine.png", "logs/of-the-robot.mcap"]
-    for name in theirs:
+def test_a_link_to_a_run_is_not_renamed(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("link").symlink_to("run")
+    before = files(".")
+    assert main(["springs", "--out", "link", "--overwrite"]) == 2
+    assert "expected a folder to rename, found a link" in capsys.readouterr().err
+    assert files(".") == before
+
+
+THEIRS = ["notes.txt", "frames.csv", "figures/mine.png", "logs/of-the-robot.mcap", "sub/run.txt"]
+
+
+def lay_theirs() -> None:
+    for name in THEIRS:
         Path("run", name).parent.mkdir(exist_ok=True)
         Path("run", name).write_text("mine")
-    words = ["wall", "--trials", "1", "--profiles", "descending", "--workers", "1", "--out", "run"]
-    code = main([*words, *more])
-    assert [Path("run", name).read_text() for name in theirs] == ["mine"] * 3
-    if more == ["--overwrite"]:
-        assert code == 0
-        assert not Path("run/logs/descending-0.mcap").exists()
-        assert main([*words, "--no-figures", "--overwrite"]) == 0
-        assert [path.name for path in Path("run/figures").iterdir()] == ["mine.png"]
-        assert [Path("run", name).read_text() for name in theirs] == ["mine"] * 3
 
 
-def test_a_file_of_somebody_with_the_name_of_one_of_a_run_is_not_replaced(
-    capsys: pytest.CaptureFixture[str],
+def test_what_somebody_laid_into_a_run_stays_where_it_goes_on() -> None:
+    lay_theirs()
+    Path("run/frames.csv").unlink()  # a run writes that name, so it would not go on
+    assert main([*WALL, "--out", "run", "--resume"]) == 0
+    assert all(Path("run", name).exists() for name in THEIRS if name != "frames.csv")
+
+
+@pytest.mark.parametrize("name", [*THEIRS, "sub", "link"])
+def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
+    name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("run/frames.csv").write_text("mine")
-    before = files()
-    assert main([*WALL, "--out", "run", "--overwrite"]) == 2
-    assert "found frames.csv, which is of none" in capsys.readouterr().err
-    assert files() == before
-    Path("run/frames.csv").unlink()
-    figure = Path("run/figures/trials.svg")
-    figure.parent.mkdir()
-    figure.write_text("mine")
-    with (
-        pytest.raises(OutputError, match="found one of somebody else"),
-        RunDirectory.create("wall", "run", overwrite=True) as run,
-    ):
-        run.write("figures/trials.svg", "another")
+    if name == "link":
+        Path("run/link").symlink_to("result.json")
+    elif name == "sub":
+        Path("run/sub").mkdir()
+    else:
+        Path("run", name).parent.mkdir(exist_ok=True)
+        Path("run", name).write_text("mine")
+    before = contents("run")
+    words = ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    assert main(words) == 0
+    assert contents("run.old") == before
+    assert Path("run.old", name).exists()
+    capsys.readouterr()
+    everything = files(".")
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "run.old: expected an old run alone" in line
+    assert line.endswith("which no run wrote; move run.old away")
+    assert files(".") == everything
+    Path("run.old").rename("saved")
+    assert main(words) == 0
+
+
+@pytest.mark.parametrize("kind", ["file", "link", "their folder", "live run"])
+def test_a_name_old_that_is_no_old_run_is_refused(
+    kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, words = Path("run.old"), ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    with contextlib.ExitStack() as live:
+        if kind == "file":
+            old.write_text("mine")
+        elif kind == "link":
+            shutil.copytree("run", "elsewhere")
+            old.symlink_to("elsewhere")
+        elif kind == "their folder":
+            old.mkdir()
+            (old / "result.json").write_text("{}")
+        else:
+            live.enter_context(RunDirectory.create("springs", old)).keep()
+        before = files(".")
+        assert main(words) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert ("found another process" if kind == "live run" else "move run.old away") in line
+        assert files(".") == before
+
+
+def test_a_run_writes_over_no_file_of_somebody() -> None:
+    figure = Path("new/figures/trials.svg")
+    with RunDirectory.create("wall", "new") as run:
+        figure.parent.mkdir()
+        figure.write_text("mine")
+        with pytest.raises(OutputError, match="found one of somebody else"):
+            run.write("figures/trials.svg", "another")
     assert figure.read_text() == "mine"
 
 
@@ -335,6 +425,10 @@ def test_a_list_leads_to_no_file_outside_its_folder() -> None:
     Path("elsewhere/secret.txt").write_text("of somebody")
     Path("run/behind").symlink_to(Path("elsewhere").absolute())
     listed(Path("run"), "../secret.txt", str(Path("secret.txt").absolute()), "behind/secret.txt")
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    words = ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    assert main(words) == 0
+    assert main(words) == 2  # the link is in the old run
+    Path("run.old/behind").unlink()
+    assert main(words) == 0
     assert Path("secret.txt").exists()
     assert Path("elsewhere/secret.txt").exists()

@@ -290,6 +290,7 @@ BAD = {
     "flag": (SITES, '<option><flag gravity="disable"/></option>', "no <flag>"),
     "include": (SITES + '<include file="/etc/passwd"/>', "", "no <include>"),
     "extension": (SITES, '<extension><plugin plugin="x"/></extension>', "no <extension>"),
+    "attach": (SITES + '<attach model="x" prefix="y"/>', "", "could not find model 'x'"),
     "memory": (SITES, '<size memory="200G"/>', "no <size>"),
     "absolute": (SITES, '<asset><mesh file="/etc/passwd"/></asset>', "folder of the model"),
     "above": (SITES, '<asset><mesh file="../x.obj"/></asset>', "folder of the model"),

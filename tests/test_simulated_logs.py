@@ -7,9 +7,10 @@ import math
 import os
 import subprocess
 import sys
+import threading
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -33,9 +34,9 @@ from antennate.sim import gl
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
-from antennate.telemetry.apart import LogProcess
+from antennate.telemetry.log_queue import LogQueue
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.rows import HEAD, RowLog
+from antennate.telemetry.rows import HEAD, RowLog, Rows
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
@@ -266,7 +267,8 @@ def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
     [
         (["--log", "a.csv"], "--log: expected a name with .mcap, found a.csv"),
         (["--video", "a.mcap"], "--video: expected a name with .mp4, found a.mcap"),
-        (["--log", "here.mcap"], "--log: expected no such file yet, found here.mcap"),
+        (["--log", "here.mcap"], "expected a log that does not exist yet, found here.mcap"),
+        (["--log", "nowhere/a.mcap"], "expected a folder to write nowhere/a.mcap"),
         (["--video", "nowhere/a.mp4"], "--video: expected a folder for nowhere/a.mp4"),
         (["--servos", "1:xl330-m288", "--log", "a.mcap"], "--log: expected none beside --servos"),
     ],
@@ -387,18 +389,50 @@ def rows(count: int) -> Floats:
     return found
 
 
-def test_a_log_of_another_process_is_that_of_this_one(tmp_path: Path) -> None:
+def in_rows(ticks: Sequence[Floats]) -> Rows:
+    """What `RowLog` writes of such rows."""
+    return np.array(ticks), {}
+
+
+def test_a_log_behind_a_queue_is_the_same(tmp_path: Path) -> None:
     kept = rows(700)
-    with RowLog[Floats](tmp_path / "here.mcap", HEADER, lambda ticks: (np.array(ticks), {})) as log:
+    with RowLog[Floats](tmp_path / "here.mcap", HEADER, in_rows) as log:
         for row in kept:
             log.add(row)
-    with LogProcess(tmp_path / "there.mcap", HEADER) as apart:
+    with LogQueue(RowLog[Floats](tmp_path / "there.mcap", HEADER, in_rows)) as queue:
         for row in kept:
-            apart.add(row)
-    assert apart.close() == ""
+            queue.add(row)
+    assert queue.close() == ""
     with LogReader(tmp_path / "here.mcap") as one, LogReader(tmp_path / "there.mcap") as other:
         assert [tick.pack() for tick in one] == [tick.pack() for tick in other]
         assert one.end == other.end == 700
+
+
+def test_a_tick_never_waits_for_a_slow_disk_and_those_without_room_are_counted(
+    tmp_path: Path,
+) -> None:
+    """The queue holds 30 s of ticks; what comes in order before and after stays in order."""
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slowly(ticks: Sequence[Floats]) -> Rows:
+        begun.set()
+        go_on.wait(60)
+        return np.array(ticks), {}
+
+    kept = rows(3500)
+    queue = LogQueue(RowLog[Floats](tmp_path / "log.mcap", HEADER, slowly))
+    queue.add(kept[0])
+    assert begun.wait(60)
+    begin = time.monotonic()
+    for row in kept[1:]:
+        queue.add(row)
+    assert time.monotonic() - begin < 1.0
+    go_on.set()
+    assert queue.close() == "499 ticks are missing in it"
+    assert queue.dropped == 499
+    with LogReader(tmp_path / "log.mcap") as log:
+        assert [tick.now for tick in log] == pytest.approx(kept[:3001, 0])
+        assert log.end == 3001
 
 
 SLOW = f"""
@@ -450,26 +484,21 @@ def test_nothing_keeps_a_log_from_being_written_to_its_end(
 
 
 def test_a_log_whose_simulation_is_killed_is_not_closed(tmp_path: Path) -> None:
-    """What was handed over is read; a second log at the same place is refused."""
+    """All but the last half of a second is read; a second log at the same place is refused."""
     code = f"""
-import os, signal, sys
+import os, signal, sys, time
 sys.path[:0] = {sys.path!r}
-from test_simulated_logs import HEADER, LogProcess, Path, rows
-log = LogProcess(Path({str(tmp_path / "log.mcap")!r}), HEADER)
+from test_simulated_logs import HEADER, LogQueue, Path, RowLog, in_rows, rows
+log = LogQueue(RowLog(Path({str(tmp_path / "log.mcap")!r}), HEADER, in_rows))
 for row in rows(300):
     log.add(row)
+time.sleep(0.5)
 os.kill(os.getpid(), signal.SIGKILL)
 """
     done = subprocess.run([sys.executable, "-c", code], timeout=120, check=False)
     assert done.returncode == -9
-    found: list[float] = []
-    for _ in range(100):  # the other process ends by itself
-        with LogReader(tmp_path / "log.mcap") as log:
-            found = [tick.now for tick in log]
-            assert log.end is None
-        if len(found) == 300:
-            break
-        time.sleep(0.1)
-    assert found == pytest.approx(0.01 * np.arange(1, 301))
+    with LogReader(tmp_path / "log.mcap") as log:
+        assert [tick.now for tick in log] == pytest.approx(0.01 * np.arange(1, 301))
+        assert log.end is None
     with pytest.raises(LogError, match="expected a log that does not exist yet"):
-        LogProcess(tmp_path / "log.mcap", HEADER)
+        RowLog[Floats](tmp_path / "log.mcap", HEADER, in_rows)

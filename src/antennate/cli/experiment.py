@@ -267,8 +267,6 @@ def _end(
     result = outcome.result()
     interrupted = bool(result.get("interrupted"))
     holds_trials = run.store is not None and run.store.holds_trials
-    if options.shard is not None and not interrupted:
-        raise ConfigError(f"--shard: expected trials on workers, found {experiment.name}")
     again = ""
     if argv is not None and interrupted and holds_trials:
         again = go_on(experiment.name, argv, run.path)

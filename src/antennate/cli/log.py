@@ -112,7 +112,7 @@ def _target(path: Path, options: Options) -> Path:
     """The file to write.
 
     Raises:
-        ConfigError: Its name has another ending, or it is a folder or the log itself.
+        ConfigError: Its name has another ending, or it is the log itself.
     """
     endings = _ENDINGS[options.action]
     stem = f"{path.stem}{RECOVERED}" if options.action == "recover" else path.stem
@@ -120,8 +120,6 @@ def _target(path: Path, options: Options) -> Path:
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
     try:
-        if target.is_dir():
-            raise ConfigError(f"--out: expected the name of a file, found the folder {target}")
         if target.exists() and any(p.exists() and target.samefile(p) for p in parts(path)):
             raise ConfigError(f"--out: expected another file than the log, found {target}")
         if _would_continue(target, path):

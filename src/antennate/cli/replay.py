@@ -80,7 +80,8 @@ def command(argv: Sequence[str]) -> int:
     log.require_ticks()
     result = _result(log, found, config)
     if options.out is not None:
-        with folder_for(VIEW, options, config, argv, reads=log.parts) as folder:
+        donor = [log_of(Path(options.donor))] if options.donor else []
+        with folder_for(VIEW, options, config, argv, reads=[*log.parts, *donor]) as folder:
             _keep(folder, path, found)
             say_by_hand(by_hand, folder)
             folder.finish(result)

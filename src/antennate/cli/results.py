@@ -18,7 +18,6 @@ from antennate.errors import BadInputError
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
-from antennate.studies.replaced import settle_if_free
 from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOG, LOGS, require_apart
@@ -31,7 +30,7 @@ class ResultOptions(FromFile):
     """Where the results go."""
 
     out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "replace the results that the folder holds", needs=["--out"])
+    overwrite: bool = option(False, "first rename the folder to FOLDER.old", needs=["--out"])
     json: bool = option(False, "print the content of result.json and nothing else")
 
 
@@ -72,7 +71,7 @@ def folder_for(
         for word in words:
             require_text(flag or view.name, word)
     given = [] if options.config is None else [options.config]
-    require_apart(options.out, config.model_dump(), [*reads, *given])
+    require_apart(options.out, options.overwrite, config.model_dump(), [*reads, *given])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place, tasks=tasks) as folder:
         folder.describe(config, ["antennate", command or view.name, *argv])
@@ -90,8 +89,6 @@ def log_of(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
-    if not any((path / LOGS).glob("*.mcap")):  # to settle would remove those of a killed run
-        settle_if_free(path)
     every = sorted((path / LOGS).glob("*.mcap"))
     logs = [each for each in every if _original(each) not in every]
     logs = logs or [each for each in [path / LOG] if each.exists()]

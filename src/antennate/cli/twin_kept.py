@@ -16,8 +16,7 @@ from antennate.cli.status import write
 from antennate.errors import ConfigError, LogError
 from antennate.files import write_whole
 from antennate.sim.world import World
-from antennate.telemetry.apart import LogProcess
-from antennate.telemetry.twin_log import TwinLog, header_of
+from antennate.telemetry.twin_log import TwinLog
 from antennate.twin.config import Passage, TwinConfig
 from antennate.twin.robot import TwinRobot
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 class KeptOptions:
     """Whether to keep something."""
 
-    log: Path | None = option(None, "keep a log, .mcap; another process writes it", "FILE")
+    log: Path | None = option(None, "keep a log, .mcap", "FILE")
     video: Path | None = option(None, "film it, .mp4; drawn when it has ended", "FILE")
 
 
@@ -47,7 +46,7 @@ class Kept:
         watchers: What is to be called with the world after each tick.
 
     Raises:
-        ConfigError: A file has another ending, or exists.
+        ConfigError: A file has another ending, or a film exists.
         MissingPackageError: A package of the extra `video` is missing.
         BadInputError: Nothing here can draw.
     """
@@ -55,11 +54,12 @@ class Kept:
     def __init__(self, options: KeptOptions, robot: TwinRobot) -> None:
         self.watchers: list[Callable[[World], None]] = []
         self._options, self._robot = options, robot
-        self._log: LogProcess | None = None
+        self._log: TwinLog | None = None
         self._film: TwinFilm | None = None
-        _require("--log", options.log, ".mcap")
-        _require("--video", options.video, ".mp4")
+        _require_ending("--log", options.log, ".mcap")
+        _require_ending("--video", options.video, ".mp4")
         if options.video is not None:
+            _require_new(options.video)
             from antennate.telemetry.film import require_video  # slow to import
 
             require_video()
@@ -75,9 +75,9 @@ class Kept:
             LogError: The log cannot be begun.
         """
         if self._options.log is not None:
-            log = LogProcess(self._options.log, header_of(config, time.time_ns()), _tell)
-            self._log = log
-            self.watchers.append(TwinLog(log, self._robot, config).take)
+            path, start = self._options.log, time.time_ns()
+            self._log = TwinLog(path, self._robot, config, start, _tell)
+            self.watchers.append(self._log.take)
         if self._options.video is not None:
             from antennate.telemetry.twin_film import TwinFilm  # slow to import
 
@@ -114,20 +114,18 @@ def _tell(failure: str) -> None:
     write(f"log: {failure}; the twin goes on without it\n")
 
 
-def _require(flag: str, path: Path | None, ending: str) -> None:
-    """Check a file that is to be written.
-
-    Raises:
-        ConfigError: It has another ending, exists, or has no folder.
-    """
-    if path is None:
-        return
-    if path.suffix != ending:
+def _require_ending(flag: str, path: Path | None, ending: str) -> None:
+    """Check the name of a file that is to be written."""
+    if path is not None and path.suffix != ending:
         raise ConfigError(f"{flag}: expected a name with {ending}, found {path}")
-    if path.exists():
-        raise ConfigError(f"{flag}: expected no such file yet, found {path}; choose another name")
-    if not path.parent.is_dir():
-        raise ConfigError(f"{flag}: expected a folder for {path}, found none")
+
+
+def _require_new(film: Path) -> None:
+    """Check a film, which is not made before the end."""
+    if film.exists():
+        raise ConfigError(f"--video: expected no such file yet, found {film}; choose another name")
+    if not film.parent.is_dir():
+        raise ConfigError(f"--video: expected a folder for {film}, found none")
 
 
 def _draw(kept: TwinFilm, path: Path) -> None:

@@ -128,7 +128,7 @@ def run(
             script needs `if __name__ == "__main__":`.
         out: A run directory to write: configuration, versions, rows, result and figures; None
             for none.
-        overwrite: Replace a run that `out` holds.
+        overwrite: Rename a folder that holds a run to `out`.old first.
         video: Number of a trial of which `out` gets a film for each condition, None for none.
         on_step: Called with how many of how many parts are done.
         resume: Go on with the run that `out` holds, if there is one; with more trials, too.
@@ -159,7 +159,7 @@ def run(
     pool = Workers(workers, make_engine(engine), shared=environment(found.name, config))
     if out is None:
         return Result(found, config, found.run(config, pool, on_step, lambda row: None))
-    require_apart(out, config.model_dump())
+    require_apart(out, overwrite, config.model_dump())
     place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
     with RunDirectory.create(*place, tasks=found.grows) as directory:
         directory.keeps_store = found.continued or found.grows is not None

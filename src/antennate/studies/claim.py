@@ -1,17 +1,21 @@
-"""How a run takes its directory: nothing of another run goes before this one can begin."""
+"""How a run takes its directory; with `--overwrite`, NAME is renamed to NAME.old first.
+
+The rename is one step, so a process that is killed at any moment leaves the old run whole, under
+one of the two names. A new run that ends with nothing to keep gives the name back.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import fcntl
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from antennate.errors import OutputError
-from antennate.studies.replaced import Replaced, settle
 from antennate.studies.run_files import (
-    CALIBRATION,
     FILES,
     FOLDERS,
     PARTIAL,
@@ -20,14 +24,17 @@ from antennate.studies.run_files import (
     files_of,
     holds_run,
     is_finished,
+    is_folder,
+    listed,
+    old_of,
     others_of,
     outdated,
     place_of,
-    require_replaceable,
+    remove_run,
     sweep,
     writing,
 )
-from antennate.studies.store import STORE, Store, Tasks, open_store
+from antennate.studies.store import STORE, Store, Tasks, nobody_else, open_store
 
 
 class Claim(NamedTuple):
@@ -39,7 +46,8 @@ class Claim(NamedTuple):
         partial: File of finished trials, None for a run that is finished.
         store: Its finished trials if it can be resumed, None otherwise.
         finished: Whether the run is finished.
-        replaced: The run that is replaced, if there is one.
+        old: The new name of the folder that it replaces, if there is one.
+        lock: Handle of the locked list of files, None if the directory is only read.
     """
 
     path: Path
@@ -47,7 +55,8 @@ class Claim(NamedTuple):
     partial: IO[str] | None = None
     store: Store | None = None
     finished: bool = False
-    replaced: Replaced | None = None
+    old: Path | None = None
+    lock: int | None = None
 
 
 def claim(
@@ -65,38 +74,66 @@ def claim(
         _require_folder(place)
         missing = [p for p in (place, *place.parents) if not p.exists()]
         place.mkdir(parents=True, exist_ok=path is not None)
-        for folder in FOLDERS:
-            if (place / folder).is_symlink():
-                raise OutputError(f"expected {place / folder} within its run, found a link")
-        settle(place)
         sweep(place)
-        held, others = files_of(place), others_of(place)
-        goes_on = bool(resume) and not overwrite and not others and (place / STORE) in held
-        if overwrite:
-            require_replaceable(place)
-        elif (held or others) and not goes_on:
-            raise holds_run(place, [*others, *held], resume)
-        stays = CALIBRATION if command == "calibrate" else ""
-        replaced = Replaced(place, held, stays) if held and overwrite else None
+        old = _set_aside(place) if overwrite and any(place.iterdir()) else None
         try:
-            known = (stays,) if stays and held else ()
-            add_to_list(place, (PARTIAL, STORE, ROOM, *known))
-            store = open_store(place, identity, tasks if goes_on else None)
-            sound = store is not None and not store.damaged and store.holds_all(tasks)
-            finished = goes_on and not retry and sound and is_finished(place)
-            for file in outdated(held, stays, finished) if goes_on else ():
-                file.unlink()
-            partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
+            place.mkdir(exist_ok=True)
+            return _begin(place, missing, old, identity, resume, retry, tasks)
         except BaseException:
-            if replaced is not None:
-                replaced.settle()
-            elif files_of(place) == [place / FILES]:
-                (place / FILES).unlink()
             with contextlib.suppress(OSError):
-                for each in missing:
-                    each.rmdir()
+                give_back(place, missing, old)
             raise
-        return Claim(place, missing, partial, store, finished, replaced)
+
+
+def _begin(
+    place: Path,
+    missing: Sequence[Path],
+    old: Path | None,
+    identity: Mapping[str, Any] | None,
+    resume: bool | None,
+    retry: bool,
+    tasks: Tasks | None,
+) -> Claim:
+    """Begin a run in a folder that is there, or go on with the one that it holds."""
+    for folder in FOLDERS:
+        if (place / folder).is_symlink():
+            raise OutputError(f"expected {place / folder} within its run, found a link")
+    held, others = files_of(place), others_of(place)
+    goes_on = bool(resume) and not others and (place / STORE) in held
+    if (held or others) and not goes_on:
+        raise holds_run(place, [*others, *held], resume)
+    add_to_list(place, (PARTIAL, STORE, ROOM))
+    lock = _locked(place / FILES)
+    try:
+        store = open_store(place, identity, tasks if goes_on else None)
+        sound = store is not None and not store.damaged and store.holds_all(tasks)
+        finished = goes_on and not retry and sound and is_finished(place)
+        for file in outdated(held, finished) if goes_on else ():
+            file.unlink()
+        partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")
+    except BaseException:
+        if not goes_on:
+            remove_run(place)
+        os.close(lock)
+        raise
+    return Claim(place, missing, partial, store, finished, old, lock)
+
+
+def give_back(place: Path, created: Sequence[Path], old: Path | None) -> None:
+    """Remove the empty folders of a run that left nothing; the run before has its name again.
+
+    Args:
+        place: The folder.
+        created: Folders that were made for it, the innermost first.
+        old: The name of the run before, if there was one.
+
+    Raises:
+        OSError: A folder is not empty, or cannot be written.
+    """
+    if old is not None:
+        old.rename(place)
+    for folder in created:
+        folder.rmdir()
 
 
 def _require_folder(place: Path) -> None:
@@ -104,3 +141,68 @@ def _require_folder(place: Path) -> None:
     if os.path.lexists(place) and not place.is_dir():
         what = "a file" if place.exists() else "a link to nothing"
         raise OutputError(f"{place}: expected a folder, found {what}; give another --out")
+
+
+def _set_aside(place: Path) -> Path:
+    """Rename a folder that holds a run; its new name."""
+    if listed(place) is None:
+        raise OutputError(
+            f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
+            f"found {min(place.iterdir()).name}, which is of none; choose another folder"
+        )
+    if place.is_symlink():
+        raise OutputError(f"{place}: expected a folder to rename, found a link; give its own name")
+    working = (Path.cwd(), *Path.cwd().parents)
+    if place.name in ("", "..") or {place.resolve(), old_of(place).resolve()} & {*working}:
+        raise OutputError(
+            f"{place}: expected a folder to rename, found the working directory or one above it; "
+            "go to another directory, or choose another folder"
+        )
+    if not os.access(place.parent, os.W_OK):  # before anything is removed
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    with contextlib.ExitStack() as locks:
+        for file in (place / FILES, place / STORE):
+            if file.exists():
+                locks.callback(os.close, _locked(file))
+        _remove_old(old_of(place))
+        return place.rename(old_of(place))
+
+
+def _remove_old(old: Path) -> None:
+    """Remove what an earlier overwrite left under a name, unless it holds anything else.
+
+    An empty folder stays, as a rename replaces it.
+    """
+    if not os.path.lexists(old):
+        return
+    others = [old]
+    if is_folder(old):
+        sweep(old)
+        files = files_of(old)
+        own = {*files, *(folder for file in files for folder in file.parents)}
+        own |= {old / name for name in FOLDERS if files}
+        others = sorted(path for path in old.rglob("*") if path not in own)
+    if others:
+        raise OutputError(
+            f"{old}: expected an old run alone, which --overwrite removes, found {others[0]}, "
+            f"which no run wrote; move {old} away"
+        )
+    if (old / FILES).exists():
+        lock = _locked(old / FILES)
+        try:
+            remove_run(old)
+        finally:
+            os.close(lock)
+
+
+def _locked(file: Path) -> int:
+    """The handle of a locked file; the system frees the lock when this process ends."""
+    lock = os.open(file, os.O_RDWR | os.O_CLOEXEC)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise nobody_else(file.parent) from None
+    except OSError:
+        pass  # a file system without locks
+    return lock

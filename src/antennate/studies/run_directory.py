@@ -3,9 +3,7 @@
 Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are
 appended to `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`,
 which stays where more trials may follow. A directory that
-holds a run is left alone unless told otherwise; then the files of that run are set aside, and go
-once the new one has something to keep, so that nothing old stands beside the new. Only a
-calibration stays until the next one replaces it, so that a robot is never without.
+holds a run is left alone unless told otherwise; then it is renamed to NAME.old first.
 
 ```python
 with RunDirectory.create("tunnel", "runs/mine") as run:
@@ -31,9 +29,8 @@ from antennate.files import writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
 from antennate.studies import dates, formats
-from antennate.studies.claim import Claim, claim
+from antennate.studies.claim import Claim, claim, give_back
 from antennate.studies.processor import processor
-from antennate.studies.replaced import settle_if_free
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -52,6 +49,7 @@ from antennate.studies.run_files import (
     listed,
     read_as,
     remove_described,
+    remove_run,
     writing,
 )
 from antennate.studies.store import Tasks
@@ -74,7 +72,7 @@ class RunDirectory:
     def __init__(self, taken: Claim):
         self.path, self.store, self.keeps_store = taken.path, taken.store, False
         self._finished, self.untouched = taken.finished, taken.finished
-        self._created, self._replaced = taken.created, taken.replaced
+        self._created, self._old, self._lock = taken.created, taken.old, taken.lock
         self._partial = taken.partial
         self._kept = taken.partial is None
         self._described: dict[str, str] = {}
@@ -96,7 +94,8 @@ class RunDirectory:
         Args:
             command: Name of the experiment or command.
             path: The directory; the next free `runs/COMMAND-N` if not given.
-            overwrite: Replace the run that it holds, once this one has something to keep.
+            overwrite: If it holds a run, rename it to NAME.old first. A NAME.old that holds only a
+                run is removed before. If the new run leaves nothing, the name is given back.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
             resume: Go on with the run that it holds, if there is one. Of one that is finished only
                 files that are missing are written, and the report with them. None if `command`
@@ -109,7 +108,7 @@ class RunDirectory:
             BadInputError: The run that is to go on is another one, the path is none, or the command
                 has a name that no folder can have.
             OutputError: It cannot be made or written to, it holds another run, or another process
-                works on it.
+                works on it; or, to overwrite it, it holds no run, or NAME.old holds anything else.
         """
         return cls(claim(command, path, overwrite, identity, resume, retry, tasks))
 
@@ -121,7 +120,6 @@ class RunDirectory:
             BadInputError: It holds no run, or the path is none.
         """
         place = checks.path("path", path)
-        settle_if_free(place)
         if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
         return cls(Claim(place))
@@ -251,12 +249,8 @@ class RunDirectory:
             self._close_store(remove=not self.keeps_store)
 
     def keep(self) -> None:
-        """Let it stay when the run ends, in place of the run that it held before."""
+        """Let it stay when the run ends."""
         self._kept = True
-        if self._replaced is not None:
-            with writing(self.path):
-                self._replaced.forget()
-            self._replaced = None
 
     def keep_logs(self) -> None:
         """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
@@ -353,17 +347,15 @@ class RunDirectory:
         kept = self._kept or (self.store is not None and self.store.holds_trials)
         self._close_store(remove=not kept)
         if kept:
-            with contextlib.suppress(OutputError):
-                self.keep()
             if self._partial is not None:
                 with contextlib.suppress(OSError):
                     self._partial.close()
-            return
-        with contextlib.suppress(OSError, OutputError):
-            self._drop_partial()
-            self._give_room()
-            remove_described(self.path)
-            if self._replaced is not None:
-                self._replaced.settle()
-            for path in self._created:
-                path.rmdir()
+        else:
+            with contextlib.suppress(OSError, OutputError):
+                self._drop_partial()
+                self._give_room()
+                (remove_described if self._old is None else remove_run)(self.path)
+                give_back(self.path, self._created, self._old)
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None

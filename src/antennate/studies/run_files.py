@@ -1,7 +1,7 @@
 """The names of the files of a run, and which of them a folder holds.
 
 `files.txt` lists the files that a run writes, each before it is made. Without that list a folder
-holds no run of this program, and nothing in it is replaced.
+holds no run of this program, and is never overwritten.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
-from antennate.studies.identity import texts
+from antennate.studies.identity import code_named, texts
 from antennate.studies.store import STORE
 from antennate.telemetry.parts import MOST_PARTS, part
 
@@ -29,7 +29,7 @@ SHARD = "shard.json"
 CONFIG, VERSIONS, COMMAND = "config.toml", "versions.json", "command.txt"
 FILES = "files.txt"
 """The list of the files of the run."""
-_TITLE = "# Files that this run wrote. --overwrite replaces these alone."
+_TITLE = "# Files that this run wrote."
 FOLDERS = FIGURES, FILMS, LOGS = "figures", "films", "logs"
 """Folders of figures (svg, png), films (mp4) and logs of trials (mcap)."""
 BY_HAND = "by-hand.txt"
@@ -66,7 +66,7 @@ def listed(place: Path) -> list[str] | None:
             title, *names = file.read(LARGEST).decode().splitlines() or [""]
     except (OSError, UnicodeDecodeError):
         return None
-    return list(dict.fromkeys(names)) if title == _TITLE else None
+    return list(dict.fromkeys(names)) if title.startswith(_TITLE) else None
 
 
 def add_to_list(place: Path, names: Iterable[str]) -> None:
@@ -75,11 +75,13 @@ def add_to_list(place: Path, names: Iterable[str]) -> None:
     Raises:
         OSError: It cannot be written.
     """
-    if not os.path.lexists(place / FILES):
-        write_whole(place / FILES, f"{_TITLE}\n".encode())
     known = listed(place) or ()
+    lines = "".join(f"{name}\n" for name in names if name not in known).encode()
+    if not os.path.lexists(place / FILES):
+        write_whole(place / FILES, f"{_TITLE}\n".encode() + lines)
+        return
     with (place / FILES).open("ab", buffering=0) as file:
-        file.write("".join(f"{name}\n" for name in names if name not in known).encode())
+        file.write(lines)
 
 
 def files_of(place: Path) -> list[Path]:
@@ -105,20 +107,6 @@ def others_of(place: Path) -> list[Path]:
     return [path for path in paths if os.path.lexists(path) and path not in own]
 
 
-def require_replaceable(place: Path) -> None:
-    """Check that a directory is empty, or that all that would be replaced is of its run.
-
-    Raises:
-        OutputError: It holds files of somebody else.
-    """
-    others = others_of(place) if listed(place) is not None else sorted(place.iterdir())
-    if others:
-        raise OutputError(
-            f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
-            f"found {others[0].name}, which is of none; choose another folder"
-        )
-
-
 def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputError:
     """The error of a directory that holds another run, whose files are given.
 
@@ -141,23 +129,44 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputE
     )
 
 
+def old_of(place: Path) -> Path:
+    """The new name of a folder that is overwritten."""
+    return place.parent / f"{place.name}.old"
+
+
 def require_apart(
-    out: str | Path | None, config: Mapping[str, Any], reads: Iterable[Path] = ()
+    out: str | Path | None,
+    overwrite: bool,
+    config: Mapping[str, Any],
+    reads: Iterable[Path] = (),
 ) -> None:
-    """Check that what a run reads does not go with the run that its folder holds.
+    """Check that what a run reads stays where it is when the run takes its folder.
 
     Args:
         out: The folder.
+        overwrite: Whether it is renamed, and what an earlier overwrite left is removed.
         config: The configuration, with names of files.
         reads: More files.
 
     Raises:
-        OutputError: It would.
+        OutputError: It would go.
     """
-    held = files_of(Path(out)) if out is not None and Path(out).is_dir() else []
-    for path in (*reads, *map(Path, texts(config))) if held else ():
-        if any(is_same(path, each) for each in held):
+    held = files_of(Path(out)) if out is not None else []
+    if out is None or not held:
+        return
+    place = Path(out).resolve()
+    moved = {place, old_of(place)} if overwrite else set()
+    for path in (*reads, *map(Path, texts(config)), *map(Path, code_named(config))):
+        if any(is_same(path, file) for file in held) or moved & _folders_of(path):
             raise OutputError(f"expected another folder than that of {path}, found {out}")
+
+
+def _folders_of(path: Path) -> set[Path]:
+    """All folders that a file lies in; none if there is no such file."""
+    try:
+        return set(path.resolve().parents) if path.is_file() else set()
+    except (OSError, ValueError, RuntimeError):  # not even a name of one
+        return set()
 
 
 def is_same(path: Path, other: Path) -> bool:
@@ -168,18 +177,16 @@ def is_same(path: Path, other: Path) -> bool:
         return False
 
 
-def outdated(held: Sequence[Path], stays: str, finished: bool) -> list[Path]:
+def outdated(held: Sequence[Path], finished: bool) -> list[Path]:
     """Which of the files that a directory holds go before a run goes on.
 
     Args:
         held: Those files.
-        stays: Name of a file that stays until it is replaced.
         finished: Whether the run is finished, so that its files stay.
     """
     if finished:
         return [file for file in held if file.name in (PARTIAL, ROOM)]
-    stay = (STORE, FILES, stays)
-    return [file for file in held if file.parent.name != LOGS and file.name not in stay]
+    return [file for file in held if file.parent.name != LOGS and file.name not in (STORE, FILES)]
 
 
 def sweep(place: Path) -> None:
@@ -189,6 +196,24 @@ def sweep(place: Path) -> None:
     for folder in FOLDERS:
         if is_folder(place / folder):
             remove_abandoned(place / folder, lambda name, f=folder: f"{f}/{name}" in names)
+
+
+def remove_run(place: Path) -> None:
+    """Remove the files of its run from a directory, the list last, and folders that get empty.
+
+    Raises:
+        OSError: A file cannot be removed.
+    """
+    files = files_of(place)
+    folders = {file.parent for file in files} | {place / name for name in FOLDERS}
+    for file in files[:-1]:
+        file.unlink()
+    for folder in sorted(folders - {place}, reverse=True):
+        if is_folder(folder):
+            with contextlib.suppress(OSError):  # it holds files of somebody else
+                folder.rmdir()
+    for file in files[-1:]:
+        file.unlink()
 
 
 def is_finished(place: Path) -> bool:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
-import logging
 import os
 import re
 import time
@@ -28,7 +27,6 @@ from antennate.studies.identity import but_trials, differences
 STORE = "trials.store.jsonl"
 Tasks = Callable[[Mapping[str, Any]], Sequence[Any]]
 """What each task of a configuration is, by its place: the same for any number of trials."""
-_NOTE = logging.getLogger(__name__)
 _SYNC = 1.0
 """Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
@@ -172,19 +170,10 @@ class Store:
             self.records[key] = content
 
     def _keep(self, trial: Mapping[str, Any]) -> None:
-        """Keep a trial and its processor, if that is a new one: a warning tells of another one."""
+        """Keep a trial and its processor, if that is a new one."""
         models = [{"processor": model} for model in self._running]
         self._write(b"".join(map(line, [*models, trial])))
-        for model in self._running:
-            if self.processors:
-                _NOTE.warning(
-                    "%s: trials ran on another model of processor, %s, now also on %s; the same "
-                    "seed may end differently there",
-                    self.path.parent,
-                    " and ".join(self.processors),
-                    model,
-                )
-            self.processors.append(model)
+        self.processors += self._running
         self._running.clear()
 
     def _append(self, data: bytes) -> None:

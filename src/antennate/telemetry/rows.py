@@ -82,6 +82,16 @@ class RowLog(Generic[Taken]):
         if len(self._held) == _MOST or now - self._since >= _PATIENCE:
             self._begin()
 
+    def write(self, ticks: Sequence[Taken]) -> None:
+        """Write ticks at once, in this thread, after those that were added.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.flush()
+        if ticks and not self._forked:
+            self._write(ticks)
+
     def settle(self) -> None:
         """Write what has waited long enough; to be called where no tick may follow for a while.
 

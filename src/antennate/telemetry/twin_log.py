@@ -7,15 +7,18 @@ know. So levels are NaN, contacts UNKNOWN and the maneuver is `UNKNOWN_MANEUVER`
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
-from antennate.telemetry.apart import LogProcess
 from antennate.telemetry.header import TWIN, Header
-from antennate.telemetry.simulated import Decisions, TickRows
+from antennate.telemetry.log_queue import LogQueue
+from antennate.telemetry.rows import RowLog
+from antennate.telemetry.simulated import Decisions, TakenTick, TickRows
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Contact
@@ -31,31 +34,40 @@ class _Unknown:
     maneuver = np.array([UNKNOWN_MANEUVER])
 
 
-class TwinLog:
+class TwinLog(LogQueue[TakenTick]):
     """The log of a twin: its ticks while the physics runs.
 
     Args:
-        log: Writes it.
+        path: A file that does not exist yet.
         robot: The twin.
         config: What is served.
+        start: Time of its beginning [ns], a Unix time.
+        on_failure: As for `LogQueue`.
+
+    Raises:
+        LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, log: LogProcess, robot: TwinRobot, config: TwinConfig) -> None:
-        self._log, self._robot = log, robot
-        self._decisions = Decisions(config.robot, _Unknown())
+    def __init__(
+        self,
+        path: Path,
+        robot: TwinRobot,
+        config: TwinConfig,
+        start: int,
+        on_failure: Callable[[str], None],
+    ) -> None:
+        self._robot, self._decisions = robot, Decisions(config.robot, _Unknown())
         self._rows = TickRows(robot.world, self._decisions)
+        super().__init__(RowLog(path, _header(config, start), self._rows.rows), on_failure)
 
     def take(self, world: World) -> None:
         """Keep a tick, its time that of the twin."""
         robot = self._robot
         frame = AntennaFrame(t=np.array([robot.t]), counts=robot.counts[None])
-        decided = self._decisions.take(frame, robot.command)
-        numbers, beside = self._rows.rows([self._rows.take(decided)])
-        self._log.add(numbers[0], *beside.values())
+        self.add(self._rows.take(self._decisions.take(frame, robot.command)))
 
 
-def header_of(config: TwinConfig, start: int) -> Header:
-    """The header of a twin's log; its time begins at `start` [ns], a Unix time."""
+def _header(config: TwinConfig, start: int) -> Header:
     fields = set(TrialConfig.model_fields) - {"robot"}
     return Header(
         controller=TWIN,

@@ -40,10 +40,6 @@ class Search:
     rows: list[Row] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if self.workers.shard is not None:
-            raise ConfigError(
-                "--shard: expected a run whose trials are known from the start, found design"
-            )
         self.objectives = self.config.objectives()
         self.evaluators = evaluators(self.config)
         self.known: dict[str, Design] = {}

@@ -39,7 +39,7 @@ _MOST_MEMORY = 2 << 30
 """Most memory of that process [bytes]."""
 _NO_MODEL = 3
 """Its exit code if the file is refused with a reason, which is found again and said later."""
-_REFUSED = ("include", "extension", "plugin", "attach", "model", "size")
+_REFUSED = ("include", "extension", "plugin", "model", "size")
 _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 _LARGEST_SIDE = 4096
