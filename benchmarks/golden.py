@@ -162,7 +162,7 @@ def served(folder: Path) -> None:
         while open_ports and take(received, open_ports, 5.0):
             pass
         process.wait(60)
-    (folder / "board.bytes").write_bytes(b"\0".join(frames_of(received[board])))
+    (folder / "board.bytes").write_bytes(b"\0".join(frames_of(bytes(received[board]))))
     (folder / "bus.bytes").write_bytes(received[bus])
 
 
