@@ -159,6 +159,14 @@ def test_killed_before_its_first_trial_the_old_run_is_beside_it() -> None:
     assert len(RunDirectory.open("run").rows()) == 3
 
 
+def test_killed_twice_before_its_first_trial_the_old_run_is_still_there() -> None:
+    before = contents("run")
+    for _ in range(2):
+        Path("begun").unlink(missing_ok=True)
+        killed_once(Path("begun"), slow_study(free=0))
+    assert contents("run.old") == before
+
+
 def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
     before = contents("run")
     killed_once(Path("begun"), slow_study(free=1))

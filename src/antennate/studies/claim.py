@@ -16,10 +16,14 @@ from typing import IO, Any, NamedTuple
 
 from antennate.errors import OutputError
 from antennate.studies.run_files import (
+    CALIBRATION,
     FILES,
     FOLDERS,
+    LOG_PARTS,
     PARTIAL,
+    RESULT,
     ROOM,
+    SHARD,
     add_to_list,
     files_of,
     holds_run,
@@ -34,7 +38,7 @@ from antennate.studies.run_files import (
     sweep,
     writing,
 )
-from antennate.studies.store import STORE, Store, Tasks, nobody_else, open_store
+from antennate.studies.store import STORE, Store, Tasks, nobody_else, open_store, parsed
 
 
 class Claim(NamedTuple):
@@ -164,8 +168,24 @@ def _set_aside(place: Path) -> Path:
         for file in (place / FILES, place / STORE):
             if file.exists():
                 locks.callback(os.close, _locked(file))
+        if is_folder(old_of(place)) and _is_only_begun(place):
+            remove_run(place)  # the run before it stays what can be had back
+            return old_of(place)
         _remove_old(old_of(place))
         return place.rename(old_of(place))
+
+
+def _is_only_begun(place: Path) -> bool:
+    """Whether a folder holds a run that was killed before anything was measured, and no more."""
+    return not others_of(place) and not any(map(_is_measured, files_of(place)))
+
+
+def _is_measured(file: Path) -> bool:
+    if file.name == PARTIAL:
+        return bool(file.stat().st_size)
+    if file.name == STORE:
+        return bool(parsed(file.read_bytes()).records)
+    return file.name in (RESULT, SHARD, CALIBRATION, *LOG_PARTS)
 
 
 def _remove_old(old: Path) -> None:
