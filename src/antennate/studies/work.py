@@ -66,7 +66,6 @@ class Work:
             fail(index, failure) tells of a task that has no result.
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
-        retry: Whether tasks are run again that failed in an earlier process.
         saw: Takes the model of each processor that tasks are run on; engines call it.
     """
 
@@ -77,7 +76,6 @@ class Work:
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
-    retry: bool = False
     saw: Callable[[str], None] = _unseen
 
     def part(self, places: Sequence[int]) -> Part:
