@@ -38,8 +38,8 @@ class Slurm:
     runs. So a job that is preempted and begins again goes on where it was, and one that is killed
     loses the trial that it was at. Whether a job has ended is what submitit says, by `sacct`.
 
-    Jobs are cancelled when the driver ends. Where it is killed they go on, but nobody reads what
-    they finish from then on: the next driver runs it again.
+    Jobs are cancelled when the driver ends. Where it is killed they go on until the next driver
+    removes their files. Nobody reads what they finish meanwhile: it is run again.
 
     Args:
         cluster: slurm, or local for processes of this machine that are given the same.
@@ -133,6 +133,7 @@ class _Driver:
             raise
         finally:
             for job in running:
+                job.file.unlink(missing_ok=True)
                 job.handle.cancel(check=False)
 
     def _submit(self, places: list[int]) -> _Job:
@@ -143,6 +144,7 @@ class _Driver:
         part = self._work.part(places)
         call = Resumable(str(file), identity, part, added_objects(dumps), self._at_once)
         try:
+            file.touch()
             # submitit prints what it raises, and ends jobs of this machine by Ctrl-C, which they
             # would ignore if they came from a driver that a shell has started with `&`
             with contextlib.redirect_stderr(io.StringIO()), on_ctrl_c(signal.default_int_handler):
@@ -157,12 +159,9 @@ class _Driver:
 
     def _take_rows(self, job: _Job) -> None:
         """Take the lines that have come to the file of a job since it was last read."""
-        try:
-            with job.file.open("rb") as file:
-                file.seek(job.read)
-                data = file.read()
-        except FileNotFoundError:  # the job has not begun
-            return
+        with job.file.open("rb") as file:
+            file.seek(job.read)
+            data = file.read()
         data = data[: data.rfind(b"\n") + 1]
         if data:
             self._failed_starts = 0

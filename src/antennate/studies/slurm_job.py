@@ -25,7 +25,8 @@ class Resumable:
     The trials run in a process beside it, so one that crashes or hangs is found as on one machine.
 
     Args:
-        file: Where it keeps what it has finished.
+        file: Where it keeps what it has finished. The driver makes it, and removes it when it needs
+            the job no more: without it the job does nothing.
         identity: The environment of the driver.
         part: Its tasks by place.
         added: Objects that were added to registries in the driver.
@@ -58,16 +59,24 @@ class Resumable:
         Raises:
             WorkerError: The driver has other versions or other code, or nothing can be run here.
         """
+        file = Path(self._file)
+        if not file.exists():
+            return 0
         require_same(self._identity, Path())
-        store = Store(Path(self._file))
+        store = Store(file)
         store.begin(self._identity)
         left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
 
+        def keep(place: int, content: Mapping[str, Any]) -> None:
+            if not file.exists():
+                raise WorkerError("expected a driver that reads what this job finishes, found none")
+            store.append(str(place), content)
+
         def emit(place: int, result: Any) -> None:
-            store.append(str(place), {"result": encoded(result)})
+            keep(place, {"result": encoded(result)})
 
         def fail(place: int, failure: Failure) -> None:
-            store.append(str(place), {"failure": [failure.status, failure.reason]})
+            keep(place, {"failure": [failure.status, failure.reason]})
 
         part, places, size = replace(self._part, tasks=left), list(left), self._at_once
         parts = [places[i : i + size] for i in range(0, len(places), size)]
