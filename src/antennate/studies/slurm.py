@@ -18,11 +18,11 @@ from antennate.errors import ConfigError, OutputError, WorkerError, in_one_line
 from antennate.messages import shortened
 from antennate.studies.codec import decoded
 from antennate.studies.identity import environment
-from antennate.studies.processes import added_objects, on_ctrl_c
+from antennate.studies.processes import on_ctrl_c
 from antennate.studies.slurm_job import Resumable
 from antennate.studies.store import parsed
 from antennate.studies.submitted import require_package
-from antennate.studies.work import Emit, Fail, Failure, Waiting, Work
+from antennate.studies.work import Emit, Fail, Failure, Waiting, Work, added_objects
 
 _LOOK = 0.5
 """How often the driver looks for what its jobs have finished [s]."""

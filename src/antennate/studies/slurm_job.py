@@ -10,10 +10,10 @@ from typing import Any
 
 from antennate.errors import WorkerError
 from antennate.studies.codec import encoded
-from antennate.studies.processes import Packed, Processes
+from antennate.studies.processes import Processes
 from antennate.studies.store import Store
 from antennate.studies.submitted import require_same, work_apart
-from antennate.studies.work import Failure, Part
+from antennate.studies.work import Failure, Packed, Part
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
