@@ -208,7 +208,7 @@ def test_what_slurm_cannot_give_is_one_line(study: Study) -> None:
     every 30 s; the others run meanwhile.
     """
     study.start("timeout_min=60", "slurm_signal_delay_s=0", sleep=300.0, workers=1)
-    study.until(lambda: list(study.jobs.glob("*.jsonl")))
+    study.until(lambda: any(file.stat().st_size for file in study.jobs.glob("*.jsonl")))
     (number,) = study.slurm.running()
     study.slurm.say("scontrol", "update", f"JobId={number}", "EndTime=now+1")
     others = [Study(study.slurm, study.folder / str(place)) for place in range(len(REFUSED))]
