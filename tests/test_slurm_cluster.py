@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -13,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from slurm_cluster import LIMIT, Cluster, NoCluster, cluster
+from slurm_cluster import Cluster, NoCluster, cluster
 
 import antennate
 
@@ -28,15 +27,6 @@ sleep = {{sleep}}
 [vary]
 x = [0.5, 1.5]
 """
-IMPATIENT = """
-import sys
-from antennate.cli import main
-from antennate.studies import slurm_queue
-
-slurm_queue.PATIENCE = 2.0
-sys.exit(main(sys.argv[1:]))
-"""
-"""The command, which waits a short time alone for a SLURM that does not answer."""
 PROGRESS = ("trials: ", "written to ")
 """How lines on stderr begin that are there without a fault."""
 pytestmark = pytest.mark.slow
@@ -78,11 +68,10 @@ class Study:
         self.notes, self.jobs = folder / "notes.txt", folder / "run" / "slurm"
         self.driver: subprocess.Popen[str] | None = None
 
-    def start(self, *slurm: str, sleep: float = 0.4, workers: int = 2, code: str = "") -> None:
+    def start(self, *slurm: str, sleep: float = 0.4, workers: int = 2) -> None:
         (self.folder / "plan.toml").write_text(PLAN.format(sleep=sleep))
-        words = ["-c", code] if code else ["-m", "antennate"]
-        words += ["study", "plan.toml", "--trust-code", "--no-figures", "--out", "run"]
-        words += ["--workers", str(workers), "--engine", "slurm"]
+        words = ["-m", "antennate", "study", "plan.toml", "--trust-code", "--no-figures"]
+        words += ["--out", "run", "--workers", str(workers), "--engine", "slurm"]
         words += ["--slurm", *slurm] if slurm else []
         known = {**self.slurm.known, "PYTHONPATH": source(), "STUDY_NOTES": str(self.notes)}
         pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
@@ -172,20 +161,18 @@ def test_jobs_that_end_too_early_cost_no_trial(
     assert len(study.ended()) == TRIALS
 
 
-def test_jobs_of_a_driver_that_was_killed_are_taken_over(study: Study, table: bytes) -> None:
-    """There are more jobs than cores, so one of them waits."""
+def test_after_a_driver_was_killed_the_same_command_leaves_the_same_table(
+    study: Study, table: bytes
+) -> None:
+    """Its jobs still run; there are more of them than cores, so one of them waits."""
     study.start(workers=3)
-    numbers = study.until_both_run()
+    study.until_both_run()
     assert study.driver is not None
     study.driver.kill()
     study.driver.communicate()
-    notes = [json.loads(path.read_text()) for path in study.jobs.glob("*.job")]
-    assert {note["job"] for note in notes} == set(study.slurm.jobs()) > set(numbers)
     study.start(workers=3)
     assert study.wait() == (0, [])
     assert study.table() == table
-    assert len(study.ended()) == len(set(study.ended())) == TRIALS
-    assert not list(study.jobs.glob("*.job"))
 
 
 def test_ctrl_c_cancels_the_jobs_and_the_same_command_goes_on(study: Study, table: bytes) -> None:
@@ -200,7 +187,8 @@ def test_ctrl_c_cancels_the_jobs_and_the_same_command_goes_on(study: Study, tabl
     study.start()
     assert study.wait() == (0, [])
     assert study.table() == table
-    assert len(study.ended()) == len(set(study.ended())) == TRIALS
+    assert len(set(study.ended())) == TRIALS
+    assert len(study.ended()) <= TRIALS + 2, "each job may have been at a trial"
 
 
 REFUSED = {
@@ -208,8 +196,7 @@ REFUSED = {
     "slurm_colour=red": "Unknown argument 'colour' for executor 'slurm'",
     "timeout_min=soon": 'Parameter "timeout_min" expected type',
     "tasks_per_node=2": "expected jobs of one task, found 2",
-    f"timeout_min={LIMIT + 1}": "found that all wait: SLURM says PartitionTimeLimit",
-    'slurm_setup=["exit 1"]': "found 3 in a row that ended before: SLURM says FAILED",
+    'slurm_setup=["exit 1"]': "found 3 in a row that ended before: FAILED",
 }
 """What SLURM cannot give, and the reason that is told."""
 
@@ -221,7 +208,7 @@ def test_what_slurm_cannot_give_is_one_line(study: Study) -> None:
     every 30 s; the others run meanwhile.
     """
     study.start("timeout_min=60", "slurm_signal_delay_s=0", sleep=300.0, workers=1)
-    study.until(lambda: list(study.jobs.glob("*.jsonl")))
+    study.until(lambda: any(file.stat().st_size for file in study.jobs.glob("*.jsonl")))
     (number,) = study.slurm.running()
     study.slurm.say("scontrol", "update", f"JobId={number}", "EndTime=now+1")
     others = [Study(study.slurm, study.folder / str(place)) for place in range(len(REFUSED))]
@@ -245,24 +232,12 @@ def test_what_slurm_cannot_give_is_one_line(study: Study) -> None:
     )
 
 
-def test_without_a_controller_nothing_hangs_and_nothing_is_lost(study: Study, table: bytes) -> None:
-    """It ends in the middle of a study, and is not there at the beginning of the next."""
-    study.start(sleep=1.5, code=IMPATIENT)
-    study.until_both_run()
+def test_a_controller_that_is_not_there_is_one_line(study: Study) -> None:
     study.slurm.stop_controller()
     try:
+        study.start()
         code, said = study.wait()
-        assert code == 2
-        assert said[-1].startswith("antennate study: error: slurm: expected squeue to answer")
-        assert "its jobs go on" in said[-1]
-        study.start(sleep=1.5)
-        code, said = study.wait()
-        assert code == 2
-        assert len(said) == 1
-        assert "expected squeue to answer" in said[0]
     finally:
         study.slurm.start_controller()
-    study.start(sleep=1.5)
-    assert study.wait() == (0, [])
-    assert study.table() == table
-    assert len(study.ended()) == len(set(study.ended())) == TRIALS
+    assert code == 2
+    assert said[-1].startswith("antennate study: error: slurm: expected a job to be taken, found: ")

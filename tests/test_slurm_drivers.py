@@ -1,21 +1,18 @@
-"""What a driver of SLURM's jobs finds of an earlier one that was killed, with jobs as processes."""
+"""What becomes of trials whose job or driver ends too early, with jobs as processes."""
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from study_trials import trial
 
 import antennate
-from antennate.studies import slurm
-from antennate.studies.identity import environment
-from antennate.studies.work import Part
+from antennate.studies.store import read_store
 
 HERE = Path(__file__).parent
 
@@ -45,33 +42,40 @@ gather(trial, tasks, workers, lambda done, total: None)
 """
 
 
-def driver(notes: Path, seed: int) -> subprocess.Popen[bytes]:
-    """A driver of six trials in one job, in a process that may be killed.
-
-    Its sets are in an order of their own, as those of each process are.
-    """
-    there = {**os.environ, "STUDY_NOTES": str(notes), "PYTHONHASHSEED": str(seed)}
-    return subprocess.Popen([sys.executable, "-c", DRIVER], env=there)
+def driver(notes: Path) -> subprocess.Popen[bytes]:
+    """A driver of six trials in one job, in a process that may be killed."""
+    known = {**os.environ, "STUDY_NOTES": str(notes)}
+    return subprocess.Popen([sys.executable, "-c", DRIVER], env=known)
 
 
-def test_jobs_of_a_driver_that_was_killed_are_taken_over(tmp_path: Path) -> None:
-    """No trial is run twice, though the job goes on while the next driver starts."""
+def until(done: Callable[[], object]) -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + 120.0
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_the_next_driver_runs_again_what_jobs_finish_after_theirs_was_killed(
+    tmp_path: Path,
+) -> None:
+    """The first one's job still runs then: what it finishes changes nothing."""
     pytest.importorskip("submitit")
     notes = tmp_path / "notes.txt"
     Path("run").mkdir()
-    first = driver(notes, 1)
+    first = driver(notes)
     try:
-        end = time.monotonic() + 120.0
-        while not notes.exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        until(notes.exists)
     finally:
         first.kill()
         first.wait()
-    assert list(Path("run/slurm").glob("*.job"))
-    assert driver(notes, 2).wait() == 0
-    assert sorted(notes.read_text().split()[1::2]) == list("012345")
-    assert not list(Path("run/slurm").glob("*.job"))
+    assert driver(notes).wait() == 0
+    assert sorted(set(notes.read_text().split()[1::2])) == list("012345")
+    assert sorted(read_store(Path("run/trials.store.jsonl")).records) == [
+        f"0.{seed}" for seed in range(6)
+    ]
+    assert not list(Path("run/slurm").glob("*.jsonl"))
+    until(lambda: len(list(Path("run/slurm").glob("*_result.pkl"))) == 2)
 
 
 def test_jobs_of_a_driver_in_the_background_end_with_it(tmp_path: Path) -> None:
@@ -87,12 +91,9 @@ def test_jobs_of_a_driver_in_the_background_end_with_it(tmp_path: Path) -> None:
     there = {**os.environ, "STUDY_NOTES": str(notes)}
     background = subprocess.Popen(["bash", "-c", script], env=there)
     try:
-        end = time.monotonic() + 120.0
-        while not notes.exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        (note,) = Path("run/slurm").glob("*.job")
-        job = int(json.loads(note.read_text())["job"])
+        until(notes.exists)
+        (submitted,) = Path("run/slurm").glob("*_submitted.pkl")
+        job = int(submitted.name.partition("_")[0])
         background.terminate()
         assert background.wait(60.0) != 0
     finally:
@@ -101,56 +102,6 @@ def test_jobs_of_a_driver_in_the_background_end_with_it(tmp_path: Path) -> None:
     while Path(f"/proc/{job}").exists():
         assert time.monotonic() < end, "its trials take two minutes"
         time.sleep(0.05)
-
-
-def test_a_job_whose_driver_was_killed_before_it_noted_it_does_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The next driver does not know of it, and gives its tasks to another job."""
-    pytest.importorskip("cloudpickle")
-    monkeypatch.setattr("antennate.studies.slurm_job.NOTED", 0.3)
-    part = Part(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
-    job = slurm.Resumable(str(tmp_path / "a.jsonl"), environment(), part, {}, noted=True)
-    assert job.carry_out() == 0
-    assert not (tmp_path / "a.jsonl").exists()
-    (tmp_path / "a.job").touch()
-    assert job.carry_out() == 1
-
-
-CURED = """
-from pathlib import Path
-
-
-def trial(config, seed):
-    with Path("notes.txt").open("a") as notes:
-        notes.write(f"{seed} ")
-    if seed == 1 and not Path("cured").exists():
-        raise ValueError("not yet")
-    return {"value": seed}
-"""
-
-
-def test_retry_runs_a_trial_again_that_a_job_of_an_earlier_driver_told_as_failed() -> None:
-    pytest.importorskip("submitit")
-    Path("run").mkdir()
-    Path("own.py").write_text(CURED)
-    code = DRIVER.replace("from study_trials", "from own").replace(', "sleep": 0.5', "")
-    first = subprocess.Popen([sys.executable, "-c", code])
-    try:
-        end = time.monotonic() + 120.0
-        while not list(Path("run/slurm").glob("*.job")):
-            assert time.monotonic() < end
-            time.sleep(0.001)
-    finally:
-        first.kill()
-        first.wait()
-    while not list(Path("run/slurm").glob("*_result.pkl")):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-    Path("cured").touch()
-    code = code.replace("store=store", "store=store, retry=True")
-    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
-    assert Path("notes.txt").read_text().split() == [*"012345", "1"]
 
 
 KILLS_ITS_JOB = """

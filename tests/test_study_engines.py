@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import metadata
 from multiprocessing import get_context
@@ -30,8 +30,8 @@ from antennate.cli import main
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import WorkerError
 from antennate.experiments.study.config import StudyConfig
-from antennate.studies import slurm
 from antennate.studies.identity import environment, identity, packages_used
+from antennate.studies.slurm_job import Resumable
 from antennate.studies.store import read_store
 from antennate.studies.submitted import Submitted
 from antennate.studies.work import Part, Work
@@ -120,7 +120,24 @@ def test_jobs_of_slurm_leave_the_same_table(alone: bytes) -> None:
     assert table("jobs", workers=2, engine="slurm-local") == alone
 
 
-def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_path: Path) -> None:
+def job_of(file: Path, part: Part, theirs: Mapping[str, Any] | None = None) -> Resumable:
+    """What a job of SLURM calls, whose driver has made its file."""
+    file.touch()
+    return Resumable(str(file), theirs or environment(), part, {})
+
+
+def test_a_job_whose_driver_needs_it_no_more_runs_no_further_trial(tmp_path: Path) -> None:
+    """Its driver has removed its file: before it begins, or while it runs."""
+    pytest.importorskip("cloudpickle")
+    removes = {place: (str(tmp_path / "job.jsonl"),) for place in range(3)}
+    job = job_of(tmp_path / "job.jsonl", Part(os.unlink, removes, together=False, timeout=60.0))
+    with pytest.raises(WorkerError, match="expected a driver that reads what this job finishes"):
+        job.carry_out()
+    assert job.carry_out() == 0
+    assert not list(tmp_path.glob("*.jsonl"))
+
+
+def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
     """SLURM begins a job again with the tasks that it was first given."""
     pytest.importorskip("cloudpickle")
     notes = tmp_path / "notes.txt"
@@ -128,7 +145,7 @@ def test_a_job_that_begins_again_goes_on_and_its_driver_finds_what_it_did(tmp_pa
     try:
         tasks = {place: ({"x": 1.0}, place) for place in range(3)}
         part = Part(trial, tasks, together=False, timeout=60.0)
-        job = slurm.Resumable(str(tmp_path / "job.jsonl"), environment(), part, {})
+        job = job_of(tmp_path / "job.jsonl", part)
         assert job.carry_out() == 3
         assert job.carry_out() == 0
         assert len(notes.read_text().splitlines()) == 3
@@ -141,13 +158,13 @@ def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path
     pytest.importorskip("cloudpickle")
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
     part = Part(trial, tasks, together=False, timeout=1.0)
-    slurm.Resumable(str(tmp_path / "hung.jsonl"), environment(), part, {}).carry_out()
+    job_of(tmp_path / "hung.jsonl", part).carry_out()
     found = read_store(tmp_path / "hung.jsonl")[1]
     assert found["1"]["failure"] == ["hung", "no result within 1 s"]
     assert found["2"]["result"]
     signals = {0: (signal.SIGTERM,), 1: (signal.SIGUSR2,), 2: (signal.SIGKILL,)}
     part = Part(signal.raise_signal, signals, together=False, timeout=60.0)
-    slurm.Resumable(str(tmp_path / "asked.jsonl"), environment(), part, {}).carry_out()
+    job_of(tmp_path / "asked.jsonl", part).carry_out()
     found = read_store(tmp_path / "asked.jsonl")[1]
     assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
     assert found["2"]["failure"] == ["crashed", "a worker process ended with code -9 in its work"]
@@ -200,7 +217,7 @@ def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
     part = Part(trial, {}, together=False, timeout=60.0)
     old = {**environment(), "versions": {"numpy": "1.0"}}
     with pytest.raises(WorkerError, match=r'numpy "1\.0", now'):
-        slurm.Resumable(str(tmp_path / "job.jsonl"), old, part, {}).carry_out()
+        job_of(tmp_path / "job.jsonl", part, old).carry_out()
 
 
 def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Path) -> None:
@@ -217,9 +234,7 @@ def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Pat
         theirs = environment(command, config)
         theirs["versions"][package] = "0.1"
         with pytest.raises(WorkerError, match=rf'{package} "0\.1", now'):
-            slurm.Resumable(
-                str(tmp_path / "job.jsonl"), theirs, Part(trial, {}, False, 9.0), {}
-            ).carry_out()
+            job_of(tmp_path / "job.jsonl", Part(trial, {}, False, 9.0), theirs).carry_out()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -322,11 +337,11 @@ def test_a_worker_with_another_copy_of_a_named_file_is_refused(tmp_path: Path) -
     file.write_text("def trial(config, seed):\n    return {'value': 1}\n")
     theirs = environment("study", StudyConfig(experiment=f"{file}:trial"))
     part = Part(trial, {}, together=False, timeout=60.0)
-    assert slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, part, {}).carry_out() == 0
+    assert job_of(tmp_path / "job.jsonl", part, theirs).carry_out() == 0
     for edit, told in ((lambda: file.write_text("x = 1\n"), "changed"), (file.unlink, "is gone")):
         edit()
         with pytest.raises(WorkerError, match=rf"own\.py {told}"):
-            slurm.Resumable(str(tmp_path / "job.jsonl"), theirs, part, {}).carry_out()
+            job_of(tmp_path / "job.jsonl", part, theirs).carry_out()
 
 
 def test_a_worker_in_another_folder_is_refused_or_has_the_same_file() -> None:

@@ -215,7 +215,7 @@ def gather(
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout
-        how: dict[str, Any] = {"batched": batched, "shared": workers.shared, "retry": workers.retry}
+        how: dict[str, Any] = {"batched": batched, "shared": workers.shared}
         if workers.store is not None:
             how["saw"] = workers.store.saw
         work = Work(function, tasks, together, timeout, folder, **how)

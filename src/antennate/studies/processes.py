@@ -1,8 +1,9 @@
 """The engine of this machine: worker processes, each of which is known to hold certain tasks.
 
-So the task that kills a worker, or does not end, is found, and the others go on.
-concurrent.futures breaks as a whole when one process dies. Each result is sent at once. Processes
-are started fresh (spawn), leave Ctrl-C to the parent, and end when the parent is gone.
+So the task that kills a worker, or does not end, is found, and the others go on. Each worker has a
+pipe of its own: pools that share one break as a whole when a process dies (CONTRIBUTING.md). Each
+result is sent at once. Processes are started fresh (spawn), leave Ctrl-C to the parent, and end
+when the parent is gone.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import Connection, wait
@@ -23,10 +24,21 @@ from pathlib import Path
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line, raised
-from antennate.lookup import ADDED, NotSent
+from antennate.lookup import NotSent
 from antennate.sim.engine_warnings import dropped
 from antennate.studies.processor import processor
-from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
+from antennate.studies.work import (
+    Emit,
+    Fail,
+    Failure,
+    Packed,
+    Part,
+    Waiting,
+    Work,
+    added_objects,
+    sendable,
+    take_added,
+)
 
 _GUARD = (
     '; a script that uses several workers needs `if __name__ == "__main__":` around what it runs'
@@ -44,8 +56,6 @@ _READY, _BEGUN, _FAILED, _RESULT = range(4)
 """Kinds of messages of a worker."""
 _LAST_WORDS = 1.0
 """Time that a worker whose connection has ended has to end by itself, with its own code [s]."""
-Packed = Mapping[str, Mapping[str, bytes]]
-"""Added objects by registry and name, each pickled."""
 
 
 class Processes:
@@ -59,48 +69,49 @@ class Processes:
 
     def __init__(self, stay: bool = False) -> None:
         self._stay = stay
-        self._left: list[_Worker] = []
+        self._workers: list[_Worker] = []
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
     ) -> None:
         """Run the tasks on `count` processes; see `Engine`."""
         _require_file()
-        checked = sendable(work.tasks)
-        if isinstance(checked, NotSent):
-            raise WorkerError(checked.reason)
+        tasks = sendable(work.tasks)
+        if isinstance(tasks, NotSent):
+            raise WorkerError(tasks.reason)
         work.saw(processor())
-        pool = _Pool(work, parts, added_objects(), emit, fail, self._left)
-        self._left = []
+        pool = _Pool(work, parts, self._workers, emit, fail)
+        stays = False
         try:
             pool.run(min(count, len(parts)))
-            if self._stay:
-                self._left = pool.give_back()
+            stays = self._stay
         except KeyboardInterrupt:
             pool.take_what_came()
             raise
         finally:
-            pool.end()
+            if not stays:
+                self.end()
 
     def end(self) -> None:
-        """End the workers that stayed."""
-        while self._left:
-            self._left.pop().kill()
+        """End all workers."""
+        while self._workers:
+            self._workers.pop().kill()
 
 
 class _Pool:
+    """One call: parts that wait, and the workers that carry them out, as many as are needed."""
+
     def __init__(
         self,
         work: Work,
         parts: Sequence[Sequence[int]],
-        added: Packed,
+        workers: list[_Worker],
         emit: Emit,
         fail: Fail,
-        workers: Sequence[_Worker] = (),
     ) -> None:
-        self._work, self._waiting, self._added = work, Waiting(parts), added
+        self._work, self._waiting, self._workers = work, Waiting(parts), workers
         self._emit, self._fail = emit, fail
-        self._workers = list(workers)
+        self._added = added_objects()
         self._failed_starts = 0
 
     def run(self, count: int) -> None:
@@ -113,14 +124,16 @@ class _Pool:
                     worker.give(self._work, self._waiting.next())
             end = min(worker.deadline for worker in self._workers)
             left = min(max(0.0, end - time.monotonic()), _LONGEST_WAIT)
-            signs: dict[Any, _Worker] = {
-                x: m for m in self._workers for x in (m.connection, m.process.sentinel)
+            owners: dict[Any, _Worker] = {
+                each: worker
+                for worker in self._workers
+                for each in (worker.connection, worker.process.sentinel)
             }
-            told = {signs[x]: None for x in wait(list(signs), left)}
-            dead = {m: None for m in self._workers if not m.process.is_alive()}
-            for worker in told | dead:
+            ready = {owners[each]: None for each in wait(list(owners), left)}
+            dead = {worker: None for worker in self._workers if not worker.process.is_alive()}
+            for worker in ready | dead:
                 self._receive(worker)
-            for worker in [m for m in self._workers if time.monotonic() > m.deadline]:
+            for worker in [each for each in self._workers if time.monotonic() > each.deadline]:
                 self._remove(worker, hung=True)
 
     def _receive(self, worker: _Worker) -> None:
@@ -169,16 +182,6 @@ class _Pool:
             with contextlib.suppress(EOFError, OSError):
                 while worker.connection.poll(_POLL):
                     self._take(worker, *worker.connection.recv())
-
-    def give_back(self) -> list[_Worker]:
-        """The workers that live; they are this pool's no more."""
-        kept, self._workers = self._workers, []
-        return kept
-
-    def end(self) -> None:
-        """End all workers."""
-        for worker in self._workers:
-            worker.kill()
 
 
 class _Worker:
@@ -238,49 +241,6 @@ def _require_file() -> None:
             f"expected a program in a file, which workers import, found {Path(program).name}; save "
             "it, or use one worker"
         )
-
-
-def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
-    """Objects that were added to registries here, for workers; what cannot be sent says so.
-
-    Each is packed apart, so that one that a worker cannot read costs no other.
-
-    Args:
-        dumps: What packs one: `cloudpickle.dumps` also packs what was typed at a prompt.
-    """
-    return {
-        group: {name: dumps(sendable(each)) for name, each in objects.items()}
-        for group, objects in ADDED.items()
-    }
-
-
-def take_added(added: Packed) -> None:
-    """In a worker: know the objects that were added in the driver."""
-    for group, objects in added.items():
-        found = {name: _read(content) for name, content in objects.items()}
-        ADDED.setdefault(group, {}).update(found)
-
-
-def _read(content: bytes) -> Any:
-    """In a worker: an object that was sent, or what says why it cannot be read here."""
-    try:
-        return pickle.loads(content)  # noqa: S301  (the driver wrote it)
-    except Exception as error:  # noqa: BLE001  (an object's own module may raise anything)
-        return NotSent(
-            f"expected an object of your own that workers can import, found {in_one_line(error)}"
-        )
-
-
-def sendable(each: Any) -> Any:
-    """The same object if it can be sent to a worker, else what says why not."""
-    try:
-        pickle.dumps(each)
-    except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)
-        return NotSent(
-            f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
-            "your own has to be defined at the top of a module, or run with one worker"
-        )
-    return each
 
 
 @contextlib.contextmanager

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import signal
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +10,13 @@ from typing import Any
 
 from antennate.errors import WorkerError
 from antennate.studies.codec import encoded
-from antennate.studies.processes import Packed, Processes
+from antennate.studies.processes import Processes
 from antennate.studies.store import Store
 from antennate.studies.submitted import require_same, work_apart
-from antennate.studies.work import Failure, Part
+from antennate.studies.work import Failure, Packed, Part
 
-_LATER = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
+_WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
-NOTED = 60.0
-"""Time within which a network file system shows a job the note of its driver [s]."""
-_RESTARTS = "SLURM_RESTART_COUNT"
-"""Where SLURM tells a job how often it was begun again."""
-_POLL = 0.1
-"""How often the note is looked for [s]."""
 
 
 class Resumable:
@@ -34,27 +25,19 @@ class Resumable:
     The trials run in a process beside it, so one that crashes or hangs is found as on one machine.
 
     Args:
-        file: Where it keeps what it has finished.
-        identity: What is run, and the environment of the driver.
+        file: Where it keeps what it has finished. The driver makes it, and removes it when it needs
+            the job no more: without it the job does nothing.
+        identity: The environment of the driver.
         part: Its tasks by place.
         added: Objects that were added to registries in the driver.
         at_once: How many tasks run together.
-        noted: Whether it does nothing without the note of its driver. A driver that was killed
-            before it wrote the note gives its tasks to another job, and a driver removes the note
-            of a job that has ended; SLURM may begin that once more, if it was asked to before.
     """
 
     def __init__(
-        self,
-        file: str,
-        identity: Mapping[str, Any],
-        part: Part,
-        added: Packed,
-        at_once: int = 1,
-        noted: bool = False,
+        self, file: str, identity: Mapping[str, Any], part: Part, added: Packed, at_once: int = 1
     ) -> None:
         self._file, self._identity, self._part, self._added = file, identity, part, added
-        self._at_once, self._noted = at_once, noted
+        self._at_once = at_once
 
     def __call__(self) -> int | Exception:
         """Carry out what is not in its file yet; how many tasks that was.
@@ -76,24 +59,29 @@ class Resumable:
         Raises:
             WorkerError: The driver has other versions or other code, or nothing can be run here.
         """
-        again = int(os.environ.get(_RESTARTS, "0")) > 0
-        if self._noted and not _comes(note_of(Path(self._file)), 0.0 if again else NOTED):
+        file = Path(self._file)
+        if not file.exists():
             return 0
-        require_same({k: v for k, v in self._identity.items() if k != "work"}, Path())
-        store = Store(Path(self._file))
+        require_same(self._identity, Path())
+        store = Store(file)
         store.begin(self._identity)
         left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
 
+        def keep(place: int, content: Mapping[str, Any]) -> None:
+            if not file.exists():
+                raise WorkerError("expected a driver that reads what this job finishes, found none")
+            store.append(str(place), content)
+
         def emit(place: int, result: Any) -> None:
-            store.append(str(place), {"result": encoded(result)})
+            keep(place, {"result": encoded(result)})
 
         def fail(place: int, failure: Failure) -> None:
-            store.append(str(place), {"failure": [failure.status, failure.reason]})
+            keep(place, {"failure": [failure.status, failure.reason]})
 
         part, places, size = replace(self._part, tasks=left), list(left), self._at_once
         parts = [places[i : i + size] for i in range(0, len(places), size)]
         if left:
-            work = work_apart(part, Path.cwd(), self._added, store.saw, _LATER)
+            work = work_apart(part, Path.cwd(), self._added, store.saw, _WARNINGS)
             Processes().run(work, parts, 1, emit, fail)
         store.close()
         return len(left)
@@ -103,25 +91,3 @@ class Resumable:
         from submitit.helpers import DelayedSubmission
 
         return DelayedSubmission(self)
-
-
-def note_of(file: Path) -> Path:
-    """Where a driver notes the number of the job that writes a file, and what it was given."""
-    return file.with_suffix(".job")
-
-
-def show_new(folder: Path) -> None:
-    """Let a network file system show what others have written in a folder a moment ago."""
-    with contextlib.suppress(OSError):
-        folder.chmod(folder.stat().st_mode)
-
-
-def _comes(path: Path, within: float) -> bool:
-    """Whether a file is there, or comes within some time [s]."""
-    end = time.monotonic() + within
-    while not path.exists():
-        if time.monotonic() > end:
-            return False
-        time.sleep(_POLL)
-        show_new(path.parent)
-    return True

@@ -20,9 +20,18 @@ from typing import Any
 from antennate.errors import MissingPackageError, WorkerError, in_one_line
 from antennate.messages import extra
 from antennate.studies.identity import differences, environment, environment_here
-from antennate.studies.processes import Packed, added_objects, take_added
 from antennate.studies.processor import Processor, processor
-from antennate.studies.work import Emit, Fail, Failure, Part, Waiting, Work
+from antennate.studies.work import (
+    Emit,
+    Fail,
+    Failure,
+    Packed,
+    Part,
+    Waiting,
+    Work,
+    added_objects,
+    take_added,
+)
 
 NO_PLACE = -1
 """Place of what is no result."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,10 +12,13 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from antennate.errors import LogError, WorkerError, in_one_line
+from antennate.lookup import ADDED, NotSent
 from antennate.studies.processor import processor
 
 Emit = Callable[[int, Any], None]
 """Takes the place of a task and its result."""
+Packed = Mapping[str, Mapping[str, bytes]]
+"""Objects that were added to registries, by registry and name, each pickled."""
 RETRIES = 2
 """How often a task is run again whose worker died."""
 
@@ -66,7 +70,6 @@ class Work:
             fail(index, failure) tells of a task that has no result.
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
-        retry: Whether tasks are run again that failed in an earlier process.
         saw: Takes the model of each processor that tasks are run on; engines call it.
     """
 
@@ -77,7 +80,6 @@ class Work:
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
-    retry: bool = False
     saw: Callable[[str], None] = _unseen
 
     def part(self, places: Sequence[int]) -> Part:
@@ -231,3 +233,46 @@ class Here:
         work.saw(processor())
         for part in parts:
             work.part(part).carry_out(emit, fail)
+
+
+def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
+    """Objects that were added to registries here, for workers; what cannot be sent says so.
+
+    Each is packed apart, so that one that a worker cannot read costs no other.
+
+    Args:
+        dumps: What packs one: `cloudpickle.dumps` also packs what was typed at a prompt.
+    """
+    return {
+        group: {name: dumps(sendable(each)) for name, each in objects.items()}
+        for group, objects in ADDED.items()
+    }
+
+
+def take_added(added: Packed) -> None:
+    """In a worker: know the objects that were added in the driver."""
+    for group, objects in added.items():
+        found = {name: _read(content) for name, content in objects.items()}
+        ADDED.setdefault(group, {}).update(found)
+
+
+def _read(content: bytes) -> Any:
+    """In a worker: an object that was sent, or what says why it cannot be read here."""
+    try:
+        return pickle.loads(content)  # noqa: S301  (the driver wrote it)
+    except Exception as error:  # noqa: BLE001  (an object's own module may raise anything)
+        return NotSent(
+            f"expected an object of your own that workers can import, found {in_one_line(error)}"
+        )
+
+
+def sendable(each: Any) -> Any:
+    """The same object if it can be sent to a worker, else what says why not."""
+    try:
+        pickle.dumps(each)
+    except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)
+        return NotSent(
+            f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
+            "your own has to be defined at the top of a module, or run with one worker"
+        )
+    return each
