@@ -106,7 +106,7 @@ class Master(Protocol):
 
 
 class Ours:
-    """`antennate.hardware.dynamixel`."""
+    """`antennate.dxl`."""
 
     def __init__(self, path: str) -> None:
         self._line = SerialPort(path, BAUD)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import signal
@@ -415,6 +416,43 @@ def test_a_name_old_that_is_no_old_run_is_refused(
         (line,) = capsys.readouterr().err.splitlines()
         assert ("found another process" if kind == "live run" else "move run.old away") in line
         assert files(".") == before
+
+
+@pytest.mark.parametrize("there", ["mine.jpg", "files.txt"])
+def test_beside_a_run_only_begun_a_name_old_is_looked_at_too(there: str) -> None:
+    shutil.rmtree("run")
+    killed_once(Path("begun"), slow_study(free=0))
+    Path("run.old").mkdir()
+    Path("run.old", there).write_text("mine")
+    before = files("run.old")
+    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
+    assert files("run.old") == before
+
+
+def test_what_a_killed_run_has_measured_is_not_lost() -> None:
+    """Its logs count, too."""
+    shutil.copytree("run", "run.old")
+    for path in Path("run").iterdir():
+        if path.name in ("result.json", "trials.csv", "trials.store.jsonl", "report.html"):
+            path.unlink()
+    before = files("run")
+    assert any(path.suffix == ".mcap" for path in before)
+    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert contents("run.old") == {path.relative_to("run"): data for path, data in before.items()}
+
+
+def test_a_rename_that_fails_costs_neither_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree("run", "run.old")
+    before, rename = files("."), Path.rename
+
+    def busy(path: Path, target: str | Path) -> Path:
+        if path == Path("run"):
+            raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", busy)
+    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
+    assert files(".") == before
 
 
 def test_a_run_writes_over_no_file_of_somebody() -> None:

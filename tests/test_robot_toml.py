@@ -88,6 +88,7 @@ def test_a_file_of_another_form_is_refused_and_stays(text: str, tmp_path: Path) 
     [
         ("robot.yaw.zeros = [1] # mine\n", "robot.yaw.zeros = [2] # mine\n"),
         ("robot = {yaw = {zeros = [1]}}\n", "robot = {yaw = {zeros = [2]}}\n"),
+        ("robot = {baud = 57600}\n", "robot = {baud = 57600,yaw = {zeros = [2]}}\n"),
         ("[robot]\n\n[control]\n\n[robot.yaw]\nzeros=[ 1 ]\n", None),
     ],
 )

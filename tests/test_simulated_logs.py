@@ -435,6 +435,17 @@ def test_a_tick_never_waits_for_a_slow_disk_and_those_without_room_are_counted(
         assert log.end == 3001
 
 
+def test_a_log_that_fails_in_any_way_is_told(tmp_path: Path) -> None:
+    def broken(ticks: Sequence[Floats]) -> Rows:
+        raise ValueError("rows of 3")
+
+    told = list[str]()
+    queue = LogQueue(RowLog[Floats](tmp_path / "log.mcap", HEADER, broken), told.append)
+    queue.add(rows(1)[0])
+    assert queue.close() == queue.failure == "ValueError: rows of 3"
+    assert told == [queue.failure]
+
+
 SLOW = f"""
 import os, signal, sys, threading, time
 sys.path[:0] = {sys.path!r}

@@ -23,7 +23,7 @@ from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.safety import torque
 from antennate.hardware.setup.config import ZeroConfig
 from antennate.hardware.setup.person import Quit
-from antennate.hardware.setup.robot_toml import change
+from antennate.hardware.setup.robot_toml import change, require_changeable
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
 from antennate.messages import typed
 from antennate.robots.spec import RobotSpec
@@ -67,6 +67,8 @@ def command(argv: Sequence[str]) -> int:
 
 def _measure(person: TerminalPerson, config: ZeroConfig, orders: Orders, path: Path) -> int:
     robot, clock = config.robot, HostClock()
+    present = by_group(robot, "zeros", robot.zeros)
+    require_changeable(path, present | by_group(robot, "directions", robot.directions))
     with master(opener_of(orders.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
         if left := torque.disable(bus, robot.ids):

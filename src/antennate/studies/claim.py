@@ -10,20 +10,21 @@ import contextlib
 import errno
 import fcntl
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from antennate.errors import OutputError
 from antennate.studies.run_files import (
-    CALIBRATION,
+    COMMAND,
+    CONFIG,
     FILES,
     FOLDERS,
-    LOG_PARTS,
+    JOBS,
     PARTIAL,
-    RESULT,
     ROOM,
-    SHARD,
+    VERSIONS,
     add_to_list,
     files_of,
     holds_run,
@@ -149,10 +150,32 @@ def _require_folder(place: Path) -> None:
 
 def _set_aside(place: Path) -> Path:
     """Rename a folder that holds a run; its new name."""
+    _require_renamable(place)
+    old, spare = old_of(place), place.parent / f".{place.name}.old"
+    with contextlib.ExitStack() as locks:
+        for file in (place / FILES, place / STORE):
+            if file.exists():
+                locks.callback(os.close, _locked(file))
+        if not (place / FILES).exists():
+            raise nobody_else(place)
+        for earlier in (old, spare):
+            _require_run_alone(earlier)
+            if (earlier / FILES).exists():
+                locks.callback(os.close, _locked(earlier / FILES))
+        if (old / FILES).exists() and _is_only_begun(place):
+            remove_run(place)  # the run before it stays what can be had back
+        else:
+            _rename(place, old, spare)
+    return old
+
+
+def _require_renamable(place: Path) -> None:
+    """Refuse a folder without a run of ours, or one that cannot have another name."""
     if listed(place) is None:
+        first = min((path.name for path in place.iterdir()), default="none")
         raise OutputError(
             f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
-            f"found {min(place.iterdir()).name}, which is of none; choose another folder"
+            f"found {first}, which is of none; choose another folder"
         )
     if place.is_symlink():
         raise OutputError(f"{place}: expected a folder to rename, found a link; give its own name")
@@ -162,36 +185,48 @@ def _set_aside(place: Path) -> Path:
             f"{place}: expected a folder to rename, found the working directory or one above it; "
             "go to another directory, or choose another folder"
         )
-    if not os.access(place.parent, os.W_OK):  # before anything is removed
+    if place.is_mount():
+        raise OutputError(
+            f"{place}: expected a folder to rename, found a file system of its own; choose a "
+            "folder in it"
+        )
+    if not os.access(place.parent, os.W_OK):  # before anything is moved
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    with contextlib.ExitStack() as locks:
-        for file in (place / FILES, place / STORE):
-            if file.exists():
-                locks.callback(os.close, _locked(file))
-        if is_folder(old_of(place)) and _is_only_begun(place):
-            remove_run(place)  # the run before it stays what can be had back
-            return old_of(place)
-        _remove_old(old_of(place))
-        return place.rename(old_of(place))
+
+
+def _rename(place: Path, old: Path, spare: Path) -> None:
+    """Rename a folder; what has the new name is removed last, and has it again on an error."""
+    _remove_old(spare)
+    if os.path.lexists(old):
+        old.rename(spare)
+    try:
+        place.rename(old)
+    except OSError:
+        if spare.exists():
+            spare.rename(old)
+        raise
+    _remove_old(spare)
 
 
 def _is_only_begun(place: Path) -> bool:
     """Whether a folder holds a run that was killed before anything was measured, and no more."""
-    return not others_of(place) and not any(map(_is_measured, files_of(place)))
+    known = {*files_of(place)}
+    return all(path in known and _is_description(path) for path in place.rglob("*"))
 
 
-def _is_measured(file: Path) -> bool:
+def _is_description(file: Path) -> bool:
+    """Whether a file of a run says what is to be measured, and not what was."""
     if file.name == PARTIAL:
-        return bool(file.stat().st_size)
+        return not file.stat().st_size
     if file.name == STORE:
-        return bool(parsed(file.read_bytes()).records)
-    return file.name in (RESULT, SHARD, CALIBRATION, *LOG_PARTS)
+        return not parsed(file.read_bytes()).records
+    return file.name in (CONFIG, VERSIONS, COMMAND, ROOM, FILES)
 
 
-def _remove_old(old: Path) -> None:
-    """Remove what an earlier overwrite left under a name, unless it holds anything else.
+def _require_run_alone(old: Path) -> None:
+    """Refuse what an earlier overwrite left under a name if it holds more than a run.
 
-    An empty folder stays, as a rename replaces it.
+    An empty folder is taken, too.
     """
     if not os.path.lexists(old):
         return
@@ -202,17 +237,22 @@ def _remove_old(old: Path) -> None:
         own = {*files, *(folder for file in files for folder in file.parents)}
         own |= {old / name for name in FOLDERS if files}
         others = sorted(path for path in old.rglob("*") if path not in own)
+        if files:
+            others = [path for path in others if old / JOBS not in (path, *path.parents)]
     if others:
         raise OutputError(
             f"{old}: expected an old run alone, which --overwrite removes, found {others[0]}, "
             f"which no run wrote; move {old} away"
         )
-    if (old / FILES).exists():
-        lock = _locked(old / FILES)
-        try:
-            remove_run(old)
-        finally:
-            os.close(lock)
+
+
+def _remove_old(old: Path) -> None:
+    """Remove a run that was replaced, with its folder."""
+    if os.path.lexists(old):
+        shutil.rmtree(old / JOBS, ignore_errors=True)
+        remove_run(old)
+        if is_folder(old):
+            old.rmdir()
 
 
 def _locked(file: Path) -> int:

@@ -19,6 +19,7 @@ from antennate.messages import shortened
 from antennate.studies.codec import decoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import on_ctrl_c
+from antennate.studies.run_files import JOBS
 from antennate.studies.slurm_job import Resumable
 from antennate.studies.store import parsed
 from antennate.studies.submitted import require_package
@@ -58,7 +59,7 @@ class Slurm:
         """Run the tasks on `count` jobs at once; see `Engine`."""
         if work.folder is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
-        folder = work.folder / self.name
+        folder = work.folder / JOBS
         try:
             folder.mkdir(exist_ok=True)
             for file in folder.glob("*.jsonl"):  # of jobs whose driver has ended
@@ -132,9 +133,11 @@ class _Driver:
                 self._take_rows(job)
             raise
         finally:
-            for job in running:
+            for job in running:  # without its file a job runs no further trial
                 job.file.unlink(missing_ok=True)
-                job.handle.cancel(check=False)
+            for job in running:
+                with contextlib.suppress(OSError):
+                    job.handle.cancel(check=False)
 
     def _submit(self, places: list[int]) -> _Job:
         from cloudpickle import dumps  # submitit brings it

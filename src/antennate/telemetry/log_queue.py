@@ -15,12 +15,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, NamedTuple, Self
 
-from antennate.errors import LogError
+from antennate.errors import LogError, in_one_line
 from antennate.hardware.driving.priority import LEVEL, claim
 from antennate.telemetry.rows import RowLog, Taken
 
 _MOST = 3000
-"""Most ticks and events in the queue: 30 s at 100 Hz."""
+"""Most ticks and events in the queue: 30 s at 100 Hz, 3 s at 1000 Hz."""
 _PERIOD = 0.15
 """Time between two writes [s]: with the time that one takes, a kill costs less than 0.5 s."""
 _PATIENCE = 10.0
@@ -93,8 +93,9 @@ class LogQueue(Generic[Taken]):
                 self._write()
             self._write()
             self._log.close()
-        except LogError as error:
-            self.failure = str(error)
+        except Exception as error:  # noqa: BLE001 whatever it is, the log has ended: say so
+            self.failure = str(error) if isinstance(error, LogError) else in_one_line(error)
+            self._queue.clear()
             self._on_failure(self.failure)
 
     def _write(self) -> None:

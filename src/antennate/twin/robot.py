@@ -55,7 +55,7 @@ class TwinRobot:
         watch: Told the world after each tick of the physics.
         battery: Numbers of its supply.
         servos: Its servos in the order of its joints, set up for it by default.
-        pushes: Joints without torque that somebody turns, as `push.Pushes` reads them.
+        pushes: Joints without torque that somebody turns, as `orders.Pushes` reads them.
         mains: Frequency of a hum on its readings [Hz].
 
     Attributes:

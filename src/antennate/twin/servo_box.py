@@ -93,7 +93,7 @@ def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
                 f"that ends in .toml, found {word!r}"
             )
         model, count = match["model"], match["count"]
-        if count and not match["baud"] and model not in MODELS:
+        if count and not match["baud"] and model not in MODELS and not model.endswith(".toml"):
             model, count = f"{model}x{count}", None  # the x is part of its name
         entry: dict[str, Any] = {"id": int(match["id"]), "model": model}
         if match["baud"]:
@@ -108,7 +108,7 @@ class ServoBox:
     Args:
         entries: The servos.
         plugged: Names of those on the bus at first, all by default.
-        pushes: Shafts that somebody turns, as `push.Pushes` reads them.
+        pushes: Shafts that somebody turns, as `orders.Pushes` reads them.
 
     Attributes:
         servos: The servos.

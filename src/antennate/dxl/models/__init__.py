@@ -54,7 +54,11 @@ def _read(path: Path) -> ServoModel:
 
 def _table_of(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """What stands in a file, over what stands in the model that it is `like`."""
-    if path.resolve() in above:
+    try:
+        place = path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a zero byte
+        raise ConfigError(f"{path}: expected a file, found: {error}") from None
+    if place in above:
         raise ConfigError(f"{path}: expected a model that is like another, found one like itself")
     table = dict(_shipped_table(path) if path.parent == _FOLDER else read_toml(path, _LARGEST_FILE))
     like, removed = table.pop("like", None), table.pop("without", [])
@@ -67,7 +71,7 @@ def _table_of(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if not like.endswith(".toml") and not base.exists():
         names = sorted(file.stem for file in _FOLDER.glob("*.toml"))
         raise ConfigError(f"{path}: like: expected one of {', '.join(names)}, found {shown(like)}")
-    found = _over(_table_of(base, (*above, path.resolve())), table)
+    found = _over(_table_of(base, (*above, place)), table)
     registers = dict(checked(found.get("registers"), f"{path}: registers", {}, others=True))
     for name in removed:
         if registers.pop(name, None) is None:

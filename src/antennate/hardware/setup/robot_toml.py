@@ -9,6 +9,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable
 
 from antennate.errors import ConfigError
 from antennate.files import decoded, read_limited, write_whole
@@ -30,11 +31,31 @@ def change(path: Path, values: Mapping[Key, Value]) -> None:
             it is as before.
         OutputError: It cannot be written.
     """
+    text, changed = _read_and_edited(path, values)
+    if changed != text:
+        write_whole(path, changed.encode(), overwrite=True)
+
+
+def require_changeable(path: Path, values: Mapping[Key, Value]) -> None:
+    """Check that keys of a file can be set, before somebody works for their values.
+
+    Args:
+        path: The file.
+        values: As of `change`.
+
+    Raises:
+        ConfigError: As of `change`.
+    """
+    _read_and_edited(path, values)
+
+
+def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[str, str]:
+    """The text of a file, empty if there is none, and that text with keys set."""
     text = ""
     if path.exists():
         text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
     try:
-        changed = edited(text, values)
+        return text, edited(text, values)
     except (TOMLKitError, ValueError) as error:
         keys = ", ".join(
             f"{'.'.join(key)} = {tomlkit.item(value).as_string()}" for key, value in values.items()
@@ -42,8 +63,6 @@ def change(path: Path, values: Mapping[Key, Value]) -> None:
         raise ConfigError(
             f"{path}: expected tables that can be changed, found: {error}; write by hand: {keys}"
         ) from None
-    if changed != text:
-        write_whole(path, changed.encode(), overwrite=True)
 
 
 def edited(text: str, values: Mapping[Key, Value]) -> str:
@@ -58,7 +77,11 @@ def edited(text: str, values: Mapping[Key, Value]) -> str:
         table: MutableMapping[str, Any] = document
         for place, part in enumerate(tables):
             if part not in table:
-                table[part] = tomlkit.table(is_super_table=place + 1 < len(tables))
+                table[part] = (
+                    tomlkit.inline_table()
+                    if isinstance(table, InlineTable)
+                    else tomlkit.table(is_super_table=place + 1 < len(tables))
+                )
             table = table[part]
             if not isinstance(table, MutableMapping):
                 raise ValueError(f"{'.'.join(tables[: place + 1])} = {table!r}")
