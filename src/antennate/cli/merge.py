@@ -39,7 +39,9 @@ class MergeOptions:
 
     shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD", positional=True)
     out: Path | None = option(None, "folder for the run, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "first rename the folder to FOLDER.old", needs=["--out"])
+    overwrite: bool = option(
+        False, "first rename the folder to FOLDER.old, in place of an older one", needs=["--out"]
+    )
     json: bool = option(False, "print the content of result.json and nothing else")
     no_figures: bool = option(False, "draw no figures")
 

@@ -30,7 +30,9 @@ class ResultOptions(FromFile):
     """Where the results go."""
 
     out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(False, "first rename the folder to FOLDER.old", needs=["--out"])
+    overwrite: bool = option(
+        False, "first rename the folder to FOLDER.old, in place of an older one", needs=["--out"]
+    )
     json: bool = option(False, "print the content of result.json and nothing else")
 
 
@@ -78,7 +80,8 @@ def folder_for(
         yield folder
         write_report(folder, view)
         told = "complete already; nothing was run:" if folder.untouched else "written to"
-        sys.stderr.write(f"{told} {folder.path}\n")
+        before = f"; what it held before is in {folder.old}" if folder.old else ""
+        sys.stderr.write(f"{told} {folder.path}{before}\n")
 
 
 def log_of(path: Path) -> Path:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import SupportsIndex, TypeVar
 
 from antennate.types import Floats
 
@@ -91,9 +92,24 @@ class Register:
         """It may be written at all."""
         return self.access == "RW"
 
-    def encode(self, value: int) -> bytes:
-        """The value as it is sent."""
-        return value.to_bytes(self.size, "little", signed=self.signed)
+    def encode(self, value: SupportsIndex) -> bytes:
+        """The value as it is sent.
+
+        Args:
+            value: A whole number, of NumPy too, in the register's unit.
+
+        Raises:
+            TypeError: It is no whole number.
+            OverflowError: The register cannot hold it.
+        """
+        whole = operator.index(value)
+        try:
+            return whole.to_bytes(self.size, "little", signed=self.signed)
+        except OverflowError:
+            sign = "a signed" if self.signed else "an unsigned"
+            raise OverflowError(
+                f"{self.name}: expected {sign} number of {self.size} bytes, found {whole}"
+            ) from None
 
     def decode(self, data: bytes) -> int:
         """The value of `size` bytes."""

@@ -23,12 +23,14 @@ class TimedParams(Params):
 class ScheduleParams(Params):
     """Turns of `schedule`, to one side and to the other, farther and farther."""
 
-    walk_time: float = number(5.0, "s", "assumed: as timed.walk_time", gt=0, le=300)
+    walk_time: float = number(
+        12.0, "s", "fitted: best of 5, 8, 12 and 18 s (docs/science/corridors.md)", gt=0, le=300
+    )
     """Time to walk between two escapes."""
     headings: tuple[_Angle, ...] = number(
-        tuple(math.radians(angle) for angle in (60.0, 60.0, 100.0, 100.0, 130.0)),
+        (0.785, 0.785, 1.571, 1.571),
         "rad",
-        "assumed: both sides of a corner, then both of a sharper one",
+        "fitted: better than 60, 60, 100, 100, 130 deg (docs/science/corridors.md)",
         min_length=1,
         max_length=20,
     )

@@ -67,12 +67,13 @@ class RunDirectory:
         store: Its finished trials if it can be resumed, None otherwise.
         keeps_store: Whether they stay when the run is complete.
         untouched: Whether it was finished already, and no file of it was missing so far.
+        old: The new name of the folder that it replaces, None if it replaces none.
     """
 
     def __init__(self, taken: Claim):
         self.path, self.store, self.keeps_store = taken.path, taken.store, False
         self._finished, self.untouched = taken.finished, taken.finished
-        self._created, self._old, self._lock = taken.created, taken.old, taken.lock
+        self._created, self.old, self._lock = taken.created, taken.old, taken.lock
         self._partial = taken.partial
         self._kept = taken.partial is None
         self._described: dict[str, str] = {}
@@ -95,7 +96,7 @@ class RunDirectory:
             command: Name of the experiment or command.
             path: The directory; the next free `runs/COMMAND-N` if not given.
             overwrite: If it holds a run, rename it to NAME.old first. A NAME.old that holds only a
-                run is removed before. If the new run leaves nothing, the name is given back.
+                run goes then. If the new run leaves nothing, the name is given back.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
             resume: Go on with the run that it holds, if there is one. Of one that is finished only
                 files that are missing are written, and the report with them. None if `command`
@@ -354,8 +355,8 @@ class RunDirectory:
             with contextlib.suppress(OSError, OutputError):
                 self._drop_partial()
                 self._give_room()
-                (remove_described if self._old is None else remove_run)(self.path)
-                give_back(self.path, self._created, self._old)
+                (remove_described if self.old is None else remove_run)(self.path)
+                give_back(self.path, self._created, self.old)
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
