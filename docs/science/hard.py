@@ -65,13 +65,14 @@ def saved(rows: Rows) -> dict[str, Any]:
         plain, ours = (limit * shares(rows[each], both) for each in (PLAIN, name))
         mean, ends = difference95(plain, ours, limit)
         found[name] = {"seconds": mean, "seconds_95": ends}
-    found["share"] = found[OURS]["seconds"] / found[SIDE]["seconds"]
     return found
 
 
 def table(result: dict[str, Any]) -> list[str]:
     """A line for each scene."""
-    names = (OURS, *RIVALS)
+    names = [
+        name for name in (OURS, *RIVALS) if any(name in r["controllers"] for r in result.values())
+    ]
     head = [row("scene", *(f"`{n}`" for n in names), "best blind", "`closed` against it [%]", "p")]
     lines = [*head, row(*["---"] * (len(names) + 4))]
     for scene in HARD:
@@ -79,8 +80,8 @@ def table(result: dict[str, Any]) -> list[str]:
             continue
         cells, pair = result[scene]["controllers"], result[scene]["pair"]
         told = [
-            f"{c['successes']} of {c['trials']}, {100 * c['share']:.0f} %"
-            for c in (cells[name] for name in names)
+            f"{c['successes']} of {c['trials']}, {100 * c['share']:.0f} %" if c else ""
+            for c in map(cells.get, names)
         ]
         low, high = (100 * end for end in pair["ratio_95"])
         ratio = f"{100 * pair['ratio']:+.0f} ({low:+.0f} to {high:+.0f})"
@@ -92,18 +93,21 @@ def table(result: dict[str, Any]) -> list[str]:
 
 
 def sentence(scene: str, result: dict[str, Any]) -> str:
-    """What touch saves in a scene of what the side would."""
-    ours, side = (result["saved"][name] for name in (OURS, SIDE))
+    """What touch saves in a scene, and what the side would."""
+    ours, side = (spoken(result["saved"][name]) for name in (OURS, SIDE))
     cell = result["controllers"][SIDE]
-    spans = [
-        "{:.1f} s ({:.1f} to {:.1f} s)".format(each["seconds"], *each["seconds_95"])
-        for each in (ours, side)
-    ]
     return (
-        f"`{scene}`: `closed` saves {spans[0]} against `timed 5 s`; knowing the side saves "
-        f"{spans[1]} and crosses {cell['successes']} of {cell['trials']}: "
-        f"{100 * result['saved']['share']:.0f} % of it."
+        f"`{scene}`: against `timed 5 s` `closed` {ours}; knowing the side {side} and crosses "
+        f"{cell['successes']} of {cell['trials']}."
     )
+
+
+def spoken(saved: dict[str, Any]) -> str:
+    """Time that is saved or lost, with its interval [s]."""
+    mean, (low, high) = saved["seconds"], saved["seconds_95"]
+    if mean >= 0.0:
+        return f"saves {mean:.1f} s ({low:.1f} to {high:.1f} s)"
+    return f"loses {-mean:.1f} s ({-high:.1f} to {-low:.1f} s)"
 
 
 def main(folders: list[Path]) -> None:
