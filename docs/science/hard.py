@@ -24,7 +24,6 @@ RIVALS = ("schedule", "timed 12 s", "timed 5 s")
 """Blind ones."""
 PLAIN = "timed 5 s"
 """As it is without options: what knowledge of the side is compared with."""
-LEVEL = 0.05
 
 
 def labelled(folder: Path) -> tuple[str, Rows]:

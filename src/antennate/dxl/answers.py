@@ -148,9 +148,9 @@ class PendingRequests:
 
     def free(self, ids: Sequence[int], span: Span) -> int | None:
         """The shortest length that no late answer of these has; None if there is none."""
-        taken = {length for servo in ids for length in self._lengths(servo)}
+        lengths = {length for servo in ids for length in self._lengths(servo)}
         allowed = range(span.length, span.length + span.spare + 1)
-        return next((length for length in allowed if length not in taken), None)
+        return next((length for length in allowed if length not in lengths), None)
 
     def longest(self) -> float:
         """Time until nothing late can come from anybody [s]."""

@@ -136,26 +136,26 @@ class DrivenMotion(Motion):
     def _wanted(self, t: float, period: float) -> Pull | None:
         """Its goal for the shaft, drives as the servo counts; None if friction holds the shaft."""
         if self.mode == PWM_MODE:
-            found = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL_DRIVE)
+            pull = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL_DRIVE)
         elif self.mode == CURRENT_MODE:
             load = self._current()
             if self._stuck(load, period):
                 return None
             turning = abs(self._speed) > CREEP
             against = math.copysign(FRICTION, self._speed if turning else load)
-            found = self._torque(load - against)
+            pull = self._torque(load - against)
         elif self.mode == VELOCITY_MODE:
-            found = self._to_speed(t, period)
+            pull = self._to_speed(t, period)
         else:
-            found = self._to_position(t, period)
+            pull = self._to_position(t, period)
             if self.mode == CURRENT_POSITION_MODE:
                 if self._stuck(self._current(), period):
                     return None
-                found = self._with_current(found, abs(self._current()), period)
+                pull = self._with_current(pull, abs(self._current()), period)
         if self.mode != PWM_MODE:
-            found = found.within(-self.limit, self.limit)
+            pull = pull.within(-self.limit, self.limit)
         slope, before = steepest(self.memory, period), self.sign * self.shaft.duty
-        return found.within(before - slope, before + slope) if slope < math.inf else found
+        return pull.within(before - slope, before + slope) if slope < math.inf else pull
 
     @property
     def _speed(self) -> float:

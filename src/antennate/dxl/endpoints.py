@@ -114,10 +114,10 @@ def _speed(terminal: int) -> int | None:
     """Bits per second, None while nobody has set it."""
     try:
         answer = fcntl.ioctl(terminal, _GET, bytes(struct.calcsize(_LAYOUT)))
-        found = struct.unpack(_LAYOUT, answer)[-1]
+        baud = struct.unpack(_LAYOUT, answer)[-1]
     except OSError:  # not Linux, or not this kind of it
-        found = _NAMED.get(termios.tcgetattr(terminal)[5], 0)
-    return None if found == 50 else found
+        baud = _NAMED.get(termios.tcgetattr(terminal)[5], 0)
+    return None if baud == 50 else baud
 
 
 class TcpEndpoint:

@@ -81,7 +81,7 @@ class Noise:
         if not data or not (self.ber or self.loss):
             return data
         turned = self._rng.random(8 * len(data)) < self.ber
-        kept = self._rng.random(len(data)) >= self.loss
+        arrived = self._rng.random(len(data)) >= self.loss
         self.wrong += int(turned.sum())
-        self.lost += int((~kept).sum())
-        return (np.frombuffer(data, np.uint8) ^ np.packbits(turned))[kept].tobytes()
+        self.lost += int((~arrived).sum())
+        return (np.frombuffer(data, np.uint8) ^ np.packbits(turned))[arrived].tobytes()

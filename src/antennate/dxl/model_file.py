@@ -145,18 +145,18 @@ def checked(
 
 def _register(name: str, entry: Any, where: str) -> Register:
     where = f"{where}: registers.{name}"
-    given = checked(entry, where, _ENTRY)
-    low, high = _range(given.get("range", []), given.get("default"), where)
+    fields = checked(entry, where, _ENTRY)
+    low, high = _range(fields.get("range", []), fields.get("default"), where)
     register = Register(
         name,
-        given["address"],
-        given["size"],
-        given["access"],
-        given.get("unit", ""),
-        given.get("default"),
+        fields["address"],
+        fields["size"],
+        fields["access"],
+        fields.get("unit", ""),
+        fields.get("default"),
         low,
         high,
-        given.get("signed", False),
+        fields.get("signed", False),
     )
     if register.size not in (1, 2, 4) or not 0 <= register.address <= 0xFFFF - register.size:
         raise ConfigError(
@@ -220,11 +220,11 @@ def _require_layout(
     for name, entry in layout.items():
         if entry["address"] >= _COMMON_END or name == "present_load":
             continue
-        found = registers.get(name)
-        if found is None:
+        register = registers.get(name)
+        if register is None:
             raise ConfigError(f"{where}: expected the register {name} of the X series, found none")
         for what, missing in (("address", 0), ("size", 0), ("unit", ""), ("signed", False)):
-            wanted, there = entry.get(what, missing), getattr(found, what)
+            wanted, there = entry.get(what, missing), getattr(register, what)
             if wanted != there:
                 raise ConfigError(
                     f"{where}: registers.{name}: {what}: expected {shown(wanted)}, as all servos "
@@ -272,16 +272,17 @@ def _require_currents(
 
 def _rating(table: Any, registers: Mapping[str, Register], where: str) -> Rating:
     where = f"{where}: rating"
-    given = checked(table, where, dict.fromkeys(_RATINGS, dict))
+    ratings = checked(table, where, dict.fromkeys(_RATINGS, dict))
     values: dict[str, float] = {}
-    for name, entry in given.items():
+    for name, entry in ratings.items():
         place = f"{where}.{name}"
         checked(entry, place, {"value": object, "unit": str, "source": str})
         value, unit = entry["value"], entry["unit"]
         wanted, least, most = _RATINGS[name]
         scale = _REV_PER_MIN if (wanted, unit) == ("rad/s", "rev/min") else 1.0
         if unit != wanted and scale == 1.0:
-            raise ConfigError(f"{place}: unit: expected {wanted}, found {shown(unit)}")
+            units = f"{wanted} or rev/min" if wanted == "rad/s" else wanted
+            raise ConfigError(f"{place}: unit: expected {units}, found {shown(unit)}")
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and least <= value <= most):
             raise ConfigError(
@@ -289,7 +290,7 @@ def _rating(table: Any, registers: Mapping[str, Register], where: str) -> Rating
                 f"{shown(value)}"
             )
         values[name] = float(value) * scale
-    sources = {name: entry["source"] for name, entry in given.items()}
+    sources = {name: entry["source"] for name, entry in ratings.items()}
     return Rating(
         **values, p_gain=float(registers["position_p_gain"].default or 0), sources=sources
     )
