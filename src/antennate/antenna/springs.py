@@ -80,11 +80,7 @@ def spring_stiffness(
 
 
 def _positive(name: str, value: Any, unit: str) -> float | Floats:
-    """A finite number above 0, or an array of such.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """A finite number above 0, or an array of such."""
     if not isinstance(value, list | tuple) and np.ndim(value) == 0:
         return checks.real(name, value, unit, above=0.0)
     found = checks.array(name, value, (), unit)

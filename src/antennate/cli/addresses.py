@@ -213,10 +213,6 @@ def require_bus(bus: str) -> None:
 
 
 def _refuse_udp(bus: str) -> None:
-    """Refuse a servo bus on a network that loses packets.
-
-    Raises:
-        ConfigError: It is behind udp://.
-    """
+    """Refuse a servo bus on a network that loses packets."""
     if is_udp(bus):
         raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")

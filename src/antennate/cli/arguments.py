@@ -115,11 +115,7 @@ def parse(
 
 
 def _refuse_alone(given: Iterable[Option], options: Any) -> None:
-    """Refuse an option that says nothing without another one.
-
-    Raises:
-        ConfigError: One of those given is without what it needs.
-    """
+    """Refuse an option that says nothing without another one."""
     for each in given:
         if not each.is_beside(options):
             needed = " or ".join(each.needs)
@@ -127,11 +123,7 @@ def _refuse_alone(given: Iterable[Option], options: Any) -> None:
 
 
 def _refuse_unread(config: Params, flags: Mapping[tuple[str, ...], Any]) -> None:
-    """Refuse a flag that nothing reads, though a file for several commands may hold its value.
-
-    Raises:
-        ConfigError: There is one.
-    """
+    """Refuse a flag that nothing reads, though a file for several commands may hold its value."""
     why = config.unread_here() if config.shared else {}
     for path, value in changes(config, why):
         parts = tuple(path.split("."))
@@ -146,11 +138,7 @@ TRUST = "trust_code"
 
 
 def _refuse_code(file: Path, base: Mapping[str, Any], flags: Mapping[tuple[str, ...], Any]) -> None:
-    """Run no code because a file of somebody else says so: a flag has to name it.
-
-    Raises:
-        ConfigError: The file names code, and no flag does.
-    """
+    """Run no code because a file of somebody else says so: a flag has to name it."""
     for path, name in () if flags.get((TRUST,)) else _code_in(base, ()):
         if path not in flags:
             deeper = len(path) > 1

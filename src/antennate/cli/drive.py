@@ -262,11 +262,7 @@ def _carry_out(
 
 @contextlib.contextmanager
 def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
-    """Who may stop the drive: signals, a key that is let go, a file that comes.
-
-    Raises:
-        ConfigError: No key can be held, or the file is there already.
-    """
+    """Who may stop the drive: signals, a key that is let go, a file that comes."""
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopOnce(last=True))
         pressed = arrived = None

@@ -193,11 +193,7 @@ def _folder(
 
 
 def _require_viewable(options: Options, config: Params) -> None:
-    """Check that what is run beside a view can be shown: by the engine, in this process.
-
-    Raises:
-        ConfigError: It cannot.
-    """
+    """Check that what is run beside a view can be shown: by the engine, in this process."""
     for name in OF_WORKERS:
         value = getattr(options, name)
         if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
@@ -213,11 +209,7 @@ def _require_viewable(options: Options, config: Params) -> None:
 
 
 def _require_unfinished(options: Options) -> None:
-    """Refuse a shard of what is finished, before the folder is touched.
-
-    Raises:
-        ConfigError: The folder holds a result.
-    """
+    """Refuse a shard of what is finished, before the folder is touched."""
     finished = options.out is not None and (options.out / RESULT).exists()
     if options.shard is not None and finished and not options.overwrite:
         raise ConfigError(
@@ -292,11 +284,7 @@ def _end(
 
 
 def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Table], str]:
-    """Tables and sentence of a result, checked, as an experiment may be anybody's code.
-
-    Raises:
-        BadInputError: It has others.
-    """
+    """Tables and sentence of a result, checked, as an experiment may be anybody's code."""
     try:
         tables, sentence = [*experiment.tables(result)], experiment.sentence(result)
         if isinstance(sentence, str) and all(isinstance(table, Table) for table in tables):

@@ -109,11 +109,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _target(path: Path, options: Options) -> Path:
-    """The file to write.
-
-    Raises:
-        ConfigError: Its name has another ending, or it is the log itself.
-    """
+    """The file to write."""
     endings = _ENDINGS[options.action]
     stem = f"{path.stem}{RECOVERED}" if options.action == "recover" else path.stem
     target = options.out or path.with_name(stem + endings[0])
@@ -160,12 +156,7 @@ def _export(path: Path, target: Path) -> LogReader:
 
 
 def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
-    """A Parquet file with a column for each number, written in groups of rows.
-
-    Raises:
-        MissingPackageError: pyarrow is not installed.
-        OutputError: It cannot be written.
-    """
+    """A Parquet file with a column for each number, written in groups of rows."""
     try:
         arrow: Any = import_module("pyarrow")
         parquet: Any = import_module("pyarrow.parquet")

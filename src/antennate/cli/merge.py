@@ -85,11 +85,7 @@ class _Part(NamedTuple):
 
 
 def _part(text: str) -> _Part:
-    """What the file of a shard says.
-
-    Raises:
-        ValueError: It is no such file.
-    """
+    """What the file of a shard says."""
     match json.loads(text):
         case {"shard": str(name), "of": int(trials)} if (part := shard_of(name)) and trials >= 0:
             return _Part(*part, trials)
@@ -98,11 +94,7 @@ def _part(text: str) -> _Part:
 
 
 def _gathered(shards: Sequence[Path]) -> Shards:
-    """What all shards say is run, and their trials.
-
-    Raises:
-        BadInputError: One is incomplete or damaged, or of another run, or one is missing.
-    """
+    """What all shards say is run, and their trials."""
     identity: Any = None
     records: dict[str, Any] = {}
     processors: list[str] = []
@@ -126,11 +118,7 @@ def _gathered(shards: Sequence[Path]) -> Shards:
 
 
 def _require_whole(shard: Path, part: _Part, found: Set[int]) -> None:
-    """Check that a shard, which was complete, has lost none of its trials.
-
-    Raises:
-        BadInputError: It has.
-    """
+    """Check that a shard, which was complete, has lost none of its trials."""
     sound = sum(place in part.places for place in found)
     if sound < len(part.places):
         raise BadInputError(
@@ -146,9 +134,6 @@ def _require_all(part: _Part, found: Set[int]) -> None:
     Args:
         part: One of them.
         found: Trials of all of them.
-
-    Raises:
-        BadInputError: One is missing.
     """
     each = Counter(place % part.parts for place in found)
     missing = [

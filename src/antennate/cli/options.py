@@ -286,11 +286,7 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
 
 
 def _refuse_commas(option: Option, words: Sequence[str]) -> None:
-    """Refuse a list in one word.
-
-    Raises:
-        ConfigError: There is one.
-    """
+    """Refuse a list in one word."""
     listed = [word for word in words if "," in word and "/" not in word]
     if not listed or option.metavar in _WITH_COMMAS or Path in option.kinds:
         return

@@ -74,11 +74,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _require_no_source(place: Path, runs: Sequence[Path]) -> None:
-    """Check that a page takes the place of no file of a run, but of its page.
-
-    Raises:
-        OutputError: It would.
-    """
+    """Check that a page takes the place of no file of a run, but of its page."""
     files = (file for run in runs for file in files_of(run) if file.name != REPORT)
     if any(is_same(place, file) for file in files):
         raise OutputError(f"--out: expected no file that the page is made of, found {place}")
@@ -100,20 +96,12 @@ def _compared(paths: Sequence[Path]) -> str:
 
 
 def _require_shown(run: RunDirectory) -> None:
-    """Check that a run can be shown, so that the one of two that cannot is named.
-
-    Raises:
-        BadInputError: It cannot.
-    """
+    """Check that a run can be shown, so that the one of two that cannot is named."""
     _made(run, lambda view: f"{view.tables(run.result())} {view.sentence(run.result())}")
 
 
 def _made(run: RunDirectory, make: Callable[[View], str]) -> str:
-    """A page by the view of the command of a run.
-
-    Raises:
-        BadInputError: The command is unknown, or its result has another form.
-    """
+    """A page by the view of the command of a run."""
     name = command_of(run)
     if name in _COMMANDS:
         view = importlib.import_module(f"antennate.cli.{name}").VIEW

@@ -133,12 +133,7 @@ def _servos(
 
 
 def _whole(person: TerminalPerson, assembly: Assembly) -> None:
-    """Ask for the whole robot until all servos answer.
-
-    Raises:
-        Quit: The person leaves it out, or wants to end.
-        BadInputError: No answer can come.
-    """
+    """Ask for the whole robot until all servos answer."""
     while confirm(person, "connect all servos as they are in the robot"):
         states = assembly.look()
         missing = [state.joint.name for state in states if state.note != "answers"]

@@ -78,9 +78,6 @@ def _keys(path: Path | None, silence: float) -> Iterator[Callable[[], list[str]]
     """Yield what says, without waiting, which keys have come.
 
     A gamepad without an event for `silence` [s] counts as released.
-
-    Raises:
-        BadInputError: None can come.
     """
     if path is not None:
         with contextlib.closing(Gamepad(path, HostClock().now, silence)) as pad:

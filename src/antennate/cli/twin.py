@@ -218,11 +218,7 @@ def _serve_servos(
 
 
 def _require_of_servos(config: TwinConfig, places: Places) -> None:
-    """Refuse what is for a robot.
-
-    Raises:
-        ConfigError: There is something.
-    """
+    """Refuse what is for a robot."""
     options = [(name, getattr(places, name), field) for name, field in fields_of(Places).items()]
     given = [(name, value) for name, value, field in options if value != field.default]
     given += list(changes(config, paths_of(TwinConfig)))
@@ -285,11 +281,7 @@ def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpo
 
 
 def _tcp(places: Places) -> tuple[type[TcpEndpoint] | None, str, int]:
-    """The kind of TCP endpoint that is wanted, if any, with its host and port.
-
-    Raises:
-        ConfigError: Both are.
-    """
+    """The kind of TCP endpoint that is wanted, if any, with its host and port."""
     if places.tcp is not None and places.rfc2217 is not None:
         raise ConfigError("--rfc2217: expected none beside --tcp, found both")
     for kind, text in ((TcpEndpoint, places.tcp), (Rfc2217Endpoint, places.rfc2217)):

@@ -107,9 +107,6 @@ def _trial_of(path: Path, header: Header) -> TrialConfig | None:
     """The configuration of a trial, None where nothing tells.
 
     A log may come from elsewhere, so that of a scene in code of its own only the run can tell.
-
-    Raises:
-        AntennateError: It cannot be read.
     """
     if header.arena.get("scene") in SHIPPED:
         return from_values(TrialConfig, {**header.arena, "robot": header.robot})

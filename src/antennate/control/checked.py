@@ -105,11 +105,7 @@ class CheckedController:
         return command
 
     def _require_shapes(self, command: JointCommand) -> None:
-        """Arrays of the right shapes.
-
-        Raises:
-            ControllerError: One is something else.
-        """
+        """Arrays of the right shapes."""
         for owner, shapes in ((command, self._shapes), (self._controller, self._attributes)):
             for name, shape in shapes.items():
                 value = getattr(owner, name)

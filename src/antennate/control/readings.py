@@ -56,11 +56,7 @@ def check_readings(text: str) -> str:
 
 
 def _delay(text: str, seconds: str) -> float:
-    """The delay of `delayed:S` [s].
-
-    Raises:
-        ConfigError: It is no time above 0, or too long.
-    """
+    """The delay of `delayed:S` [s]."""
     try:
         delay = float(seconds)
     except ValueError:

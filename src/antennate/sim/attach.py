@@ -199,11 +199,7 @@ def _sensor_addresses(model: mujoco.MjModel, names: Sequence[str], kind: str, co
 
 
 def _require_no_more(model: mujoco.MjModel, names: Sequence[str], count: int) -> None:
-    """Check that no antenna has more hinges than these.
-
-    Raises:
-        ConfigError: One has.
-    """
+    """Check that no antenna has more hinges than these."""
     known = {model.sensor(i).name for i in range(model.nsensor)}
     for name in names:
         more = sum(f"{name}/angle{i}" in known for i in range(count, model.nsensor))

@@ -144,12 +144,7 @@ def _mismatches_in_a_line() -> Iterator[None]:
 
 
 def _require_scheduler(place: str) -> None:
-    """Require that what answers there greets as a scheduler does; a client would wait for ever.
-
-    Raises:
-        OSError: Nothing answers there.
-        WorkerError: It does not.
-    """
+    """Require that what answers there greets as a scheduler does; a client would wait for ever."""
     head, found = b"", "another program"
     host, _, port = place.removeprefix("tcp://").rpartition(":")
     with socket.create_connection((host.strip("[]"), int(port)), CONNECT) as connection:
@@ -170,11 +165,7 @@ class _Workers:
         self._next, self._none_since, self._told = 0.0, math.inf, False
 
     def __call__(self) -> int:
-        """Threads of all workers; the last number that is known while the scheduler is silent.
-
-        Raises:
-            WorkerError: Our own workers ended, and others do not start.
-        """
+        """Threads of all workers; the last number that is known while the scheduler is silent."""
         now = time.monotonic()
         if now < self._next or self._client.status != "running":
             return self._found

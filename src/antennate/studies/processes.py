@@ -230,11 +230,7 @@ class _Worker:
 
 
 def _require_file() -> None:
-    """Check that workers can import the program, as each begins with that.
-
-    Raises:
-        WorkerError: It was read from standard input, or its file is gone.
-    """
+    """Check that workers can import the program, as each begins with that."""
     program = get_preparation_data("").get("init_main_from_path")
     if program is not None and not Path(program).exists():
         raise WorkerError(
@@ -283,11 +279,7 @@ def _serve(connection: Connection, added: Packed) -> None:
 
 
 def _uninterrupted(function: Callable[..., Any], *given: Any) -> Any:
-    """What a function returns; no Ctrl-C arrives in a worker, so that one is of the user's code.
-
-    Raises:
-        WorkerError: The code raised KeyboardInterrupt.
-    """
+    """What a function returns; no Ctrl-C arrives in a worker, so that one is of the user's code."""
     try:
         return function(*given)
     except KeyboardInterrupt as error:

@@ -247,11 +247,7 @@ def _flat(text: str) -> dict[str, str]:
 
 
 def _table(text: str) -> dict[str, Any]:
-    """The table of a TOML file.
-
-    Raises:
-        BadInputError: It is no TOML.
-    """
+    """The table of a TOML file."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -115,11 +115,7 @@ def simulate(
 
 
 def _log(given: str | Path) -> Path:
-    """The path of the log that is asked for.
-
-    Raises:
-        ConfigError: It is none, or has another ending.
-    """
+    """The path of the log that is asked for."""
     log = checks.path("log", given)
     if log.suffix != ".mcap":
         raise ConfigError(f"log: expected a name with .mcap, found {log}")
@@ -161,11 +157,7 @@ class _Walk:
         self._ticks, self._judge = 0, Judge(start.scene)
 
     def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
-        """Keep a tick; whether there is a next one.
-
-        Raises:
-            ControllerError: What the controller answered is no command.
-        """
+        """Keep a tick; whether there is a next one."""
         if self.checked.faults:
             raise ControllerError(f"tick {self._ticks + 1}: {self.checked.faults[0]}")
         self.recorder.take(frame, command)

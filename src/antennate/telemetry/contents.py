@@ -82,11 +82,7 @@ def contents_of(at: int, data: bytes) -> Chunk | None:
 
 
 def _contents(at: int, data: bytes) -> Chunk:
-    """The same.
-
-    Raises:
-        ValueError, struct.error, McapError: It is not made of records.
-    """
+    """The same."""
     from mcap.data_stream import ReadDataStream
     from mcap.records import Channel, Schema
 

@@ -312,11 +312,7 @@ class LogReader:
         raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")
 
     def _learn(self, chunk: Chunk) -> None:
-        """Take note of the channels that a chunk declares.
-
-        Raises:
-            LogError: A topic of ours has messages of another definition.
-        """
+        """Take note of the channels that a chunk declares."""
         self._schemas |= chunk.schemas
         try:
             self._declared |= by_channel(chunk.channels, self._schemas)

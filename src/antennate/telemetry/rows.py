@@ -144,11 +144,7 @@ class RowLog(Generic[Taken]):
         self._wait()
 
     def _begin(self) -> None:
-        """Let the thread write what is held, once it has written what was held before.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Let the thread write what is held, once it has written what was held before."""
         self._wait()
         held, self._held, self._since = self._held, [], math.inf
         if held and not self._forked:
@@ -160,11 +156,7 @@ class RowLog(Generic[Taken]):
         return os.getpid() != self._process
 
     def _wait(self) -> None:
-        """Wait until the thread has written.
-
-        Raises:
-            LogError: The disk is full or gone, which is told once.
-        """
+        """Wait until the thread has written."""
         if self._writing is not None and not self._forked:
             try:
                 self._writing.result()

@@ -75,12 +75,7 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
 
 
 def _intact(file: BinaryIO, topics: Mapping[int, Topic]) -> Iterator[Chunk]:
-    """The chunks, those that are of use with their messages.
-
-    Raises:
-        OSError: It cannot be read.
-        ValueError: A place is damaged.
-    """
+    """The chunks, those that are of use with their messages."""
     for found in walk(file, _to_read(file, topics)):
         if isinstance(found, Fault):
             raise ValueError(found.reason)
@@ -89,12 +84,7 @@ def _intact(file: BinaryIO, topics: Mapping[int, Topic]) -> Iterator[Chunk]:
 
 
 def _to_read(file: BinaryIO, topics: Mapping[int, Topic]) -> frozenset[int]:
-    """Where the chunks are with events, and the first and the last one with ticks.
-
-    Raises:
-        OSError: It cannot be read.
-        ValueError: The summary says something else.
-    """
+    """Where the chunks are with events, and the first and the last one with ticks."""
     events, ends = list[int](), list[int]()
     for place in places(file):
         held = {topics.get(channel) for channel in place.channels}

@@ -286,11 +286,7 @@ class _NewFile(io.BufferedIOBase):
         return self._at + len(self._held)
 
     def flush(self) -> None:
-        """Hand over what is held.
-
-        Raises:
-            OSError: It was not taken, or only in part.
-        """
+        """Hand over what is held."""
         held, self._held = self._held, bytearray()
         if self._lost:
             raise OSError(self._lost)
@@ -303,11 +299,7 @@ class _NewFile(io.BufferedIOBase):
             raise OSError(f"only {count} of {len(held)} bytes were taken; the disk is full")
 
     def _require_name(self) -> None:
-        """Whether it is still where it was made; a file that was removed goes on to take bytes.
-
-        Raises:
-            _GoneError: It is not.
-        """
+        """Whether it is still where it was made; a file that was removed goes on to take bytes."""
         try:
             there = os.path.samestat(self._path.stat(), os.fstat(self._file))
         except (FileNotFoundError, NotADirectoryError):

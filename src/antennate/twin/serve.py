@@ -50,11 +50,7 @@ class _OrderedServer(Server):
             self._orders.take(lambda text: self._order(text, now))
 
     def _order(self, text: str, now: float) -> None:
-        """Carry out one order.
-
-        Raises:
-            BadInputError: It is none.
-        """
+        """Carry out one order."""
         raise NotImplementedError
 
 

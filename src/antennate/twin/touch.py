@@ -103,11 +103,7 @@ def _read(text: str, antenna: AntennaSpec, timed: bool) -> tuple[int, float, flo
 
 
 def _flex_of(way: float, antenna: AntennaSpec) -> float:
-    """Flex [rad] of an antenna whose tip is pushed aside by so much [m], by the statics.
-
-    Raises:
-        BadInputError: The tip cannot be pushed so far.
-    """
+    """Flex [rad] of an antenna whose tip is pushed aside by so much [m], by the statics."""
     chain = Chain.of(antenna)
     force = np.stack([np.zeros_like(_LOADS), _LOADS], axis=1)
     bent = equilibrium(chain, np.full(len(_LOADS), chain.length), force, follower=True).angles

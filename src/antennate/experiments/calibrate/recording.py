@@ -241,11 +241,7 @@ def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | N
 def _units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
 ) -> tuple[str, ...]:
-    """Where a unit is declared against that in the name of its column: it is taken, and told.
-
-    Raises:
-        CalibrationError: The name gives another unit, and none was declared.
-    """
+    """Where a unit is declared against that in the name of its column: it is taken, and told."""
     columns = (
         (places[1], SPEED_UNITS, "speed_unit"),
         (places[2], TIME_UNITS, "time_unit"),

@@ -172,11 +172,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
 
 
 def _read(path: Path, config: ServoConfig) -> Recording:
-    """A recording of either form that can serve.
-
-    Raises:
-        BadInputError: It cannot.
-    """
+    """A recording of either form that can serve."""
     if drive_log.is_log(path):
         found = drive_log.read(path, config)
     else:

@@ -54,11 +54,7 @@ def own_row(found: Any, taken: Collection[str] = ()) -> dict[str, Any]:
 
 
 def _plain(value: Any, where: str) -> Any:
-    """A value as JSON has it.
-
-    Raises:
-        BadInputError: It cannot be kept; the text says where it is.
-    """
+    """A value as JSON has it."""
     match value:
         case Enum():
             return _plain(value.value, where)

@@ -240,11 +240,7 @@ def _run(tasks: Sequence[_Task], emit: _Emit) -> None:
 
 
 def _run_batched(tasks: Sequence[_Task], emit: _Emit, fail: Fail, device: str | None) -> None:
-    """The same on a GPU, a batch for each point; a point that cannot be run fails alone.
-
-    Raises:
-        ConfigError: What is run has no batches, or there is no such device.
-    """
+    """The same on a GPU, a batch for each point; a point that cannot be run fails alone."""
     subject, ended = find(tasks[0][0], tasks[0][1]), set[int]()
 
     def take(index: int, result: tuple[_Name, Rows]) -> None:

@@ -167,11 +167,7 @@ class _OfExperiment:
         self.most = self._trials.most if self._trials else 1
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
-        """Its configuration from nested values; those allowed may differ though nothing reads them.
-
-        Raises:
-            ConfigError: A value cannot be used.
-        """
+        """Its configuration from nested values; `allowed` may differ though nothing reads them."""
         model = self._experiment.config
         text = json.dumps(with_bases(values, model, Path()), default=_plain)
         try:
@@ -202,11 +198,7 @@ class _OfExperiment:
     def run_on_device(
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
-        """The same on a GPU or another device of Warp.
-
-        Raises:
-            ConfigError: It has no batches, or there is no such device.
-        """
+        """The same on a GPU or another device of Warp."""
         if self._trials is None or self._trials.run_on_device is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)

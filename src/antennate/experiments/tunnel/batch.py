@@ -181,11 +181,7 @@ class _Rows:
         return sorted(running + self._waiting)
 
     def run(self, make: ControllerMaker) -> None:
-        """Run all trials, with the controller that `make` makes.
-
-        Raises:
-            ControllerError: The controller failed as a whole; unfinished trials are left.
-        """
+        """Run all trials, with the controller that `make` makes."""
         config = self._config
         phases = [self._place(row) for row in range(self._batch)]
         if not self._monitors:
@@ -218,11 +214,7 @@ class _Rows:
         run_loop(self._robot, given, config.control.period, go_on)
 
     def _make(self, make: ControllerMaker) -> Controller:
-        """The controller, and what is to be known of its rows.
-
-        Raises:
-            ControllerError: It cannot be made.
-        """
+        """The controller, and what is to be known of its rows."""
         config = self._config
         try:
             made = make(self._controller, config.control, config.robot, self._batch)
@@ -247,11 +239,7 @@ class _Rows:
         return None
 
     def _begin(self, row: int, trial: int) -> float:
-        """Put a trial into a row; its gait phase [rad].
-
-        Raises:
-            SceneError: The scene cannot be drawn.
-        """
+        """Put a trial into a row; its gait phase [rad]."""
         config = self._config
         if self._readings == YOKED and trial not in self._donors:
             other = config.following(trial)

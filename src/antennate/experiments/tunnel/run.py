@@ -142,11 +142,7 @@ def _run(
 def _run_batched(
     tasks: Sequence[_Task], emit: Callable[[int, _Found], None], fail: Fail, device: str | None
 ) -> None:
-    """The same on a GPU; what fails is an invalid row, and nothing is told to `fail`.
-
-    Raises:
-        ConfigError: There is none, or logs are wanted.
-    """
+    """The same on a GPU; what fails is an invalid row, and nothing is told to `fail`."""
     from antennate.experiments.tunnel.warp import run_trials_on_warp
 
     if tasks[0][3] is not None:

@@ -131,11 +131,7 @@ class KeyController(RuleController):
         return replace(command, antenna=np.full((1, 2), angle))
 
     def _press(self, key: str) -> None:
-        """Take a key; one without a meaning is ignored.
-
-        Raises:
-            KeyboardInterrupt: It ends the drive.
-        """
+        """Take a key; one without a meaning is ignored."""
         if key in QUIT:
             raise KeyboardInterrupt("a key" if key == "q" else "the end of the keys")
         if key in KEYS:

@@ -103,11 +103,7 @@ class Jog:
         self._newest = JogState(angle, angle, stands, 0)
 
     def _require_settings(self) -> None:
-        """All that a servo needs before it gets torque, as `drive` and `doctor` know it.
-
-        Raises:
-            SetupError: A register holds something else.
-        """
+        """All that a servo needs before it gets torque, as `drive` and `doctor` know it."""
         for name, rule in self._rules.items():
             if not rule.allows(value := self._read(name)):
                 raise SetupError(

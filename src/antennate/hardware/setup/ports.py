@@ -72,11 +72,7 @@ def find_port(
 
 
 def _require_gone(before: frozenset[str], after: frozenset[str]) -> None:
-    """Require that a port has gone.
-
-    Raises:
-        SetupError: None has.
-    """
+    """Require that a port has gone."""
     if before - after:
         return
     if new := sorted(after - before):
@@ -102,11 +98,7 @@ def _settled(listing: Listing, wait: Callable[[float], None]) -> frozenset[str]:
 def _appeared(
     listing: Listing, without: frozenset[str], wait: Callable[[float], None], patience: float
 ) -> str:
-    """The one port that is new.
-
-    Raises:
-        SetupError: There is none in time, or more than one.
-    """
+    """The one port that is new."""
     waited = 0.0
     while True:
         new = sorted(listing() - without)

@@ -184,11 +184,7 @@ class ServoSetup:
         return changes
 
     def _verify(self, joint: Joint) -> None:
-        """The servo is where it has to be, with all that it has to hold.
-
-        Raises:
-            SetupError: It is not.
-        """
+        """The servo is where it has to be, with all that it has to hold."""
         with self._master(self._baud) as bus:
             lacks = self._lacks(bus, joint)
         if lacks:
@@ -214,11 +210,7 @@ class ServoSetup:
         return {n: rules[joint.servo] for n, rules in self._rules.items() if joint.servo in rules}
 
     def _read(self, bus: Bus, servo: int) -> dict[str, int]:
-        """The registers of a servo that have to hold something.
-
-        Raises:
-            SetupError: It does not answer.
-        """
+        """The registers of a servo that have to hold something."""
         found: dict[str, int] = {}
         for name in self._rules:
             value = read_some(bus, [servo], XC430_W240[name]).get(servo)

@@ -153,11 +153,7 @@ class Zeroing:
                 person.say(f"expected Enter or q, found {answer[:20]!r}")
 
     def _taken(self) -> list[int]:
-        """The mean of the positions over a while.
-
-        Raises:
-            SetupError: They moved, or a joint has no room to both sides.
-        """
+        """The mean of the positions over a while."""
         count = max(2, round(self._params.hold / _PERIOD))
         readings = np.array([now for _, now in zip(range(count), self._positions, strict=False)])
         moved = np.ptp(readings, axis=0) * POSITION_UNIT

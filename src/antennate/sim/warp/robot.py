@@ -222,12 +222,7 @@ class WarpRobot:
         self._settle()
 
     def _settle(self) -> None:
-        """Bring to the device what was loaded, stop what has ended, and set all targets.
-
-        Raises:
-            ConfigError: Warp cannot hold the worlds.
-            SceneError: The worlds are not of one structure.
-        """
+        """Bring to the device what was loaded, stop what has ended, and set all targets."""
         if not self._rows:
             return
         if self.worlds is None:

@@ -154,11 +154,7 @@ def require_viser() -> None:
 
 
 def _listener(port: int, flag: str) -> socket.socket:
-    """A socket of this computer alone.
-
-    Raises:
-        BadInputError: The port is taken.
-    """
+    """A socket of this computer alone."""
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
