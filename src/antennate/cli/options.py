@@ -312,8 +312,8 @@ def require_text(flag: str, text: str) -> None:
 _ELSEWHERE = {
     "--knows": "only tunnel takes it: no robot knows what a simulation does",
     "--log": "tunnel, gait and twin take it; drive and drive teleop always keep a log",
-    "--video": "tunnel, gait, calibrate, twin, bench wall, bench touch, bench sweep, bench force and "
-    "antenna ringdown take it; "
+    "--video": "tunnel, gait, calibrate, twin, bench wall, bench touch, bench sweep, bench force "
+    "and antenna ringdown take it; "
     "`antennate log film` makes a film of any log",
     "--view": "tunnel, gait, bench wall, twin, drive, drive teleop and log replay take it; "
     "`antennate log view` shows any log",
