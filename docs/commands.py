@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 from generated import finish, heads, row
 
-from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, carry_out, commands
-from antennate.cli.arguments import OptionsRequest
+from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, commands, described
 from antennate.cli.help import Command
 from antennate.cli.options import Option
 from antennate.experiments import is_ours
@@ -21,15 +20,6 @@ of them.
 GROUPS = "Groups of further options, each described in [Parameters](parameters.md): "
 _SHOWN = 40
 """Longest default that is shown whole."""
-
-
-def command(name: str) -> Command:
-    """What the help of a command is made from."""
-    try:
-        carry_out(name, [OptionsRequest.WORD])
-    except OptionsRequest as request:
-        return request.command
-    raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
 
 
 def section(page: Command) -> Iterator[str]:
@@ -81,7 +71,7 @@ def main() -> None:
     studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
     named = studies | others
     parts = [HEAD, index("Simulation and study", studies), index("Robot, twin, logs", others)]
-    parts += [part for name in named for part in section(command(name))]
+    parts += [part for name in named for part in section(described(name))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 
 

@@ -15,8 +15,8 @@ import pytest
 from terminal import Terminal
 
 from antennate.cli import main
-from antennate.cli.output import Output
 from antennate.cli.results import print_table
+from antennate.cli.terminal import Output
 from antennate.control.readings import short_names
 from antennate.experiments.tunnel.experiment import tables
 from antennate.messages import extra
