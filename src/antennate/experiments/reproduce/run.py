@@ -14,6 +14,7 @@ from antennate.experiments.reproduce.gait_claims import GAIT
 from antennate.experiments.reproduce.tunnel_claims import TUNNEL
 from antennate.experiments.reproduce.verdict import VERDICTS, Claim, Finding, Row, verdict
 from antennate.experiments.reproduce.wall_claims import WALL
+from antennate.messages import command_words
 from antennate.params.base import Params, number
 from antennate.params.control import ConditioningParams
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
@@ -98,7 +99,7 @@ def settings(name: str, config: ReproduceConfig) -> dict[str, Any]:
 
 def command(name: str, config: ReproduceConfig) -> str:
     """The command that runs this part alone."""
-    return shlex.join(["antennate", name, *_flags(settings(name, config))])
+    return shlex.join(["antennate", *command_words(name).split(), *_flags(settings(name, config))])
 
 
 def _flags(told: Mapping[str, Any], prefix: str = "--") -> list[str]:
