@@ -20,7 +20,7 @@ from antennate.cli import main
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import loads
 from antennate.experiments.force import run as force
-from antennate.experiments.reproduce import run as reproduce
+from antennate.experiments.reproduce import experiment as reproduce
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
