@@ -20,7 +20,7 @@ from antennate.cli import main
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import loads
 from antennate.experiments.force import run as force
-from antennate.experiments.reproduce import run as reproduce
+from antennate.experiments.reproduce import experiment as reproduce
 from antennate.messages import command_words
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(

@@ -16,10 +16,9 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options
 from antennate.control.registry import RIVAL
-from antennate.experiments.reproduce import run as reproduce
-from antennate.experiments.reproduce.experiment import EXPERIMENT
+from antennate.experiments.reproduce import experiment as reproduce
+from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig
 from antennate.experiments.reproduce.figure import draw
-from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
 from antennate.messages import command_words
 
