@@ -165,26 +165,57 @@ def drawn_table(table: Table) -> Any:
 
 
 def print_table(table: Table) -> None:
-    """Print a table and its note; as a list where it is too wide for the terminal."""
-    from rich.measure import Measurement  # slow to import
-    from rich.text import Text
+    """Print a table and its note.
 
-    drawn, output = drawn_table(table), console()
+    One that is too wide for the terminal is printed some columns at a time; where not even one of
+    them fits, as a list.
+    """
+    from rich.text import Text  # slow to import
+
+    output = console()
     if table.preface:
         output.print(Text(table.preface), soft_wrap=not output.is_terminal)
         output.print()
-    unlimited = output.options.update(max_width=sys.maxsize)
-    if Measurement.get(output, unlimited, drawn).minimum <= output.width:
-        output.print(drawn)
-    else:
-        output.print(Text(table.title))
-        for name, cells in table.rows:
-            parts = (f"{col} {cell}" for col, cell in zip(table.columns, cells, strict=True))
-            output.print(Text(f"{name}: {', '.join(parts)}"))
+    for part in _parts(table, output):
+        if _width(part, output).minimum <= output.width:
+            output.print(drawn_table(part))
+            continue
+        output.print(Text(part.title))
+        for name, cells in part.rows:
+            pairs = (f"{column} {cell}" for column, cell in zip(part.columns, cells, strict=True))
+            output.print(Text(f"{name}: {', '.join(pairs)}"))
         output.print()
     if table.note:
         output.print(Text(table.note), soft_wrap=not output.is_terminal)
         output.print()
+
+
+def _width(table: Table, output: Any) -> Any:
+    """The columns of a terminal that a table fills at least, with broken lines, and at most."""
+    from rich.measure import Measurement  # slow to import
+
+    unlimited = output.options.update(max_width=sys.maxsize)
+    return Measurement.get(output, unlimited, drawn_table(table))
+
+
+def _parts(table: Table, output: Any) -> Iterator[Table]:
+    """The table, or if it is too wide as many of its columns at a time as fit unbroken."""
+
+    def part(columns: slice) -> Table:
+        rows = [(name, cells[columns]) for name, cells in table.rows]
+        return Table(table.title, table.columns[columns], rows)
+
+    total = len(table.columns)
+    if _width(table, output).minimum <= output.width:
+        yield table
+        return
+    start = 0
+    while start < total:
+        ends = range(total, start, -1)
+        fitting = (n for n in ends if _width(part(slice(start, n)), output).maximum <= output.width)
+        end = next(fitting, start + 1)
+        yield part(slice(start, end))
+        start = end
 
 
 DESCRIPTION = """\

@@ -177,9 +177,10 @@ def console() -> Any:
     """Standard output as rich writes to it, as wide as the terminal says, also a dumb one."""
     from rich.console import Console  # slow to import
 
-    dumb = sys.stdout.isatty() and not is_drawable(sys.stdout)
-    width = shutil.get_terminal_size().columns if dumb else None
-    return Console(file=sys.stdout, highlight=False, width=width)
+    width = height = None
+    if sys.stdout.isatty() and not is_drawable(sys.stdout):  # rich takes 80 columns for it
+        width, height = shutil.get_terminal_size()
+    return Console(file=sys.stdout, highlight=False, width=width, height=height)
 
 
 class StatusLine:
