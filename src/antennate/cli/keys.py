@@ -40,15 +40,12 @@ def typed_keys() -> Iterator[ReadKeys]:
         handle = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         raise BadInputError("expected keys on a terminal, found no standard input") from None
-    if not os.isatty(handle):
-        yield lambda wait: _read(handle, wait)
-        return
-    with single_keys(handle):
+    with _single_keys(handle) if os.isatty(handle) else contextlib.nullcontext():
         yield lambda wait: _read(handle, wait)
 
 
 @contextlib.contextmanager
-def single_keys(handle: int) -> Iterator[None]:
+def _single_keys(handle: int) -> Iterator[None]:
     r"""Let a terminal give each key as it is typed, and show none; it is as before afterwards.
 
     Ctrl-C, Ctrl-\ and Ctrl-Z do what they always do.
@@ -86,7 +83,7 @@ def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
     handle = stdin.fileno()
     if os.tcgetpgrp(handle) != os.getpgrp():
         raise ConfigError(f"{flag}: expected to run in the foreground of its terminal, without &")
-    with single_keys(handle):
+    with _single_keys(handle):
         yield lambda: _came(handle)
 
 

@@ -270,6 +270,10 @@ def _say(text: str) -> None:
     write(f"{text}\n")
 
 
+def _say_lost(failure: str) -> None:
+    _say(f"log: {failure}; the twin goes on without it")
+
+
 def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
     kind, host, port = _tcp(places)
@@ -306,20 +310,11 @@ def _place(flag: str, text: str) -> tuple[str, int]:
 class Recording:
     """Log and film of a twin; a context, to be left when nobody is served any more.
 
-    A log that cannot be written any more is told at once, and ends nothing; it is an error when the
-    twin has ended.
-
-    Args:
-        options: What is wanted.
-        robot: The twin.
+    That a log cannot be written any more is said at once, and ends nothing; it is an error when the
+    twin has ended. No file is made before `begin`, when all else is ready.
 
     Attributes:
         watchers: What is to be called with the world after each tick.
-
-    Raises:
-        ConfigError: A file has another ending, or a film exists.
-        MissingPackageError: A package of the extra `video` is missing.
-        BadInputError: Nothing here can draw.
     """
 
     def __init__(self, options: RecordOptions, robot: TwinRobot) -> None:
@@ -333,34 +328,28 @@ class Recording:
         ):
             if path is not None and path.suffix != ending:
                 raise ConfigError(f"{flag}: expected a name with {ending}, found {path}")
-        if options.video is not None:
-            _require_new(options.video)
+        if (film := options.video) is not None:
+            if film.exists():
+                raise ConfigError(
+                    f"--video: expected no such file yet, found {film}; choose another name"
+                )
+            if not film.parent.is_dir():
+                raise ConfigError(f"--video: expected a folder for {film}, found none")
             from antennate.telemetry.film import require_video  # slow to import
 
             require_video()
 
     def begin(self, passage: Passage, config: TwinConfig) -> None:
-        """Begin, once all else is ready: before that no file is made.
-
-        Args:
-            passage: How far the twin has come; its `on_tick` and `on_pass` are the caller's.
-            config: What is served.
-
-        Raises:
-            LogError: The log cannot be begun.
-        """
+        """Begin to keep what is served."""
         if self._options.log is not None:
             path, start = self._options.log, time.time_ns()
-            self._log = TwinLog(path, self._robot, config, start, self._lost)
+            self._log = TwinLog(path, self._robot, config, start, _say_lost)
             self.watchers.append(self._log.take)
         if self._options.video is not None:
             from antennate.telemetry.twin_film import TwinFilm  # slow to import
 
             self._film = TwinFilm(self._robot, passage, config)
             self.watchers.append(self._film.take)
-
-    def _lost(self, failure: str) -> None:
-        write(f"log: {failure}; the twin goes on without it\n")
 
     def event(self, text: str) -> None:
         """Keep in the log what happened now."""
@@ -381,19 +370,11 @@ class Recording:
             wrong = self._log.close()
             failure = self._log.failure
             if not failure:
-                write(f"log: {self._log.path}{f': {wrong}' if wrong else ''}\n")
+                _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
         if self._film is not None and self._options.video is not None:
             _draw(self._film, self._options.video)
         if failure and isinstance(error, KeyboardInterrupt | None):
             raise LogError(failure) from None
-
-
-def _require_new(film: Path) -> None:
-    """Check a film, which is not made before the end."""
-    if film.exists():
-        raise ConfigError(f"--video: expected no such file yet, found {film}; choose another name")
-    if not film.parent.is_dir():
-        raise ConfigError(f"--video: expected a folder for {film}, found none")
 
 
 def _draw(recorded: TwinFilm, path: Path) -> None:
@@ -402,15 +383,15 @@ def _draw(recorded: TwinFilm, path: Path) -> None:
 
     film = recorded.film()
     if film is None:
-        write("video: no servo had torque, so there is nothing to show\n")
+        _say("video: no servo had torque, so there is nothing to show")
         return
     if recorded.full:
-        write(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be\n")
+        _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
     try:
         with progress("pictures of the film") as step, stop_signals():
             data = encoded(film, step)
     except KeyboardInterrupt:
-        write("video: interrupted: no film was written\n")
+        _say("video: interrupted: no film was written")
         return
     write_whole(path, data)
-    write(f"video: {path}\n")
+    _say(f"video: {path}")
