@@ -50,7 +50,7 @@ _FUNCTIONS = {
 }
 """Module and function of the commands that are not `command` of a module of their name."""
 _OWN = {**ROBOT_COMMANDS, **LOG_COMMANDS, **_MERGE}
-_FAMILIES = {
+_GROUPS = {
     "bench": "An antenna before walls and posts",
     "antenna": "What an antenna is made of",
 }
@@ -144,7 +144,7 @@ def _divided(words: Sequence[str]) -> tuple[str, list[str]]:
     name = words[0] if words else ""
     if f"{name} {''.join(words[1:2])}" in _parts(name):
         return " ".join(words[:2]), list(words[2:])
-    if name in _FAMILIES or _is_command(name):
+    if name in _GROUPS or _is_command(name):
         return name, list(words[1:])
     return "", list(words)
 
@@ -166,7 +166,7 @@ def _parts(name: str) -> list[str]:
 def _page(name: str, words: Sequence[str]) -> str:
     """What is printed in place of a run, empty if that is wanted."""
     word = words[0] if words else None
-    if name in _FAMILIES and word in (None, "-h", "--help", "--help-all"):
+    if name in _GROUPS and word in (None, "-h", "--help", "--help-all"):
         return _usage_of(name)
     if not name and word in (None, "-h", "--help"):
         return _usage()
@@ -192,7 +192,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
             pages = (described(name) for name in commands())
             sys.stdout.write(script(words[1:], commands(), pages))
             return OK
-        if name in ("", *_FAMILIES):
+        if name in ("", *_GROUPS):
             raise BadInputError(_unknown(name, words[0]))
         return carry_out(name, words)
     except HelpRequest as page:
@@ -209,20 +209,20 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         return BAD_INPUT
 
 
-def _unknown(family: str, word: str) -> str:
+def _unknown(group: str, word: str) -> str:
     """What is said of a word that is no command, or the old name of one."""
     from antennate.messages import nearest, shortened, typed
 
     if command_words(word) != word:
         return f"{word} is `{typed(word)}` now"
-    known = COMMAND_GROUPS[family] if family else [*_top()]
+    known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"
     return f"expected a command{choices}, found {shortened(word)}"
 
 
 def _top() -> dict[str, str]:
     """What stands in the list of commands: those that are in no group, and the groups."""
-    known = _FAMILIES | commands()
+    known = _GROUPS | commands()
     listed = [*_EXPERIMENTS, *ROBOT_COMMANDS, *LOG_COMMANDS, *known]
     return {name: known[name] for name in listed if " " not in name}
 
@@ -260,9 +260,9 @@ def _usage() -> str:
     )
 
 
-def _usage_of(family: str) -> str:
+def _usage_of(group: str) -> str:
     """The page of a group that is no command of its own."""
-    known, width = commands(), max(map(len, _parts(family)))
-    lines = [f"usage: antennate {family} COMMAND [OPTIONS]", "", f"{_FAMILIES[family]}.", ""]
-    lines += [f"  {name:<{width}}  {known[name]}" for name in _parts(family)]
+    known, width = commands(), max(map(len, _parts(group)))
+    lines = [f"usage: antennate {group} COMMAND [OPTIONS]", "", f"{_GROUPS[group]}.", ""]
+    lines += [f"  {name:<{width}}  {known[name]}" for name in _parts(group)]
     return "\n".join([*lines, ""])

@@ -294,7 +294,7 @@ def _refuse_commas(option: Option, words: Sequence[str]) -> None:
 
 
 _ELSEWHERE = {
-    "--readings": "tunnel and log replay take it",
+    "--readings": "tunnel and log replay take it; no other command changes what is read",
     "--knows": "only tunnel takes it: no robot knows what a simulation does",
     "--log": "tunnel, gait and twin take it; drive and drive teleop always keep a log",
     "--video": "tunnel, gait, calibrate, twin, bench wall, bench touch, bench sweep, bench force "

@@ -289,17 +289,12 @@ def teleop(argv: Sequence[str]) -> int:
     require_antennae(config.robot, "teleop")
     _require_ports(options)
     with _keys(options.gamepad, config.teleop.gamepad_silence) as keys:
-        return _walk(TELEOP_VIEW, config, options, argv, _controller(config, keys))
 
+        def controller(session: Session, calibrated: DriveConfig) -> KeyController:
+            control, robot = calibrated.control, calibrated.robot
+            return KeyController(control, robot, config.teleop, keys, session.clock.now)
 
-def _controller(
-    config: TeleopConfig, keys: Callable[[], list[str]]
-) -> Callable[[Session, DriveConfig], KeyController]:
-    def made(session: Session, calibrated: DriveConfig) -> KeyController:
-        control, robot = calibrated.control, calibrated.robot
-        return KeyController(control, robot, config.teleop, keys, session.clock.now)
-
-    return made
+        return _walk(TELEOP_VIEW, config, options, argv, controller)
 
 
 @contextlib.contextmanager

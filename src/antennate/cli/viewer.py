@@ -224,10 +224,9 @@ def main() -> int:
     return int(not log.keeps)
 
 
-def say(error: AntennateError) -> bool:
-    """Show an error of the log on stderr, below the status line; always False."""
+def say(error: AntennateError) -> None:
+    """Show an error of the log on stderr, below the status line."""
     write(f"\nantennate drive: {one_line(str(error))}\n")
-    return False
 
 
 MEASURES = (
@@ -302,8 +301,8 @@ def _sentence(result: Mapping[str, Any]) -> str:
     state = result["worst_state"]
     causes = [cause.removeprefix(f"{state} ") for cause in result["why"].split("; ")]
     why = f" ({'; '.join(causes)})" if result["why"] else ""
-    time = result.get("worst_s")  # results of older versions have none
-    worst = f"worst state {state}{f' for {time:.1f} s' if time else ''}{why}"
+    lasted = result.get("worst_s")  # results of older versions have none
+    worst = f"worst state {state}{f' for {lasted:.1f} s' if lasted else ''}{why}"
     torque, ended = _torque(result), f"ended by {result['ended']}"
     if result["refusal"]:
         more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
