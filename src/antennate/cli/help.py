@@ -238,7 +238,7 @@ def _bash(options: Mapping[str, Sequence[Option]]) -> str:
     ]
     flags = []
     for command, own in options.items():
-        every = [option.offered for option in own if not option.positional]
+        every = [w for o in own for w in (o.values if o.positional else [o.offered])]
         flags.append(f"                '{command}') words='{' '.join([*every, *_HELP])}';;")
     parts = [
         f"        {name}) parts='{' '.join(names)}';;" for name, names in COMMAND_GROUPS.items()
@@ -267,9 +267,9 @@ def _fish(commands: Mapping[str, str], options: Mapping[str, Sequence[Option]]) 
             values = " -r" * bool(option.metavar)
             if option.values:
                 values = f" -xa {_quoted(' '.join(option.values))}"
-            if not option.positional:
-                name = f"-l {option.offered[2:]}{values}"
-                yield f"{start} {_quoted(seen)} {name} -d {_quoted(option.meaning)}"
+            name = f" -l {option.offered[2:]}" * (not option.positional)
+            if name or option.values:
+                yield f"{start} {_quoted(seen)}{name}{values} -d {_quoted(option.meaning)}"
         for flag in _HELP:
             yield f"{start} {_quoted(seen)} -l {flag[2:]}"
 
