@@ -30,7 +30,8 @@ def section(page: Command) -> Iterator[str]:
     yield page.description
     yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
     top = [option for option in page.parameters if len(option.path) == 1]
-    lines = [line(option) for option in [*page.others, *top]]
+    others = sorted(page.others, key=lambda option: not option.positional)
+    lines = [line(option) for option in [*others, *top]]
     if lines:
         yield "\n".join([heads("option", "default", "meaning"), *lines])
     counts = Counter(option.path[0] for option in page.parameters if len(option.path) > 1)

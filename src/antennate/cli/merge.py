@@ -14,6 +14,7 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options, Shards, carry_out, shard_of
 from antennate.cli.options import option
+from antennate.cli.results import ResultOptions
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences
@@ -33,15 +34,10 @@ _NAMED = 3
 
 
 @dataclass(frozen=True)
-class MergeOptions:
+class MergeOptions(ResultOptions):
     """Which shards, and where the run goes."""
 
     shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD", positional=True)
-    out: Path | None = option(None, "folder for the run, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(
-        False, "first rename the folder to FOLDER.old, in place of an older one", needs=["--out"]
-    )
-    json: bool = option(False, "print the content of result.json and nothing else")
     no_figures: bool = option(False, "draw no figures")
 
 
@@ -51,7 +47,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no shard, trials are missing, or nothing can be written.
     """
-    _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
+    _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions, without=["config"])
     if not options.shards:
         raise ConfigError("merge: expected the folders of all shards, found none")
     shards = _gathered(options.shards)
