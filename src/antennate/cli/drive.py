@@ -60,7 +60,7 @@ verified.
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
 off, if it was armed and never walked, and if its log ended before the drive did."""
-TELEOP = """\
+TELEOP_DESCRIPTION = """\
 Walk the real robot, or its twin, by keys: the arrows (or w, a, d, s) are FORWARD, TURN_L, TURN_R
 and REVERSE, the space bar stands, o lets the antennae oscillate, q ends. All else is as with
 `antennate drive`: the dry run, --arm, the supervisor, the log.
@@ -73,7 +73,9 @@ L1 or R1) is held, and any other button for o. Without the button, or two second
 of the pad (--teleop.gamepad-silence), the robot stands. A pad that is unplugged ends the drive."""
 _CAPTIONS = {"drive": "Readings, bending level, contact, maneuver and supervisor over time."}
 VIEW = View("drive", DESCRIPTION, DriveConfig, viewer.tables, viewer.sentences, captions=_CAPTIONS)
-TELEOP_VIEW = dataclasses.replace(VIEW, name="teleop", about=TELEOP, config=TeleopConfig)
+TELEOP_VIEW = dataclasses.replace(
+    VIEW, name="teleop", about=TELEOP_DESCRIPTION, config=TeleopConfig
+)
 
 
 @dataclass(frozen=True)
@@ -281,7 +283,9 @@ def teleop(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed, or no key can come;
             nothing moved then.
     """
-    config, options = parse_robot("teleop", TELEOP, RobotFile.for_teleop, argv, TeleopOptions)
+    config, options = parse_robot(
+        "teleop", TELEOP_DESCRIPTION, RobotFile.for_teleop, argv, TeleopOptions
+    )
     if config.hold_to_run:
         raise ConfigError(
             "--hold-to-run: expected none with teleop, which stands without a key, found it"

@@ -299,7 +299,7 @@ def say_unguarded(command: str, log: LogReader) -> None:
         )
 
 
-VIEW = """\
+VIEW_DESCRIPTION = """\
 Show the log of a drive or of a simulation on a page of this computer: the robot, charts of what was
 read and decided, and a map. It works without a network; over ssh, forward the port that it tells.
 
@@ -323,7 +323,7 @@ def view(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: There is no such log, or the page cannot be served, or not any more.
     """
-    _, options = parse("view", VIEW, Params, argv, ShownOptions)
+    _, options = parse("view", VIEW_DESCRIPTION, Params, argv, ShownOptions)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")
     from antennate.telemetry.view.pace import Restart  # slow to import

@@ -48,14 +48,14 @@ joint, each written and read back. Torque never comes on.
 What is done is kept in robot.toml (--config names another file), so that you may stop and go on
 later. Two servos on the bus and a servo of another model are refused. For one that is done you are
 asked whether it is a spare, to become the servo of this joint."""
-ZERO = """\
+ZERO_DESCRIPTION = """\
 Measure zeros and directions of all joints. Torque goes off; you hold the robot straight, legs at
 mid-stance, antennae at their mounting angle, and press Enter. Then you move each joint in turn as
 you are told, and the sign of its motion becomes its direction. Live numbers show what is read.
 
 A horn that sits a tooth off is told. robot.toml (--config names another file) gets zeros and
 directions at the end; all else in it stays. Nothing moves by itself."""
-JOG = """\
+JOG_DESCRIPTION = """\
 Move one joint by small steps, slowly and with little force: + or the right arrow turns it in its
 positive sense, - or the left arrow back, n and p go to the next and the previous joint, q ends.
 
@@ -195,7 +195,9 @@ def zero(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used, the servos are not fit, or no answer can
             come; nothing was written then.
     """
-    config, options, path = parse_writer("zero", ZERO, RobotFile.for_zero, argv, ZeroOptions)
+    config, options, path = parse_writer(
+        "zero", ZERO_DESCRIPTION, RobotFile.for_zero, argv, ZeroOptions
+    )
     require_bus(options.bus)
     person = TerminalPerson()
     try:
@@ -262,7 +264,7 @@ def jog(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
     """
-    config, options = parse_robot("jog", JOG, RobotFile.for_jog, argv, JogOptions)
+    config, options = parse_robot("jog", JOG_DESCRIPTION, RobotFile.for_jog, argv, JogOptions)
     names = config.robot.joint_names
     if options.joint:
         _require_joint("--joint: expected a joint", options.joint, config.robot)
