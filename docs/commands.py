@@ -1,7 +1,12 @@
-"""Write docs/commands.md from the commands themselves; with --check only compare it."""
+"""Write the list of docs/commands.md from the commands themselves; with --check only compare it.
+
+What stands before the mark is written by hand. Options that many commands share are explained
+there, and named alone where a command takes them.
+"""
 
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 from generated import finish, heads, row
 
@@ -11,15 +16,13 @@ from antennate.cli.help import Command
 from antennate.cli.options import Option
 from antennate.experiments import is_ours
 
-HEAD = """\
-# Commands
-
-Every command with its options. [Options, files, exit codes](cli.md) says what holds for all
-of them.
-"""
+MARK = "<!-- commands: python docs/commands.py -->"
+SHARED = "[Options of a run](#options-of-a-run): "
 GROUPS = "Groups of further options, each described in [Parameters](parameters.md): "
 _SHOWN = 40
 """Longest default that is shown whole."""
+_MANY = 7
+"""Commands from which on an option that is the same in all of them is one of a run."""
 
 
 def command(name: str) -> Command:
@@ -31,16 +34,23 @@ def command(name: str) -> Command:
     raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
 
 
-def section(page: Command) -> Iterator[str]:
-    """The lines of one command."""
+def options(page: Command) -> dict[str, str]:
+    """Options on a command's first level, and the row of each."""
+    top = [option for option in page.parameters if len(option.path) == 1]
+    return {option.free or option.offered: line(option) for option in [*page.others, *top]}
+
+
+def section(page: Command, shared: set[str]) -> Iterator[str]:
+    """The lines of one command; rows that are shared are named alone."""
     free = "".join(f" {option.free}" for option in page.others if option.free)
     yield f"## `antennate {page.name}`"
     yield page.description
     yield f"```sh\nuv run antennate {page.name}{free} [OPTIONS]\n```"
-    top = [option for option in page.parameters if len(option.path) == 1]
-    lines = [line(option) for option in [*page.others, *top]]
-    if lines:
-        yield "\n".join([heads("option", "default", "meaning"), *lines])
+    rows = options(page)
+    if own := [text for text in rows.values() if text not in shared]:
+        yield "\n".join([heads("option", "default", "meaning"), *own])
+    if common := [f"`{name}`" for name, text in rows.items() if text in shared]:
+        yield SHARED + ", ".join(common) + "."
     counts = Counter(option.path[0] for option in page.parameters if len(option.path) > 1)
     if counts:
         named = (f"`--{group.replace('_', '-')}.*` ({n})" for group, n in counts.items())
@@ -69,11 +79,23 @@ def index(title: str, named: dict[str, str]) -> str:
 
 
 def main() -> None:
-    """Write the page, or compare it."""
+    """Write the page, or compare it.
+
+    Raises:
+        SystemExit: The part that is written by hand lacks an option that many commands share.
+    """
     named = {n: what for n, what in commands().items() if n in ROBOT_COMMANDS or is_ours(n)}
     studies = {n: what for n, what in named.items() if n not in ROBOT_COMMANDS}
-    parts = [HEAD, index("Experiments", studies), index("Robot, twin, logs", ROBOT_COMMANDS)]
-    parts += [part for name in named for part in section(command(name))]
+    pages = [command(name) for name in named]
+    rows = [pair for page in pages for pair in options(page).items()]
+    counts = Counter(text for _, text in rows)
+    shared = {text for text, count in counts.items() if count >= _MANY}
+    begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)
+    lacks = sorted({name for name, text in rows if text in shared and f"`{name}" not in begin})
+    if lacks:
+        raise SystemExit(f"docs/commands.md: expected {', '.join(lacks)} before {MARK}")
+    lists = [index("Experiments", studies), index("Robot, twin, logs", ROBOT_COMMANDS)]
+    parts = [begin, MARK, *lists, *(part for page in pages for part in section(page, shared))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 
 

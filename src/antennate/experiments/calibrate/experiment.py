@@ -250,5 +250,5 @@ EXPERIMENT = Experiment.of_folder(
     check=require_solver,
     parts="pushes",
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

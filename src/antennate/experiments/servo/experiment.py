@@ -150,6 +150,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     parts="fits",
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )
