@@ -70,8 +70,8 @@ runs springs, bench, walls, sweeps, gait and tunnel with few trials, in some min
 without `--quick` every experiment runs with its own defaults, the tunnel with 100 trials a
 controller, in about half an hour. The run directory holds `report.html`: this page with a figure
 for each claim, which needs no network and no program but a browser. `result.json` holds the same
-([keys](results.md#antennate-reproduce-schema-1)), for a program that compares two versions. Seeds are the same for all
-experiments (`--seed`); two runs with one seed give the same numbers.
+([keys](results.md#antennate-reproduce-schema-1)), for a program that compares two versions. Seeds
+are the same for all experiments (`--seed`); two runs with one seed give the same numbers.
 
 What stands behind the verdicts is told in full in [Antenna](science/antenna.md) and
 [Tunnel](science/tunnel.md).
