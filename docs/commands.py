@@ -10,11 +10,12 @@ from pathlib import Path
 
 from generated import finish, heads, row
 
-from antennate.cli import ROBOT_COMMANDS, carry_out, commands
+from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, carry_out, commands
 from antennate.cli.arguments import OptionsRequest
 from antennate.cli.help import Command
 from antennate.cli.options import Option
 from antennate.experiments import is_ours
+from antennate.messages import command_words
 
 MARK = "<!-- commands: python docs/commands.py -->"
 SHARED = "[Options of a run](#options-of-a-run): "
@@ -43,13 +44,14 @@ def options(page: Command) -> dict[str, str]:
 def section(page: Command, shared: set[str]) -> Iterator[str]:
     """The lines of one command; rows that are shared are named alone."""
     free = "".join(f" {option.free}" for option in page.others if option.free)
-    yield f"## `antennate {page.name}`"
+    name = command_words(page.name)
+    yield f"## `antennate {name}`"
     yield page.description
-    yield f"```sh\nuv run antennate {page.name}{free} [OPTIONS]\n```"
+    yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
     rows = options(page)
     if own := [text for text in rows.values() if text not in shared]:
         yield "\n".join([heads("option", "default", "meaning"), *own])
-    if common := [f"`{name}`" for name, text in rows.items() if text in shared]:
+    if common := [f"`{flag}`" for flag, text in rows.items() if text in shared]:
         yield SHARED + ", ".join(common) + "."
     counts = Counter(option.path[0] for option in page.parameters if len(option.path) > 1)
     if counts:
@@ -72,9 +74,14 @@ def line(option: Option) -> str:
     return row(f"`{head}`", f"`{default}`" if default else "", meaning)
 
 
+def is_own(name: str) -> bool:
+    """Whether a command is of this package."""
+    return name == "study merge" or is_ours(name.split()[-1])
+
+
 def index(title: str, named: dict[str, str]) -> str:
     """A table of commands."""
-    rows = (row(f"[`{n}`](#antennate-{n})", what) for n, what in named.items())
+    rows = (row(f"[`{n}`](#antennate-{n.replace(' ', '-')})", what) for n, what in named.items())
     return "\n".join([f"**{title}**\n", heads("command", "what it does"), *rows])
 
 
@@ -84,9 +91,9 @@ def main() -> None:
     Raises:
         SystemExit: The part that is written by hand lacks an option that many commands share.
     """
-    named = {n: what for n, what in commands().items() if n in ROBOT_COMMANDS or is_ours(n)}
-    studies = {n: what for n, what in named.items() if n not in ROBOT_COMMANDS}
-    pages = [command(name) for name in named]
+    others = ROBOT_COMMANDS | LOG_COMMANDS
+    studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
+    pages = [command(name) for name in studies | others]
     rows = [pair for page in pages for pair in options(page).items()]
     counts = Counter(text for _, text in rows)
     shared = {text for text, count in counts.items() if count >= _MANY}
@@ -94,7 +101,7 @@ def main() -> None:
     lacks = sorted({name for name, text in rows if text in shared and f"`{name}" not in begin})
     if lacks:
         raise SystemExit(f"docs/commands.md: expected {', '.join(lacks)} before {MARK}")
-    lists = [index("Experiments", studies), index("Robot, twin, logs", ROBOT_COMMANDS)]
+    lists = [index("Simulation and study", studies), index("Robot, twin, logs", others)]
     parts = [begin, MARK, *lists, *(part for page in pages for part in section(page, shared))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 
