@@ -3,7 +3,7 @@
 A block of `sh` is run, one of `python` too, each by itself; any other block with a title is a file.
 What stands in `in a terminal of its own` goes on running, and the ports that it prints stand for
 those of the page. Each line of a `text` block was said by the commands before it, with `…` for what
-may differ. Blocks of other kinds are for readers alone.
+may differ. Blocks of other kinds, as of `bash`, are for readers alone.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Block(NamedTuple):
     @property
     def words(self) -> list[list[str]]:
         """Words of each of its commands behind `uv run antennate`; none for other commands."""
-        shell = self.kind in ("sh", "console")
+        shell = self.kind in ("sh", "bash")
         lines = self.text.replace("\\\n", " ").splitlines() if shell else []
         found = [shlex.split(line, comments=True) for line in lines]
         return [words[3:] for words in found if words[:3] == ["uv", "run", "antennate"]]
