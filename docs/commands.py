@@ -1,7 +1,7 @@
 """Write the list of docs/commands.md from the commands themselves; with --check only compare it.
 
-What stands before the mark is written by hand. Options that many commands share are explained
-there, and named alone where a command takes them.
+What stands before the mark is written by hand. An option that is the same in several commands and
+explained there is named alone where a command takes it.
 """
 
 from collections import Counter
@@ -22,8 +22,8 @@ SHARED = "[Options of a run](#options-of-a-run): "
 GROUPS = "Groups of further options, each described in [Parameters](parameters.md): "
 _SHOWN = 40
 """Longest default that is shown whole."""
-_MANY = 7
-"""Commands from which on an option that is the same in all of them is one of a run."""
+_MANY = 3
+"""Least number of commands that have an option, the same in all, that is named alone."""
 
 
 def command(name: str) -> Command:
@@ -86,21 +86,14 @@ def index(title: str, named: dict[str, str]) -> str:
 
 
 def main() -> None:
-    """Write the page, or compare it.
-
-    Raises:
-        SystemExit: The part that is written by hand lacks an option that many commands share.
-    """
+    """Write the page, or compare it."""
     others = ROBOT_COMMANDS | LOG_COMMANDS
     studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
     pages = [command(name) for name in studies | others]
     rows = [pair for page in pages for pair in options(page).items()]
     counts = Counter(text for _, text in rows)
-    shared = {text for text, count in counts.items() if count >= _MANY}
     begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)
-    lacks = sorted({name for name, text in rows if text in shared and f"`{name}" not in begin})
-    if lacks:
-        raise SystemExit(f"docs/commands.md: expected {', '.join(lacks)} before {MARK}")
+    shared = {text for name, text in rows if counts[text] >= _MANY and f"`{name}" in begin}
     lists = [index("Simulation and study", studies), index("Robot, twin, logs", others)]
     parts = [begin, MARK, *lists, *(part for page in pages for part in section(page, shared))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
