@@ -8,6 +8,7 @@ from types import ModuleType
 from generated import finish, heads, row
 
 from antennate import experiments, params
+from antennate.messages import command_words
 from antennate.params.base import Params, meaning
 
 HEAD = """\
@@ -31,7 +32,7 @@ OTHERS = (
 COMMANDS = """\
 # Parameters of commands
 
-The top level of each command's flags and configuration file; groups link to the tables above.
+The top level of each command's flags and configuration file; groups link to their tables.
 """
 
 
@@ -66,29 +67,36 @@ def nested(config: type[Params]) -> list[type[Params]]:
     return found
 
 
-def table(group: type[Params]) -> str:
-    """Return one section: what the class says of itself, and a row for each number in it."""
-    rows = [
-        f"## {group.__name__}",
-        "",
-        inspect.getdoc(group) or "",
-        "",
-        heads("name", "default", "unit", "meaning", "source"),
-    ]
+def table(group: type[Params], command: str = "") -> str:
+    """A section: what the class says of itself, and a row for each number in it.
+
+    Of a command's own parameters the page of commands has default and meaning.
+    """
+    rows, groups = list[str](), list[str]()
     for name, field in group.model_fields.items():
         default = field.get_default(call_default_factory=True)
         if isinstance(default, Params):  # its numbers have a table of their own
             kind = type(default).__name__
-            rows.append(
-                row(f"`{name}`", f"[{kind}](#{kind.lower()})", "", meaning(group, name), "")
-            )
+            groups.append(f"`{name}` [{kind}](#{kind.lower()})")
             continue
         extra = field.json_schema_extra
         assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
         value = f"{default:.6g}" if isinstance(default, float) else default
-        said = meaning(group, name, unit=False)
-        rows.append(row(f"`{name}`", f"`{value}`", extra["unit"], said, extra["source"]))
-    return "\n".join(rows) + "\n"
+        said = () if command else (f"`{value}`", extra["unit"], meaning(group, name, unit=False))
+        rows.append(row(f"`{name}`", *said, extra["source"]))
+    parts = [f"## {group.__name__}", inspect.getdoc(group) or ""]
+    if command:
+        words = command_words(command)
+        place = f"[`antennate {words}`](commands.md#antennate-{words.replace(' ', '-')})"
+        parts.append(f"Default, unit and meaning: {place}.")
+    if rows:
+        columns = (
+            ("name", "source") if command else ("name", "default", "unit", "meaning", "source")
+        )
+        parts.append("\n".join([heads(*columns), *rows]))
+    if groups:
+        parts.append(f"Groups: {', '.join(groups)}.")
+    return "\n\n".join(parts) + "\n"
 
 
 def main() -> None:
@@ -99,7 +107,9 @@ def main() -> None:
     robots = [f"antennate.robots.{name}" for name in ROBOTS]
     modules = map(importlib.import_module, numbers + robots)
     parts = [table(group) for module in modules for group in groups(module)]
-    page = "\n".join([HEAD, *parts, COMMANDS, *(table(group) for group in commands())])
+    own = {experiments.load(name).config: name for name in experiments.names()}
+    tables = (table(group, own.get(group, "")) for group in commands())
+    page = "\n".join([HEAD, *parts, COMMANDS, *tables])
     finish(__file__, page.rstrip("\n") + "\n", source="`src/antennate/params/` and `robots/`")
 
 
