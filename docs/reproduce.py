@@ -132,7 +132,7 @@ def counts(found: Mapping[str, Any]) -> str:
 
 
 def verdicts(found: Mapping[str, Any]) -> str:
-    """The table of all claims, then the criterion and the reason of each."""
+    """The table of all claims with our numbers, then the criterion and the reason of each."""
     lines = [
         "## Verdicts",
         "",
@@ -150,7 +150,6 @@ def verdicts(found: Mapping[str, Any]) -> str:
             f"**{claim['claim']}**",
             "",
             f"- Criterion: {rule.rule}",
-            f"- Ours: {claim['ours']}",
             f"- Verdict: {VERDICTS[claim['verdict']]}. {claim['reason']}",
             f"- Run: `{claim['command']}`",
             "",
