@@ -333,12 +333,13 @@ def view(argv: Sequence[str]) -> int:
     path = log_of(options.shown)
     with LogReader(path) as log:
         header = log.header
+    arena = arena_of(path, header)  # first, as an import may swallow a signal, and one alone counts
     with (
         stop_signals(last=True),
         contextlib.suppress(KeyboardInterrupt),  # that is how it ends
         ViewProcess(options.port, MODULE, options.port_for_foxglove, "--port") as page,
     ):
-        player = LogPlayer(page.channel, header, str(path), options.speed, arena_of(path, header))
+        player = LogPlayer(page.channel, header, str(path), options.speed, arena)
         while not page.channel.closed:
             with contextlib.suppress(Restart), LogReader(path) as log:
                 player.begin()
