@@ -17,8 +17,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options
 from antennate.control.registry import RIVAL
 from antennate.experiments.reproduce import experiment as reproduce
-from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig
-from antennate.experiments.reproduce.figure import draw
+from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig, draw
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
 
 BY_NAME = {claim.name: claim for claim in CLAIMS}

@@ -253,14 +253,10 @@ def _units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
 ) -> tuple[str, ...]:
     """Sentences on units that are declared against those in the names of their columns."""
-    columns = (
-        (places[1], SPEED_UNITS, "speed_unit"),
-        (places[2], TIME_UNITS, "time_unit"),
-        (places[3], (*READING_UNITS, "%"), "reading_unit"),
-        (places[4], BEND_UNITS, "bend_unit"),
-    )
+    units = (SPEED_UNITS, TIME_UNITS, (*READING_UNITS, "%"), BEND_UNITS)
+    names = ("speed_unit", "time_unit", "reading_unit", "bend_unit")
     sentences = list[str]()
-    for place, known, field in columns:
+    for place, known, field in zip(places[SPEED:], units, names, strict=True):
         if place is None:
             continue
         named, declared = unit_of(header[place], known), getattr(params, field)
