@@ -26,6 +26,7 @@ from antennate.experiments.reproduce.verdict import (
     verdict,
 )
 from antennate.figures import INK, SERIES, canvas, styled
+from antennate.messages import command_words
 from antennate.params.base import Params, number
 from antennate.params.control import ConditioningParams
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
@@ -124,7 +125,7 @@ def settings(name: str, config: ReproduceConfig) -> dict[str, Any]:
 
 def command(name: str, config: ReproduceConfig) -> str:
     """The command that runs this part alone."""
-    return shlex.join(["antennate", name, *_flags(settings(name, config))])
+    return shlex.join(["antennate", *command_words(name).split(), *_flags(settings(name, config))])
 
 
 def _flags(values: Mapping[str, Any], prefix: str = "--") -> list[str]:
