@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from antennate.experiments.design.config import DesignConfig, Objective
-from antennate.experiments.design.evaluate import OUTCOME, Row
+from antennate.experiments.design.evaluate import Row
 from antennate.experiments.study import measures
 from antennate.experiments.study.effects import SUCCESS
 from antennate.experiments.study.run import STATUS
+from antennate.experiments.study.subject import OUTCOME
 from antennate.studies import statistics
 from antennate.studies.plan import Point
 from antennate.types import Bools, Floats

@@ -13,8 +13,8 @@ from antennate.experiments.study.effects import SUCCESS
 from antennate.experiments.study.run import holds, with_status
 from antennate.experiments.study.subject import (
     OF_TRIALS,
+    OUTCOME,
     Columns,
-    among,
     columns_of,
     find,
     nested,
@@ -31,7 +31,6 @@ from antennate.studies.pool import Workers
 
 FRESH = 1_000_000
 """Added to a seed, it gives one that no trial of a search has."""
-OUTCOME = "outcome"
 OF_DESIGN = ("design", "name", "phase", "evaluation")
 """Columns that a search fills itself, beside those of a study."""
 Row = dict[str, Any]
@@ -83,14 +82,11 @@ class Evaluator:
             self._subject = find(self.name)
         except BadInputError as error:
             raise ConfigError(f"evaluate.{label}.{error}") from None
-        known = self.name in experiments.names()
-        self._whole = known and experiments.load(self.name).trials is None
-        self._asked_for: dict[str, str] = {}
+        judged: list[str] = []
         for objective in asked.objectives(label):
-            column = OUTCOME if objective.measure == SUCCESS else objective.column
-            for name in (column, *([OUTCOME] if objective.of_successes else [])):
-                self._asked_for.setdefault(name, objective.measure)
-        self.judged = tuple(self._asked_for)
+            judged.append(OUTCOME if objective.measure == SUCCESS else objective.column)
+            judged += [OUTCOME] if objective.of_successes else []
+        self.judged = tuple(dict.fromkeys(judged))
         model = self._subject.model
         self.leaves = [] if model is None else list(_leaves(model))
         paths = None if model is None else [p for p in self.leaves if p not in model.unread]
@@ -152,7 +148,7 @@ class Evaluator:
         """
         values = {self._paths[n]: v for n, v in point.items() if n in self._paths}
         settings = put_over(self._asked.settings, nested(values))
-        if self._asked.trials is not None and not self._whole:
+        if self._asked.trials is not None and not self._subject.whole:
             settings = put_over(settings, {"trials": self._asked.trials})
         try:
             return self._subject.configured(settings)
@@ -187,7 +183,7 @@ class Evaluator:
                 f"evaluate.{self.label}.settings: expected one {self._subject.condition}, found "
                 f"{shortened(', '.join(conditions))}"
             )
-        if self._whole and "seed" not in type(config).model_fields and self._asked.trials:
+        if self._subject.whole and "seed" not in type(config).model_fields and self._asked.trials:
             raise ConfigError(
                 f"evaluate.{self.label}.trials: expected none, as {self.name} has no seed, found "
                 f"{self._asked.trials}"
@@ -201,17 +197,9 @@ class Evaluator:
         Raises:
             ConfigError: There is none.
         """
-        names, known = columns.names, columns.numbers
-        for column in self.judged:
-            if column not in (names if column == OUTCOME else known):
-                of_successes = [n + OF_SUCCESSES for n in known] if OUTCOME in names else []
-                known = [SUCCESS, *known] if OUTCOME in names else known
-                wanted = self._asked_for[column]
-                hint = nearest(wanted, [*known, *of_successes])
-                raise ConfigError(
-                    f"evaluate.{self.label}: expected a measure of {self.name}{hint}, "
-                    f"{among(known)}; found {shortened(wanted)}"
-                )
+        successes = [n + OF_SUCCESSES for n in columns.numbers if OUTCOME in columns.names]
+        for objective in self._asked.objectives(self.label):
+            columns.require(objective.measure, f"evaluate.{self.label}", self.name, successes)
 
     def trials(self, point: Point, times: int = 1, fresh: bool = False) -> list[tuple[Any, Trial]]:
         """Configuration and trial of everything that is run of a design.
@@ -226,7 +214,7 @@ class Evaluator:
             count = times * config.get("trials", 1)
             return [(config, ("", first + i)) for i in range(count)]
         start = getattr(config, "seed", None)
-        if self._whole:
+        if self._subject.whole:
             if start is None:
                 return [(config, ("", 0))]
             count = times * (self._asked.trials or 1)
@@ -282,8 +270,9 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
         groups.setdefault((task.design, task.label), []).append(index)
     for indices in groups.values():
         first = tasks[indices[0]]
-        known = first.experiment in experiments.names()
-        if known and experiments.load(first.experiment).trials is None:
+        columns = () if isinstance(first.config, Params) else (*OF_DESIGN, *first.config)
+        subject = find(first.experiment, columns)
+        if subject.whole:
             for index in indices:
                 emit(index, (tasks[index].place, _run_whole(tasks[index])))
             continue
@@ -293,8 +282,7 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
             emit(indices[i], (task.place, with_status(rows[0], task.judged)))
 
         trials = [tasks[index].trial for index in indices]
-        columns = () if isinstance(first.config, Params) else (*OF_DESIGN, *first.config)
-        find(first.experiment, columns).run(first.config, trials, take)
+        subject.run(first.config, trials, take)
 
 
 def _run_whole(task: Task) -> Row:

@@ -144,49 +144,55 @@ def _best(known: Sequence[Entry], part: str, objective: Entry, first: Entry | No
 def figures(outcome: DesignOutcome) -> dict[str, Figure]:
     """The trade-off; nothing where no design was judged."""
     result = outcome.result()
-    return {"tradeoff": tradeoff(result)} if any(d["objectives"] for d in result["designs"]) else {}
+    return (
+        {"tradeoff": _draw_tradeoff(result)}
+        if any(d["objectives"] for d in result["designs"])
+        else {}
+    )
 
 
 @style.styled
-def tradeoff(result: Mapping[str, Any]) -> Figure:
+def _draw_tradeoff(result: Mapping[str, Any]) -> Figure:
     """All designs, the front, the references, and those that were run again with intervals."""
     objectives = result["objectives"]
     pairs = list(combinations(objectives, 2))[:_MOST_PANELS] or [(None, objectives[0])]
     figure = style.canvas(style.WIDTH, 1.0 + 3.1 * len(pairs))
     panels = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for panel, (x, y) in zip(panels, pairs, strict=True):
-        _panel(panel, result["designs"], x, y)
+        _draw_pair(panel, result["designs"], x, y)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 
-def _panel(panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry) -> None:
+def _draw_pair(panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry) -> None:
     judged = [design for design in designs if design["objectives"]]
     proposed = [design for design in judged if not design["reference"]]
     rest = [design for design in proposed if not design["front"]]
     best = [design for design in proposed if design["front"]]
-    _points(panel, rest, x, y, color=style.FAINT, marker="o", label="proposed")
-    _points(panel, best, x, y, color=style.SERIES[0], marker="o", label="front, in the search")
+    _draw_points(panel, rest, x, y, color=style.FAINT, marker="o", label="proposed")
+    _draw_points(panel, best, x, y, color=style.SERIES[0], marker="o", label="front, in the search")
     references = [design for design in judged if design["reference"]]
     looks = zip(style.series(len(references) + 1)[1:], _MARKERS * len(references), strict=False)
     for design, (colour, marker) in zip(references, looks, strict=False):
         look = {"color": colour, "marker": marker, "label": design["name"], "zorder": 4}
-        _points(panel, [design], x, y, markersize=11 if marker == "*" else 7, **look)
-        _again(panel, [design], x, y, colour, marker)
+        _draw_points(panel, [design], x, y, markersize=11 if marker == "*" else 7, **look)
+        _draw_fresh(panel, [design], x, y, colour, marker)
     again = [design for design in best if design["fresh"]]
-    _again(panel, again, x, y, style.SERIES[0], "o", label="on fresh seeds, 95 %")
+    _draw_fresh(panel, again, x, y, style.SERIES[0], "o", label="on fresh seeds, 95 %")
     panel.set_xlabel("design" if x is None else _words(x))
     panel.set_ylabel(_words(y))
 
 
-def _points(panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry, **look: Any) -> None:
+def _draw_points(
+    panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry, **look: Any
+) -> None:
     if designs:
         places = [_value(d, x, "objectives") for d in designs]
         look = {"linestyle": "", "markersize": 5, **look}
         panel.plot(places, [_value(d, y, "objectives") for d in designs], **look)
 
 
-def _again(
+def _draw_fresh(
     panel: Axes,
     designs: Sequence[Entry],
     x: Entry | None,

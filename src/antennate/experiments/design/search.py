@@ -137,10 +137,11 @@ class Search:
         count = min(self.config.batch, self.config.proposals - len(self.asked))
         space = self.config.search
         goals: list[Goal] = [objective.goal for objective in self.objectives]
-        past = [
-            Proposal(drawn, worth and [value["value"] for value in worth.values()])
-            for drawn, worth in ((drawn, design.objectives) for drawn, design in self.asked)
-        ]
+        past: list[Proposal] = []
+        for drawn, design in self.asked:
+            worth = design.objectives
+            values = None if worth is None else [value["value"] for value in worth.values()]
+            past.append(Proposal(drawn, values))
         proposals = self._decided(
             f"proposals.{len(self.asked)}",
             lambda: propose(space, past, goals, count, self.config.seed),

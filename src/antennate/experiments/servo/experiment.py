@@ -112,7 +112,7 @@ def _note(result: Mapping[str, Any]) -> str:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """How far the model is from the real servo, and which recording differs, and why."""
-    return " ".join([_sentence(result), _spread(result), *_stalls(result)])
+    return " ".join([_misses(result), _spread(result), *_stalls(result)])
 
 
 def _spread(result: Mapping[str, Any]) -> str:
@@ -127,7 +127,7 @@ def _spread(result: Mapping[str, Any]) -> str:
     )
 
 
-def _sentence(result: Mapping[str, Any]) -> str:
+def _misses(result: Mapping[str, Any]) -> str:
     """The error on what the model was fitted on and on what it was not."""
     model = result["models"][-1]
     if not result["fitted"]:
@@ -154,14 +154,14 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
     panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
     traces = np.degrees(outcome.traces())
     for i, panel in enumerate(panels):
-        _draw(panel, outcome, i, traces[:, :, i])
+        _draw_course(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    return {"servo": figure, "recordings": _by_recording(outcome)}
+    return {"servo": figure, "recordings": _draw_errors(outcome)}
 
 
 @style.styled
-def _by_recording(outcome: ServoOutcome) -> Figure:
+def _draw_errors(outcome: ServoOutcome) -> Figure:
     """The error of each recording: over all, while the shaft stalls, and else."""
     rows = outcome.rows
     figure = style.canvas(style.WIDTH, 1.2 + 0.3 * len(rows))
@@ -181,7 +181,7 @@ def _by_recording(outcome: ServoOutcome) -> Figure:
     return figure
 
 
-def _draw(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:
+def _draw_course(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:
     recording, names = outcome.recordings[place], [model.name for model in outcome.models]
     t = STEP * SHOWN * np.arange(len(traces))
     inside = t <= recording.t[-1]

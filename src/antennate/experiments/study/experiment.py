@@ -181,14 +181,14 @@ def figures(outcome: StudyOutcome) -> dict[str, Figure]:
     """The figure that suits the plan."""
     result = outcome.result()
     if any(size(effect)[0] is not None for effect in result["effects"]):
-        return {"effects": effects(result)}
+        return {"effects": _draw_effects(result)}
     if outcome.config.plan == "grid" and len(result["axes"]) > 1:
-        return {"map": maps(result)}
-    return {"points": lines(result)}
+        return {"map": _draw_maps(result)}
+    return {"points": _draw_lines(result)}
 
 
 @style.styled
-def effects(result: Result) -> Figure:
+def _draw_effects(result: Result) -> Figure:
     """The largest effects and the noise; a panel for each target."""
     targets = list(dict.fromkeys(effect["of"] for effect in result["effects"]))
     parameters = len(result["effects"]) // len(targets)
@@ -200,7 +200,7 @@ def effects(result: Result) -> Figure:
     for panel, target in zip(panels, targets, strict=True):
         known = [e for e in result["effects"] if e["of"] == target and size(e)[0] is not None]
         known.sort(key=lambda effect: abs(size(effect)[0] or 0.0))
-        _sizes(panel, known[-count:], measure, signed)
+        _draw_sizes(panel, known[-count:], measure, signed)
         some = f", the {count} largest of {parameters}" if count < parameters else ""
         panel.set_title(f"{target or measure.label}{some}")
     if signed:
@@ -218,7 +218,7 @@ def effects(result: Result) -> Figure:
     return figure
 
 
-def _sizes(panel: Axes, effects: Sequence[Result], measure: Measure, signed: bool) -> None:
+def _draw_sizes(panel: Axes, effects: Sequence[Result], measure: Measure, signed: bool) -> None:
     """Each effect with its interval, its name above it; grey as far as noise alone would reach."""
     noises = [effect["noise"] for effect in effects]
     if noises and not signed and noises[0] is not None:
@@ -255,7 +255,7 @@ def _sizes(panel: Axes, effects: Sequence[Result], measure: Measure, signed: boo
 
 
 @style.styled
-def maps(result: Result) -> Figure:
+def _draw_maps(result: Result) -> Figure:
     """A map over the first two parameters for each condition and each value of the others."""
     x, y, *others = result["axes"]
     cells = result["points"]
@@ -278,7 +278,7 @@ def maps(result: Result) -> Figure:
     image: Any = None
     for panel, (name, rest) in zip(panels, drawn, strict=True):
         of = [c for c in cells if (c["condition"], _rest(titles, c, others)) == (name, rest)]
-        image = _map(panel, of, (x, y), ends, measure, full)
+        image = _draw_map(panel, of, (x, y), ends, measure, full)
         panel.set_title(", ".join(filter(None, [name, rest])))
         panel.set_ylabel(titles[y])
     panels[-1].set_xlabel(titles[x])
@@ -293,7 +293,7 @@ def maps(result: Result) -> Figure:
     return figure
 
 
-def _map(
+def _draw_map(
     panel: Axes,
     cells: Sequence[Result],
     axes: tuple[str, str],
@@ -338,7 +338,7 @@ def _text_of(cell: Result, measure: Measure) -> str:
 
 
 @style.styled
-def lines(result: Result) -> Figure:
+def _draw_lines(result: Result) -> Figure:
     """The response against each parameter, with the interval of each point."""
     axes, cells = result["axes"], result["points"]
     names = list(dict.fromkeys(cell["condition"] for cell in cells))

@@ -12,17 +12,15 @@ from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.subject import (
     OF_STUDY,
-    Columns,
     EmitRows,
     Rows,
     Subject,
-    among,
     columns_in,
     columns_of,
     configurations,
     find,
 )
-from antennate.messages import nearest, shortened
+from antennate.messages import shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.plan import Axes, Point
 from antennate.studies.pool import Workers, chunk_of, gather
@@ -100,8 +98,9 @@ def check(config: StudyConfig) -> None:
         subject.check(first)
     except ConfigError as error:
         raise ConfigError(f"{config.experiment}: {error}") from None
-    if (known := columns_of(config.experiment)) is not None:
-        _require_response(config, known)
+    columns = columns_of(config.experiment)
+    if columns is not None and config.response is not None:
+        columns.require(config.response, "response", config.experiment)
 
 
 def _require_names(config: StudyConfig, subject: Subject) -> None:
@@ -154,16 +153,6 @@ def holds(settings: Mapping[str, Any], name: str) -> bool:
     return True
 
 
-def _require_response(config: StudyConfig, columns: Columns) -> None:
-    """Check that there is a column for the response, with numbers."""
-    known = [*([measures.SUCCESS] if "outcome" in columns.names else []), *columns.numbers]
-    if config.response is not None and config.response not in known:
-        raise ConfigError(
-            f"response: expected a measure of {config.experiment}"
-            f"{nearest(config.response, known)}, {among(known)}; found {shortened(config.response)}"
-        )
-
-
 def planned(config: StudyConfig) -> list[tuple[Any, ...]]:
     """What each task is: all trials, point by point."""
     subject = find(config.experiment)
@@ -202,7 +191,7 @@ def run(
     axes = config.axes(subject.model)
     tasks = _tasks(config, subject, points)
     ended: dict[_Key, Rows] = {}
-    checked = False
+    checked = config.response is None
 
     def lost(place: int, failure: Failure) -> tuple[_Key, Rows]:
         condition, trial = tasks[place].trial
@@ -217,7 +206,7 @@ def run(
         ended[key] = rows
         for row in rows:
             if not checked and row[STATUS] in ("ok", "nan"):
-                _require_response(config, columns_in(row))
+                columns_in(row).require(str(config.response), "response", config.experiment)
                 checked = True
             on_row({"point": key[0], **row})
 

@@ -15,9 +15,10 @@ from pydantic import BaseModel, ValidationError
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.effects import SUCCESS
 from antennate.files import in_units
 from antennate.lookup import Registry
-from antennate.messages import shortened, shown
+from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params
 from antennate.params.faults import describe
 from antennate.params.reading import put_over, with_bases
@@ -28,6 +29,8 @@ from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
 
 Rows = list[dict[str, Any]]
+OUTCOME = "outcome"
+"""Column that tells whether a trial succeeded."""
 OF_TRIALS = ("trials", "trial", "seed")
 """Parameters and columns that say which trials there are."""
 MOST_TRIALS = 1_000_000
@@ -119,6 +122,26 @@ class Columns:
     names: Sequence[str]
     numbers: Sequence[str]
 
+    def require(self, measure: str, where: str, of: str, more: Sequence[str] = ()) -> None:
+        """Check that a measure is a column of numbers, or the share of successes.
+
+        Args:
+            measure: Its name.
+            where: Where it is asked for.
+            of: The experiment.
+            more: Further names that are measures.
+
+        Raises:
+            ConfigError: There is no such measure.
+        """
+        known = [SUCCESS, *self.numbers] if OUTCOME in self.names else self.numbers
+        if measure not in (*known, *more):
+            listed = f"{', '.join(known[:_MOST_NAMED])}{', ...' * (len(known) > _MOST_NAMED)}"
+            raise ConfigError(
+                f"{where}: expected a measure of {of}{nearest(measure, [*known, *more])}, one of "
+                f"{listed}; found {shortened(measure)}"
+            )
+
 
 def columns_of(name: str) -> Columns | None:
     """The columns of an experiment, None if they are not known before it is run."""
@@ -139,11 +162,6 @@ def columns_in(row: Mapping[str, Any]) -> Columns:
     return Columns(list(row), [n for n in numbers if n not in OF_TRIALS])
 
 
-def among(names: Sequence[str]) -> str:
-    """The first names of those that may be chosen."""
-    return f"one of {', '.join(names[:_MOST_NAMED])}" + (", ..." * (len(names) > _MOST_NAMED))
-
-
 def nested(point: Point) -> dict[str, Any]:
     """Dotted names as nested tables."""
     tables: dict[str, Any] = {}
@@ -161,6 +179,7 @@ class _ExperimentSubject:
     Attributes:
         condition: Column of its rows that tells the condition; empty without.
         most: Trials that may be run at once.
+        whole: Whether it has no trials of its own.
     """
 
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
@@ -168,6 +187,7 @@ class _ExperimentSubject:
         self.model: type[Params] | None = experiment.config
         self.condition = self._trials.condition if self._trials else ""
         self.most = self._trials.most if self._trials else 1
+        self.whole = self._trials is None
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
         """Its configuration from nested values; `allowed` may differ though nothing reads them."""
@@ -214,6 +234,7 @@ class _FunctionSubject:
     model: type[Params] | None = None
     condition = ""
     most = 1
+    whole = False
 
     def __init__(self, name: str, axes: Collection[str]) -> None:
         self._function, self._axes = FUNCTIONS.find(name), axes
