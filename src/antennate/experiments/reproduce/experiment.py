@@ -23,7 +23,6 @@ from antennate.experiments.reproduce.verdict import (
     Claim,
     Finding,
     Row,
-    verdict,
 )
 from antennate.figures import INK, SERIES, canvas, styled
 from antennate.messages import command_words
@@ -95,7 +94,7 @@ class ReproduceOutcome:
         """One row a claim."""
         return [
             Row(
-                *(c.claim, c.criterion, c.rival, c.paper, f.ours, verdict(f.holds, c.best)),
+                *(c.claim, c.criterion, c.rival, c.paper, f.ours, c.verdict(f)),
                 *(f.reason, command(c.experiment, self.config)),
             )
             for c, f in self.judged

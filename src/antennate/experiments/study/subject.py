@@ -315,7 +315,12 @@ def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
             raise BadInputError(
                 f"column {shortened(name)}: expected another name, as the study has this column"
             )
-        row[_text(name, "the name of a column")] = _json(value, f"column {shortened(name)}")
+        where = "the name of a column"
+        try:
+            key, where = _text(name), f"column {shortened(name)}"
+            row[key] = _json(value)
+        except ValueError as error:
+            raise BadInputError(f"{where}: {error}") from None
     if (size := len(dumped(row))) > LARGEST_ROW:
         raise BadInputError(
             f"expected a row of at most {in_units(LARGEST_ROW)} as JSON, found {in_units(size)}"
@@ -323,51 +328,51 @@ def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
     return row
 
 
-def _json(value: Any, where: str) -> Any:
-    """A value as JSON has it."""
+def _json(value: Any) -> Any:
+    """A value as JSON has it; a ValueError says what was expected of it."""
     match value:
         case Enum():
-            return _json(value.value, where)
+            return _json(value.value)
         case None | bool():
             return value
         case np.bool_():
             return bool(value)
         case int() | np.integer():
-            return _whole(int(value), where)
+            return _whole(int(value))
         case float() | np.floating():
             return float(value)
         case str():
-            return _text(value, where)
+            return _text(value)
         case np.ndarray():
-            return _json(value.tolist(), where)
+            return _json(value.tolist())
         case list() | tuple():
-            return [_json(item, where) for item in value]
+            return [_json(item) for item in value]
         case Mapping():
-            return {_key(key, where): _json(item, where) for key, item in value.items()}
+            return {_key(key): _json(item) for key, item in value.items()}
     kind = type(value).__name__  # its own text may be long, or raise
-    raise BadInputError(f"{where}: expected numbers or text, found an object of type {kind}")
+    raise ValueError(f"expected numbers or text, found an object of type {kind}")
 
 
-def _key(value: Any, where: str) -> str:
+def _key(value: Any) -> str:
     if not isinstance(value, str):
-        raise BadInputError(f"{where}: expected keys as text, found {type(value).__name__}")
-    return _text(value, where)
+        raise ValueError(f"expected keys as text, found {type(value).__name__}")
+    return _text(value)
 
 
-def _whole(value: int, where: str) -> int:
+def _whole(value: int) -> int:
     try:
         float(value)
     except OverflowError:
-        raise BadInputError(
-            f"{where}: expected a number below 1.8e308, found a whole number of "
-            f"{value.bit_length()} bits"
+        bits = value.bit_length()
+        raise ValueError(
+            f"expected a number below 1.8e308, found a whole number of {bits} bits"
         ) from None
     return value
 
 
-def _text(value: str, where: str) -> str:
+def _text(value: str) -> str:
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise BadInputError(f"{where}: expected Unicode text, found {value[:40]!a}") from None
+        raise ValueError(f"expected Unicode text, found {value[:40]!a}") from None
     return str(value)
