@@ -24,9 +24,8 @@ from antennate.messages import extra, one_line, shortened, typed
 from antennate.params.base import Params
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
-from antennate.telemetry.parts import MOST_PARTS, part, parts
-from antennate.telemetry.reader import LogReader
-from antennate.telemetry.recover import RECOVERED, left_out, recover
+from antennate.telemetry.header import MOST_PARTS, part, parts
+from antennate.telemetry.reader import RECOVERED, LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS

@@ -22,7 +22,7 @@ from antennate.studies.report import View, write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOG, LOGS, require_apart
 from antennate.studies.store import Tasks
-from antennate.telemetry.recover import RECOVERED
+from antennate.telemetry.reader import RECOVERED
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from mcap.records import (
 from zstandard import ZstdCompressor
 
 from antennate.telemetry.cdr import Form
-from antennate.telemetry.summary import MAGIC
+from antennate.telemetry.chunks import MAGIC
 from antennate.types import Ints
 
 _COMPRESSION = "zstd"

@@ -171,13 +171,16 @@ class LogWriter:
         return np.maximum.accumulate(np.maximum(found, self._time))
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
-        """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
+        """Add a message as it is, of a tick and a time [ns], not before the last one's.
+
+        It is not counted as a tick.
+        """
         if self.failure:
             return
         self._since = min(self._since, time.monotonic())
         self._size += len(data)
         self._time = max(self._time, stamp)
-        self._container.add(self._channels[topic], number & _NUMBERS, stamp, data)
+        self._container.add(self._channels[topic], number & _NUMBERS, self._time, data)
 
     def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
         """Add an event at a time of the loop [s], not before the last tick."""

@@ -14,7 +14,7 @@ from antennate.sim.world import World
 from antennate.telemetry.header import Header
 from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.records import Record
+from antennate.telemetry.survey import Record
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TICK, Channel, Poses
