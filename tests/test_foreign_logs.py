@@ -253,7 +253,7 @@ def test_X10_a_hostile_log_takes_at_most_200_MB(
 
 @pytest.mark.parametrize(
     ("odd", "words"),
-    [("type", ["log", "info"]), ("encoding", ["log", "info"]), ("controller", ["replay"])],
+    [("type", ["log", "info"]), ("encoding", ["log", "info"]), ("controller", ["log", "replay"])],
 )
 def test_a_very_long_name_is_quoted_in_short(
     odd: str, words: list[str], log: Path, capsys: pytest.CaptureFixture[str]
