@@ -101,7 +101,7 @@ def _replayed(
             return log, replay(log, controller, log.header, readings=readings), ()
     from antennate.cli.view import arena_of  # these import much, for a page
     from antennate.telemetry.view.pace import Restart
-    from antennate.telemetry.view.replayed import ReplayPlayer
+    from antennate.telemetry.view.player import ReplayPlayer
 
     with page:
         while True:

@@ -21,7 +21,7 @@ from antennate.twin.config import Passage, TwinConfig
 from antennate.twin.robot import TwinRobot
 
 if TYPE_CHECKING:
-    from antennate.telemetry.twin_film import TwinFilm
+    from antennate.telemetry.log_film import TwinFilm
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Kept:
             self._log = TwinLog(path, self._robot, config, start, _tell)
             self.watchers.append(self._log.take)
         if self._options.video is not None:
-            from antennate.telemetry.twin_film import TwinFilm  # slow to import
+            from antennate.telemetry.log_film import TwinFilm  # slow to import
 
             self._film = TwinFilm(self._robot, passage, config)
             self.watchers.append(self._film.take)

@@ -27,7 +27,7 @@ from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.view import ports
+from antennate.telemetry.view import PAGE_PORT
 from antennate.telemetry.view.pace import Restart
 from antennate.telemetry.view.player import LogPlayer
 from antennate.telemetry.view.process import ViewProcess
@@ -44,7 +44,7 @@ class Options(FoxgloveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
-    port: int = option(ports.PAGE, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
+    port: int = option(PAGE_PORT, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
     speed: float = option(
         1.0, "times real time at which it begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )

@@ -14,7 +14,7 @@ from antennate.cli.options import option
 from antennate.cli.status import write
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import BY_HAND
-from antennate.telemetry.view import ports
+from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT
 
 if TYPE_CHECKING:  # both import much, for a page that few runs want
     from antennate.telemetry.view.process import ViewProcess
@@ -29,7 +29,7 @@ class FoxgloveOptions:
         False, "topics live for Foxglove and Lichtblick, without access control"
     )
     foxglove_port: int = option(
-        ports.FOXGLOVE,
+        FOXGLOVE_PORT,
         "port for these, 0 takes any",
         "PORT",
         needs=["--foxglove"],
@@ -44,7 +44,7 @@ class PageOptions(FoxgloveOptions):
 
     view: bool = option(False, "show it on a page of this computer while it runs")
     view_port: int = option(
-        ports.PAGE, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
+        PAGE_PORT, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
     )
 
 

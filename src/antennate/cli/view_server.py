@@ -66,13 +66,11 @@ def _sink(port: int) -> Display:
 
 
 def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack) -> Display:
-    from antennate.telemetry.view import page
-    from antennate.telemetry.view.gate import Gate
-    from antennate.telemetry.view.server import serve
+    from antennate.telemetry.view.server import Gate, load_page, serve
     from antennate.telemetry.view.show import Page
 
     port = listener.getsockname()[1]
-    gate = Gate(port, *page.load(port), lambda: write(f"view: for another browser: {gate.link}\n"))
+    gate = Gate(port, *load_page(port), lambda: write(f"view: for another browser: {gate.link}\n"))
     server = serve(listener, gate)
     stack.callback(server.stop)
     shown = Page(server, channel)

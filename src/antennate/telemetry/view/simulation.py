@@ -17,8 +17,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
 from antennate.telemetry.ticks import Tick, numbers_of
 from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
-from antennate.telemetry.view.pace import Pace, Restart
-from antennate.telemetry.view.tuning import Tuning
+from antennate.telemetry.view.pace import Pace, Restart, Tuning
 from antennate.types import AntennaFrame, Contact, Controller
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
