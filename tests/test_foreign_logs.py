@@ -185,7 +185,7 @@ def test_a_log_that_is_not_read_is_refused_with_the_tool_that_rewrites_it(
         for number in range(1, TICKS + 1):
             out.write(replace(tick(number), now=float(number)))
     new = anew(Path("walk.mcap"), **how)
-    for words in (["log", "info"], ["log", "recover", "--out", "whole.mcap"], ["replay"]):
+    for words in (["log", "info"], ["log", "recover", "--out", "whole.mcap"], ["log", "replay"]):
         assert main([*words, str(new)]) == 2
         err = capsys.readouterr().err
         assert said in err
