@@ -118,8 +118,8 @@ class Container:
             begin = starts[channel] + _MESSAGE.size
             head = block[:, starts[channel] : begin].view(_MESSAGES)[:, 0]
             length = _MESSAGE.size - _HEAD + form.size
-            found = Opcode.MESSAGE, length, channel, numbers, times, times
-            for name, value in zip(head.dtype.names or (), found, strict=True):
+            values = Opcode.MESSAGE, length, channel, numbers, times, times
+            for name, value in zip(head.dtype.names or (), values, strict=True):
                 head[name] = value
             form.fill(block[:, begin : begin + form.size], columns)
         begins, done = np.empty(len(times), np.int64), 0
@@ -179,11 +179,13 @@ class Container:
 
     def _count(self, chunk: Chunk) -> None:
         """Note a chunk in the statistics."""
-        found = self._statistics
-        first = found.message_start_time if found.chunk_count else chunk.message_start_time
-        found.message_start_time = min(first, chunk.message_start_time)
-        found.message_end_time = max(found.message_end_time, chunk.message_end_time)
-        found.chunk_count += 1
+        statistics = self._statistics
+        first = (
+            statistics.message_start_time if statistics.chunk_count else chunk.message_start_time
+        )
+        statistics.message_start_time = min(first, chunk.message_start_time)
+        statistics.message_end_time = max(statistics.message_end_time, chunk.message_end_time)
+        statistics.chunk_count += 1
 
     def finish(self) -> None:
         """Write the last chunk and the summary. Nothing may follow."""

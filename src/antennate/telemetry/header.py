@@ -44,7 +44,7 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
     Args:
         packages: Optional packages that count too; one that is not installed is left out.
     """
-    found = {
+    table = {
         "antennate": __version__,
         "python": platform.python_version(),
         "numpy": metadata.version("numpy"),
@@ -53,10 +53,10 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
         "platform": f"{platform.system()} {platform.machine()}",
     }
     for name in packages:
-        if name not in found:
+        if name not in table:
             with contextlib.suppress(metadata.PackageNotFoundError):
-                found[name] = metadata.version(name)
-    return found
+                table[name] = metadata.version(name)
+    return table
 
 
 class Header(Strict):
@@ -122,14 +122,16 @@ class Header(Strict):
         return {topic: topic.type.encode(text) for topic, text in texts.items()}
 
     @classmethod
-    def of_messages(cls, found: Mapping[Topic, bytes]) -> Header:
+    def of_messages(cls, messages: Mapping[Topic, bytes]) -> Header:
         """Back from `messages`.
 
         Raises:
             LogError: One is missing or damaged.
         """
         texts = {
-            topic: topic.decode(found[topic])["data"] for topic in HEADER_TOPICS if topic in found
+            topic: topic.decode(messages[topic])["data"]
+            for topic in HEADER_TOPICS
+            if topic in messages
         }
         if CONFIG not in texts:
             raise LogError(f"expected a header of a log, found no {CONFIG.name}")

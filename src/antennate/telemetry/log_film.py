@@ -48,11 +48,11 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
             continue
         for record in records:
             if record.topic is COORDINATES:
-                found = COORDINATES.decode(record.data)
+                state = COORDINATES.decode(record.data)
                 if not placed:  # what was drawn before has another world
-                    scene, placed = LogScene(log.header, arena, len(found["position"])), True
+                    scene, placed = LogScene(log.header, arena, len(state["position"])), True
                     recorder, t, before = WalkRecorder(robot), 0.0, -math.inf
-                scene.take(tick.now, found["position"], found["robot"])
+                scene.take(tick.now, state["position"], state["robot"])
         t += min(max(0.0, tick.now - before), _LONGEST) if math.isfinite(before) else 0.0
         before = tick.now
         while recorder.due(t) and len(recorder) < MOST_PICTURES:
@@ -114,15 +114,15 @@ class TwinFilm:
 
     def film(self) -> Film | None:
         """The film, None if the physics never began."""
-        kept = self._recorder
-        if not len(kept):
+        recorder = self._recorder
+        if not len(recorder):
             return None
-        touches = kept.values("touches").astype(np.int64)
-        return kept.walk(
+        touches = recorder.values("touches").astype(np.int64)
+        return recorder.walk(
             f"twin, trial {self._config.trial}",
-            [film.trace("way of the head [m]", kept.values("progress"))],
+            [film.trace("way of the head [m]", recorder.values("progress"))],
             [
-                Band("torque", kept.values("torque").astype(np.int64), _TORQUES),
+                Band("torque", recorder.values("torque").astype(np.int64), _TORQUES),
                 *(Band(side, touches[:, i], _TOUCHES) for i, side in enumerate(("left", "right"))),
             ],
         )

@@ -39,10 +39,10 @@ class LogScene:
 
         Without the arena these alone are used.
         """
-        known = np.array(place)
+        coordinates = np.array(place)
         if self._bare:
-            known = known[robot : robot + self.world.model.nq]
-        self._before, self._last = self._last, (t, known)
+            coordinates = coordinates[robot : robot + self.world.model.nq]
+        self._before, self._last = self._last, (t, coordinates)
 
     def place(self, t: float) -> None:
         """Put all where it is at a time [s], between the last two places known: a little late."""

@@ -241,9 +241,9 @@ class LogReader:
                         self._note(*place)
                         continue
                     if isinstance(place, End):
-                        known = self._channels
+                        topics = self._channels
                         ticks = (
-                            n for each, n in place.counts.items() if known.get(each) is MANEUVER
+                            n for each, n in place.counts.items() if topics.get(each) is MANEUVER
                         )
                         self.end = self._before + sum(ticks)
                         continue
@@ -298,12 +298,12 @@ class LogReader:
         self._file.seek(0)
         refuse_old(self.path, self._file.read(1 << 16))
         ticks = sum(1 for _ in self)
-        found = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
+        content = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
         if self.bad:
-            found += f", the first at byte {self.damage[0].offset}: {self.damage[0].reason}"
+            content += f", the first at byte {self.damage[0].offset}: {self.damage[0].reason}"
         if self.end is not None and not (self.bad or ticks):
-            found = "one of another program"
-        raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")
+            content = "one of another program"
+        raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {content}")
 
     def _note(self, offset: int, reason: str) -> None:
         self.bad += 1
@@ -322,11 +322,11 @@ def count(path: Path) -> int:
         with LogReader(path) as log:
             return sum(1 for _ in log)
     except LogError:
-        found = 0
-    for each in parts(path)[1:]:
-        with suppress(LogError), LogReader(each) as log:
-            found += sum(1 for _ in log)
-    return found
+        ticks = 0
+    for later in parts(path)[1:]:
+        with suppress(LogError), LogReader(later) as log:
+            ticks += sum(1 for _ in log)
+    return ticks
 
 
 def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:

@@ -154,9 +154,9 @@ class RowLog(Generic[Taken]):
     def _begin(self) -> None:
         """Let the thread write what is held, once it has written what was held before."""
         self._wait()
-        held, self._held, self._since = self._held, [], math.inf
-        if held and not self._forked:
-            self._writing = _encoder().submit(self._write, held)
+        ticks, self._held, self._since = self._held, [], math.inf
+        if ticks and not self._forked:
+            self._writing = _encoder().submit(self._write, ticks)
 
     @property
     def _forked(self) -> bool:
@@ -173,9 +173,9 @@ class RowLog(Generic[Taken]):
                 raise
         self._writing = None
 
-    def _write(self, held: Sequence[Taken]) -> None:
+    def _write(self, ticks: Sequence[Taken]) -> None:
         """Encode ticks, and hand them to the operating system."""
-        count, (rows, beside) = len(held), self._rows(held)
+        count, (rows, beside) = len(ticks), self._rows(ticks)
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
         stamps = self._out.stamps(t)
@@ -200,7 +200,7 @@ class RowLog(Generic[Taken]):
         }
         self._out.write_many(
             stamps,
-            {topic: (self._forms[topic], each) for topic, each in columns.items()},
+            {topic: (self._forms[topic], numbers) for topic, numbers in columns.items()},
             beside,
         )
 
@@ -216,7 +216,7 @@ os.register_at_fork(after_in_child=_encoder.cache_clear)
 
 def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
     """Messages of a tick in which all that is known in simulation varies."""
-    pair, each = (0.0, 0.0), (0.0,) * len(names)
+    pair, angles = (0.0, 0.0), (0.0,) * len(names)
     joints, time = (0, 0, "", names), ("sec", "nanosec")
     return {
         ANTENNA: Form(
@@ -227,10 +227,10 @@ def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
         MANEUVER: Form(
             MANEUVER.type, (0, 0.0, 0, 0.0, True), ("number", "now", "maneuver", "phase")
         ),
-        JOINT_COMMANDS: Form(JOINT_COMMANDS.type, (*joints, each, (), ()), (*time, "position")),
+        JOINT_COMMANDS: Form(JOINT_COMMANDS.type, (*joints, angles, (), ()), (*time, "position")),
         JOINT_STATES: Form(
             JOINT_STATES.type,
-            (*joints, each, each, each),
+            (*joints, angles, angles, angles),
             (*time, "position", "velocity", "effort"),
         ),
     }
@@ -262,25 +262,32 @@ class Decisions:
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> bytes:
         """One tick, for `rows`: a copy, in one piece, as this is done in every tick."""
-        made = self._controller
+        controller = self._controller
         try:
-            phase: Any = made.phase
+            phase: Any = controller.phase
             usual = phase.shape == self._unknown.shape and phase.dtype == float
         except KeyboardInterrupt:
             raise
         except BaseException:  # noqa: BLE001 a property of anybody may raise anything
             phase, usual = None, False
         if not usual:
-            phase = np.array(numbers_of(made, "phase"))
+            phase = np.array(numbers_of(controller, "phase"))
             phase = phase if phase.shape == self._unknown.shape else self._unknown
-        found = [frame.t, made.maneuver, phase, frame.counts, made.level, made.contact]
-        found += [getattr(command, name) for name in self._parts]
-        if [part.dtype for part in found] != self._kinds:
-            found = [part.astype(kind) for part, kind in zip(found, self._kinds, strict=True)]
+        parts = [
+            frame.t,
+            controller.maneuver,
+            phase,
+            frame.counts,
+            controller.level,
+            controller.contact,
+        ]
+        parts += [getattr(command, name) for name in self._parts]
+        if [part.dtype for part in parts] != self._kinds:
+            parts = [part.astype(kind) for part, kind in zip(parts, self._kinds, strict=True)]
         try:
-            return b"".join(found)
+            return b"".join(parts)
         except TypeError:  # one is a view with gaps
-            return b"".join([part.tobytes() for part in found])
+            return b"".join([part.tobytes() for part in parts])
 
     def rows(self, ticks: Sequence[bytes], row: int, into: Floats) -> None:
         """Write how one row of the batch begins in some ticks, shape (n, HEAD + joints)."""
@@ -323,30 +330,34 @@ class TickRows:
 
     def rows(self, ticks: Sequence[TakenTick]) -> Rows:
         """What `RowLog` writes of some ticks; many at once take hardly longer than one."""
-        found = np.empty((len(ticks), HEAD + 4 * self._angles))
+        rows = np.empty((len(ticks), HEAD + 4 * self._angles))
         end = HEAD + self._angles
-        self._decisions.rows([tick.decided for tick in ticks], self._row, found[:, :end])
+        self._decisions.rows([tick.decided for tick in ticks], self._row, rows[:, :end])
         measured, places = self._world.measured([tick.measured for tick in ticks])
-        found[:, end:] = measured.reshape(len(ticks), -1)
+        rows[:, end:] = measured.reshape(len(ticks), -1)
         looks = {i: tick.contacts for i, tick in enumerate(ticks) if tick.contacts is not None}
-        return found, self._messages(looks, places) if looks else {}
+        return rows, self._messages(looks, places) if looks else {}
 
     def _messages(
         self, looks: Mapping[int, Contacts], places: Floats
     ) -> dict[int, dict[Topic, bytes]]:
         """The messages beside the ticks at which one looked."""
         coordinates = self._form.encode(len(looks), {"position": places[[*looks]]})
-        found = {i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)}
+        messages = {
+            i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)
+        }
         contacts = Contacts.joined([*looks.values()])
         which, names, points, forces = self._world.obstacle_contacts(contacts)
         columns = names, *points.T.tolist(), forces.tolist()
-        ends = np.cumsum([len(each.geoms) for each in looks.values()])
+        ends = np.cumsum([len(contact.geoms) for contact in looks.values()])
         begin, encode = 0, CONTACT_FORCES.type.encode
-        for message, end in zip(found.values(), np.searchsorted(which, ends).tolist(), strict=True):
+        for message, end in zip(
+            messages.values(), np.searchsorted(which, ends).tolist(), strict=True
+        ):
             if begin < end:
                 message[CONTACT_FORCES] = encode(*(column[begin:end] for column in columns))
             begin = end
-        return found
+        return messages
 
 
 class SimulatedLog(RowLog[TakenTick]):

@@ -123,22 +123,22 @@ class LogPlayer(Pace):
         """Keep coordinates and forces of a tick; the first coordinates bring the scene."""
         for record in records:
             if record.topic is COORDINATES:
-                found = COORDINATES.decode(record.data)
-                place = found["position"]
+                state = COORDINATES.decode(record.data)
+                place = state["position"]
                 if self._scene is None:
                     self._scene = LogScene(self._header, self._arena, len(place))
                     self._model = VisibleModel(self._scene.world.model, _SIDES)
                     self.channel.send_whole(SCENE, self._model.shapes().pack())
-                self._scene.take(tick.now, place, found["robot"])
+                self._scene.take(tick.now, place, state["robot"])
             elif record.topic is CONTACT_FORCES:
                 self._forces = _bars(CONTACT_FORCES.decode(record.data))
 
 
-def _bars(found: Mapping[str, Any]) -> Any:
+def _bars(contacts: Mapping[str, Any]) -> Any:
     """Forces of a log, whose directions are not known, as arrows upwards."""
-    places = np.array([found["x"], found["y"], found["z"]]).T.reshape(-1, 3)
+    places = np.array([contacts["x"], contacts["y"], contacts["z"]]).T.reshape(-1, 3)
     bars = np.zeros((len(places), 6), np.float32)
-    bars[:, :3], bars[:, 5] = places, found["normal"]
+    bars[:, :3], bars[:, 5] = places, contacts["normal"]
     return bars
 
 

@@ -92,8 +92,8 @@ class SceneView:
     def _aim(self, places: NDArray[np.float32]) -> None:
         """Look from behind and above at the robot, once."""
         self._aimed = True
-        ours = places[self.shapes.robot]
-        reach = float(np.ptp(ours if len(ours) else places, axis=0).max())
+        robot = places[self.shapes.robot]
+        reach = float(np.ptp(robot if len(robot) else places, axis=0).max())
         for name, size in _thickness(min(1.0, reach / _ROBOT)).items():
             setattr(self._arrows, name, size)
         camera = self._server.initial_camera
@@ -110,8 +110,8 @@ def arrows(forces: NDArray[np.float32], scale: float, least: float) -> NDArray[n
         least: Length of the arrow of a weak force, so that it is seen [m].
     """
     size = np.linalg.norm(forces[:, 3:], axis=1, keepdims=True)
-    some = size[:, 0] > 0
-    at, force, size = forces[some, :3], forces[some, 3:], size[some]
+    acting = size[:, 0] > 0
+    at, force, size = forces[acting, :3], forces[acting, 3:], size[acting]
     return np.stack([at, at + np.maximum(scale, least / size) * force], axis=1)
 
 
@@ -158,13 +158,13 @@ class _Group:
 
     def place(self, places: NDArray[np.float32], turned: NDArray[np.float32]) -> None:
         """Put its shapes where they are, if anything has moved."""
-        mine = Rotation.from_matrix(turned[self.which])
-        at = places[self.which] + mine.apply(self._shift)
-        now = np.concatenate([at.ravel(), mine.as_quat().ravel()]).astype(np.float32)
+        rotation = Rotation.from_matrix(turned[self.which])
+        at = places[self.which] + rotation.apply(self._shift)
+        now = np.concatenate([at.ravel(), rotation.as_quat().ravel()]).astype(np.float32)
         if not np.array_equal(now, self._before):
             self._before = now
             self.node.batched_positions = at
-            self.node.batched_wxyzs = mine.as_quat(scalar_first=True)
+            self.node.batched_wxyzs = rotation.as_quat(scalar_first=True)
 
 
 def _linear(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -183,17 +183,17 @@ def _groups(
     """Name, shapes, mesh, scale and shift along their own axes, and colour of each group."""
     round_, box = trimesh.creation.icosphere(2), trimesh.creation.box((2.0, 2.0, 2.0))
     tube = trimesh.creation.cylinder(1.0, 2.0, sections=24)
-    found = []
+    groups = []
     kind, size = what.kind, what.size.astype(np.float64)
 
     def add(name: str, which: Ints, mesh: Any, scale: Floats, shift: float = 0.0) -> None:
         for moves in (False, True):
-            mine = what.moves[which] == moves
-            if mine.any():
-                some = which[mine]
-                along = shift * size[some, 1:2] * _ALONG_Z
+            chosen = what.moves[which] == moves
+            if chosen.any():
+                numbers = which[chosen]
+                along = shift * size[numbers, 1:2] * _ALONG_Z
                 label = f"{name}_{'moving' if moves else 'fixed'}"
-                found.append((label, some, mesh, scale[mine], along, what.colour[some]))
+                groups.append((label, numbers, mesh, scale[chosen], along, what.colour[numbers]))
 
     def of(*kinds: int) -> Ints:
         return np.flatnonzero(np.isin(kind, kinds))
@@ -212,7 +212,7 @@ def _groups(
         mesh = (what.vertices[first:corners], what.faces[start:triangles])
         which = np.flatnonzero(what.mesh == number)
         add(f"mesh{number}", which, mesh, np.ones((len(which), 3)))
-    return found
+    return groups
 
 
 def _floor(server: viser.ViserServer, height: float) -> None:

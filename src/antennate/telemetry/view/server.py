@@ -93,8 +93,8 @@ class Gate:
             return self._refuse("expected a request of the page itself")
         path, _, query = request.path.partition("?")
         if live:
-            known = path == "/" and self._is_known(headers)
-            return None if known else self._refuse("expected the cookie of the page")
+            allowed = path == "/" and self._is_known(headers)
+            return None if allowed else self._refuse("expected the cookie of the page")
         tokens = parse_qs(query).get("token", [])
         if path == "/" and tokens:
             return self._let_in(tokens)
