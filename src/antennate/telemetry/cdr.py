@@ -11,6 +11,7 @@ import re
 import struct
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,7 +98,7 @@ class MessageType:
             numbers = iter(self._first.unpack_from(body))
             for field in self.fields[: self._leading]:
                 values[field.name] = (
-                    _several(numbers, field.number) if field.number else next(numbers)
+                    tuple(islice(numbers, field.number)) if field.number else next(numbers)
                 )
             for field in self.fields[self._leading :]:
                 values[field.name], at = _take(body, at, field)
@@ -164,10 +165,6 @@ def _field(line: str) -> Field:
     kind, several, count, name = match.groups()
     code = "" if kind == "string" else _CODES[kind]
     return Field(name, code, None if several and not count else int(count or 0))
-
-
-def _several(numbers: Any, count: int) -> tuple[Any, ...]:
-    return tuple(next(numbers) for _ in range(count))
 
 
 def _put(body: bytearray, field: Field, value: Any) -> None:

@@ -14,10 +14,10 @@ from antennate.robots.spec import ANTENNA_PREFIXES
 from antennate.sim.world import World
 from antennate.telemetry import film
 from antennate.telemetry.film import MOST_PICTURES, Film, WalkRecorder
-from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.strip import Band
 from antennate.telemetry.topics import COORDINATES
+from antennate.telemetry.view.player import LogScene
 from antennate.twin.config import Passage, TwinConfig
 from antennate.twin.robot import TwinRobot
 

@@ -328,7 +328,7 @@ class _NewFile(io.BufferedIOBase):
                 os.close(folder)
         try:
             while not self._over.wait(period):
-                _sync_data(self._file)
+                getattr(os, "fdatasync", os.fsync)(self._file)  # the bytes, if not its times
         except OSError as error:
             self._lost = reason(error)
 
@@ -341,8 +341,3 @@ class _NewFile(io.BufferedIOBase):
         if self._file >= 0:
             file, self._file = self._file, -1
             os.close(file)
-
-
-def _sync_data(file: int) -> None:
-    """Wait until the disk has the bytes of a file, if not its times."""
-    getattr(os, "fdatasync", os.fsync)(file)

@@ -18,7 +18,6 @@ import viser
 from antennate.colours import SERIES, called, rgba
 from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
-from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import (
     END,
@@ -34,9 +33,9 @@ from antennate.telemetry.view.channel import (
     read,
 )
 from antennate.telemetry.view.charts import LABELS, Charts, Map
-from antennate.telemetry.view.controls import Controls
 from antennate.telemetry.view.pace import RATE
-from antennate.telemetry.view.scene import SceneView
+from antennate.telemetry.view.player import LogScene
+from antennate.telemetry.view.scene import Controls, SceneView
 
 _SLOW = 0.1
 """Time between two pictures of charts, map and status [s]: they are read, not watched."""
