@@ -21,7 +21,7 @@ from antennate.hardware.driving.teleop import KeyController
 from antennate.params.control import ControlParams
 from antennate.params.setup import TeleopParams
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.view.tuning import Tuning
+from antennate.telemetry.view.pace import Tuning
 
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'own_controller.py'}:OwnController"
 LIFTING = {"legs": {"kind": "lifting"}}

@@ -19,8 +19,7 @@ from antennate.errors import LogError
 from antennate.hardware.driving.signals import STOPS
 from antennate.params.control import ControlParams
 from antennate.telemetry.feed import KEPT, Feed, messages
-from antennate.telemetry.header import Header
-from antennate.telemetry.parts import part
+from antennate.telemetry.header import Header, part
 from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.ticks import Tick
 

@@ -24,9 +24,9 @@ from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.session import Session
 from antennate.port import PortError
-from antennate.telemetry.log_queue import LogQueue
 from antennate.telemetry.reader import LogReader, count
-from antennate.telemetry.rows import RowLog
+from antennate.telemetry.simulated import RowLog
+from antennate.telemetry.twin_log import LogQueue
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
 from antennate.types import Floats, JointCommand

@@ -303,36 +303,6 @@ def test_export_to_parquet(log: Path, capsys: pytest.CaptureFixture[str]) -> Non
         )
 
 
-@pytest.mark.parametrize("order", ["by topic", "backwards"])
-def test_a_log_in_another_order_is_read_in_that_of_its_times(
-    order: str, log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Other programs may sort the messages of a valid MCAP file."""
-    with log.open("rb") as file, Path("new.mcap").open("wb") as copy:
-        found = [*make_reader(file).iter_messages(log_time_order=False)]
-        head = [each for each in found if each[1].topic in ("/config", "/versions")]
-        rest = [each for each in found if each not in head]
-        rest = sorted(rest, key=lambda each: each[1].topic) if order == "by topic" else rest[::-1]
-        writer, known = Writer(copy, chunk_size=2000), dict[str, int]()
-        writer.start()
-        for schema, channel, message in [*head, *rest]:
-            assert schema is not None
-            if channel.topic not in known:
-                number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                known[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
-            about = (message.log_time, message.data, message.publish_time, message.sequence)
-            writer.add_message(known[channel.topic], *about)
-        writer.finish()
-    wanted, told = info(log, capsys), info(Path("new.mcap"), capsys)
-    for _, each in (wanted, told):
-        del each["log"], each["parts"]
-    assert told == wanted
-    assert wanted[0] == 0
-    assert main(["log", "plot", "new.mcap", "--out", "new.png"]) == 0
-    with LogReader(log) as one, LogReader(Path("new.mcap")) as other:
-        assert [each.pack() for each in one] == [each.pack() for each in other]
-
-
 def test_a_name_that_grows_too_long_is_one_line(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

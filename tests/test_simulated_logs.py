@@ -34,11 +34,10 @@ from antennate.sim import gl
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
-from antennate.telemetry.log_queue import LogQueue
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.rows import HEAD, RowLog, Rows
-from antennate.telemetry.simulated import Decisions, SimulatedLog
+from antennate.telemetry.simulated import HEAD, Decisions, RowLog, Rows, SimulatedLog
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
+from antennate.telemetry.twin_log import LogQueue
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
 
 TICKS = 60

@@ -39,8 +39,7 @@ from antennate.studies.formats import to_json
 from antennate.studies.report import View
 from antennate.studies.run_files import LOG, LOG_PARTS
 from antennate.telemetry.feed import Feed
-from antennate.telemetry.header import Header
-from antennate.telemetry.parts import part, parts
+from antennate.telemetry.header import Header, part, parts
 from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
 from antennate.types import Controller

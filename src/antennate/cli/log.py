@@ -37,14 +37,12 @@ from antennate.studies.measures import Table
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
-from antennate.telemetry.header import Header
-from antennate.telemetry.parts import MOST_PARTS, part, parts
-from antennate.telemetry.reader import LogReader
-from antennate.telemetry.recover import RECOVERED, left_out, recover
+from antennate.telemetry.header import MOST_PARTS, Header, part, parts
+from antennate.telemetry.reader import RECOVERED, LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS
-from antennate.telemetry.view import ports
+from antennate.telemetry.view import PAGE_PORT
 
 if TYPE_CHECKING:  # these import much, for a page and for films
     from antennate.sim.trial import TrialConfig
@@ -311,7 +309,7 @@ class ShownOptions(FoxgloveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
-    port: int = option(ports.PAGE, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
+    port: int = option(PAGE_PORT, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
     speed: float = option(
         1.0, "times real time at which it begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
     )

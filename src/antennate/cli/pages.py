@@ -21,7 +21,7 @@ from antennate.hardware.driving.priority import give_way
 from antennate.hardware.driving.signals import STOPS
 from antennate.messages import one_line
 from antennate.studies.run_files import BY_HAND
-from antennate.telemetry.view import ports
+from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT
 from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 
 if TYPE_CHECKING:  # these import much, for a page that few runs want
@@ -43,7 +43,7 @@ class FoxgloveOptions:
         False, "topics live for Foxglove and Lichtblick, without access control"
     )
     foxglove_port: int = option(
-        ports.FOXGLOVE,
+        FOXGLOVE_PORT,
         "port for these, 0 takes any",
         "PORT",
         needs=["--foxglove"],
@@ -63,7 +63,7 @@ class PageOptions(FoxgloveOptions):
 
     view: bool = option(False, "show it on a page of this computer while it runs")
     view_port: int = option(
-        ports.PAGE, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
+        PAGE_PORT, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
     )
 
 
@@ -173,13 +173,11 @@ def _sink(port: int) -> Display:
 
 
 def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack) -> Display:
-    from antennate.telemetry.view import page
-    from antennate.telemetry.view.gate import Gate
-    from antennate.telemetry.view.server import serve
+    from antennate.telemetry.view.server import Gate, load_page, serve
     from antennate.telemetry.view.show import Page
 
     port = listener.getsockname()[1]
-    gate = Gate(port, *page.load(port), lambda: write(f"view: for another browser: {gate.link}\n"))
+    gate = Gate(port, *load_page(port), lambda: write(f"view: for another browser: {gate.link}\n"))
     server = serve(listener, gate)
     stack.callback(server.stop)
     display = Page(server, channel)

@@ -100,7 +100,7 @@ def _replayed(
             readings = _readings(log, config, options)
             return log, replay(log, controller, log.header, readings=readings), ()
     from antennate.telemetry.view.pace import Restart  # these import much, for a page
-    from antennate.telemetry.view.replayed import ReplayPlayer
+    from antennate.telemetry.view.player import ReplayPlayer
 
     with page:
         while True:

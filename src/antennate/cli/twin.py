@@ -41,7 +41,7 @@ from antennate.twin.udp import UdpEndpoint
 from antennate.types import AntennaFrame
 
 if TYPE_CHECKING:
-    from antennate.telemetry.twin_film import TwinFilm
+    from antennate.telemetry.log_film import TwinFilm
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
@@ -346,7 +346,7 @@ class Recording:
             self._log = TwinLog(path, self._robot, config, start, _say_lost)
             self.watchers.append(self._log.take)
         if self._options.video is not None:
-            from antennate.telemetry.twin_film import TwinFilm  # slow to import
+            from antennate.telemetry.log_film import TwinFilm  # slow to import
 
             self._film = TwinFilm(self._robot, passage, config)
             self.watchers.append(self._film.take)

@@ -19,7 +19,7 @@ from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
 from antennate.studies.identity import code_named, texts
 from antennate.studies.store import STORE
-from antennate.telemetry.parts import MOST_PARTS, part
+from antennate.telemetry.header import MOST_PARTS, part
 
 T = TypeVar("T")
 

@@ -11,6 +11,7 @@ import re
 import struct
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,9 +58,9 @@ class MessageType:
         sizes = [0 if not f.code or f.number is None else max(1, f.number) for f in self.fields]
         self._leading = next((i for i, size in enumerate(sizes) if not size), len(sizes))
         layout, at = "<", 0
-        for each, size in zip(self.fields[: self._leading], sizes, strict=False):
-            width = struct.calcsize(f"<{each.code}")
-            layout += f"{-at % width}x{size}{each.code}"
+        for field, size in zip(self.fields[: self._leading], sizes, strict=False):
+            width = struct.calcsize(f"<{field.code}")
+            layout += f"{-at % width}x{size}{field.code}"
             at += -at % width + size * width
         self._first = struct.Struct(layout)
 
@@ -70,14 +71,14 @@ class MessageType:
             LogError: A number does not fit its field.
         """
         flat: list[Any] = []
-        for each, value in zip(self.fields[: self._leading], values, strict=False):
-            flat += value if each.number else (value,)
+        for field, value in zip(self.fields[: self._leading], values, strict=False):
+            flat += value if field.number else (value,)
         try:
             body = bytearray(self._first.pack(*flat))
-            for each, value in zip(
+            for field, value in zip(
                 self.fields[self._leading :], values[self._leading :], strict=True
             ):
-                _put(body, each, value)
+                _put(body, field, value)
         except (struct.error, OverflowError) as error:
             raise LogError(f"expected a {self.name} of numbers that fit, found: {error}") from None
         return _HEADER + body
@@ -89,21 +90,23 @@ class MessageType:
             LogError: The bytes are no message of this type.
         """
         body = data[len(_HEADER) :]
-        found: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         try:
             if data[: len(_HEADER)] != _HEADER:
                 raise ValueError("another encoding")
             at = self._first.size
             numbers = iter(self._first.unpack_from(body))
-            for each in self.fields[: self._leading]:
-                found[each.name] = _several(numbers, each.number) if each.number else next(numbers)
-            for each in self.fields[self._leading :]:
-                found[each.name], at = _take(body, at, each)
+            for field in self.fields[: self._leading]:
+                values[field.name] = (
+                    tuple(islice(numbers, field.number)) if field.number else next(numbers)
+                )
+            for field in self.fields[self._leading :]:
+                values[field.name], at = _take(body, at, field)
             if at != len(body):
                 raise ValueError(f"{len(body) - at} bytes too many")
         except (struct.error, ValueError) as error:
             raise LogError(f"expected a {self.name}, found {len(data)} bytes: {error}") from None
-        return found
+        return values
 
 
 class Form:
@@ -123,14 +126,14 @@ class Form:
         self._data, self.size = np.frombuffer(data, np.uint8), len(data)
         formats, offsets = list[Any](), list[int]()
         body, at = data[len(_HEADER) :], 0
-        for each in kind.fields:
-            value, at = _take(body, at, each)
-            if each.name in varying:
+        for field in kind.fields:
+            value, at = _take(body, at, field)
+            if field.name in varying:
                 shape = (len(value),) if isinstance(value, tuple) else ()
-                formats.append((f"<{each.code}", shape))
-                width = struct.calcsize(f"<{each.code}") * math.prod(shape)
+                formats.append((f"<{field.code}", shape))
+                width = struct.calcsize(f"<{field.code}") * math.prod(shape)
                 offsets.append(len(_HEADER) + at - width)
-        names = [each.name for each in kind.fields if each.name in varying]
+        names = [field.name for field in kind.fields if field.name in varying]
         self._layout = np.dtype(
             {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
         )
@@ -143,9 +146,9 @@ class Form:
             columns: Numbers of some fields, of each message or the same of all, shape (count,) or
                 (), and one axis more where a field has several. Other fields are as in `values`.
         """
-        found = np.empty((count, self.size), np.uint8)
-        self.fill(found, columns)
-        return found
+        rows = np.empty((count, self.size), np.uint8)
+        self.fill(rows, columns)
+        return rows
 
     def fill(self, into: NDArray[np.uint8], columns: Mapping[str, Any]) -> None:
         """Write what `encode` gives to an array, shape (count, bytes)."""
@@ -162,10 +165,6 @@ def _field(line: str) -> Field:
     kind, several, count, name = match.groups()
     code = "" if kind == "string" else _CODES[kind]
     return Field(name, code, None if several and not count else int(count or 0))
-
-
-def _several(numbers: Any, count: int) -> tuple[Any, ...]:
-    return tuple(next(numbers) for _ in range(count))
 
 
 def _put(body: bytearray, field: Field, value: Any) -> None:
@@ -189,8 +188,8 @@ def _put(body: bytearray, field: Field, value: Any) -> None:
 @lru_cache(maxsize=256)
 def _strings(values: tuple[str, ...]) -> bytes:
     """A sequence of strings that begins at a multiple of four bytes."""
-    found = [_COUNT.pack(len(values)), *map(_string, values)]
-    return b"".join([each + bytes(-len(each) % 4) for each in found[:-1]] + found[-1:])
+    texts = [_COUNT.pack(len(values)), *map(_string, values)]
+    return b"".join([text + bytes(-len(text) % 4) for text in texts[:-1]] + texts[-1:])
 
 
 @lru_cache(maxsize=256)

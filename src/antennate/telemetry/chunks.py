@@ -1,12 +1,9 @@
 """The chunks of an MCAP file, also of one that is cut or damaged.
 
-The readers of `mcap` end at the first damage. Here a chunk whose CRC is wrong is left out and the
-next one is searched for; what lies between chunks is not needed. Nothing is decompressed beyond
-`_LARGEST` a chunk and `_RATIO` a file, whatever a file says.
-
-MCAP lets a program leave out chunks and CRCs. antennate never does, so in its files that is damage;
-what another program wrote is read all the same, and said to be unguarded. Attachments and metadata,
-which anybody may add to a file, are read past.
+The package `mcap` parses records, unpacks chunks and checks their CRC. Records are framed here, in
+place of its `StreamReader`: that ends at the first damage and believes each length that a record
+names. A damaged chunk is left out and the next one is searched for; what lies between chunks is not
+needed. Nothing is unpacked beyond `_LARGEST` a chunk and `_RATIO` a file, whatever a file says.
 """
 
 from __future__ import annotations
@@ -16,35 +13,47 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
-from antennate.telemetry.contents import CHANNEL, MESSAGE, SCHEMA, Chunk, Messages, contents_of
-from antennate.telemetry.summary import MAGIC, RECORD, End, summary
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Header, McapRecord, Message, Schema, Statistics
+from mcap.records import Chunk as ChunkRecord
+from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from zstandard import ZstdError, frame_content_size
 
-_HEADER, _CHUNK, _INDEX = 1, 6, 7
-_ATTACHMENT, _METADATA, _DATA_END = 9, 12, 15
-_KINDS = (_HEADER, _CHUNK, _INDEX, _ATTACHMENT, _METADATA, _DATA_END)
-_LOOSE = (SCHEMA, CHANNEL, MESSAGE)
-"""Kinds of records that are found outside of chunks where there are none."""
+from antennate.errors import LogError
+
+MAGIC = b"\x89MCAP0\r\n"
 LIBRARY = "antennate "
 """How the program is named that writes the logs of antennate, before its version."""
+RECORD = struct.Struct("<BQ")
+"""Kind and length, before the content of each record."""
+UNSOUND = (struct.error, ValueError, OverflowError, McapError, ZstdError)
+"""What damaged records make the libraries raise."""
+_SKIPPED = (Opcode.HEADER, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
+_LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+"""Kinds of records that stand in chunks."""
 _PREFIX = struct.Struct("<QQQII")
 """Of a chunk: first and last time, size and CRC of its content, length of the next word."""
+_LZ4 = b"\x03\0\0\0lz4"
 _BEGIN = re.compile(
-    rb"\x06.{%d}(?:\x04\0\0\0zstd|\x03\0\0\0lz4|\0\0\0\0)" % (RECORD.size + _PREFIX.size - 5),
+    rb"\x06.{%d}(?:\x04\0\0\0zstd|%b|\0\0\0\0)" % (RECORD.size + _PREFIX.size - 5, _LZ4),
     re.DOTALL,
 )
 """How a chunk begins, up to the word for its compression."""
 _LONGEST_BEGIN = RECORD.size + _PREFIX.size + 4
-_LARGEST = 1 << 26
-"""Most bytes of a chunk's content."""
+_FOOT = struct.Struct("<BQQQI")
+"""The last record: kind, length, begin of the summary, of its offsets, CRC."""
+_LARGEST = 1 << 23
+"""Most bytes of a chunk's content; programs usually close a chunk at 1 or 4 MB."""
 _LONGEST = 1 << 24
 """Most bytes of a record, compressed."""
+_LONGEST_SUMMARY = 1 << 28
 _RATIO = 100
 """Most bytes of the content of all chunks for each byte of the file."""
-_WINDOW = 1 << 25
-"""Most bytes that zstd may look back; programs use 32 MB at most."""
 _BLOCK = 1 << 20
 
 
@@ -55,19 +64,29 @@ class Fault(NamedTuple):
     reason: str
 
 
-class _Source(NamedTuple):
-    """A file: its size, whether another program wrote it, where its chunks are to be read."""
+class Chunk(NamedTuple):
+    """An intact chunk: where it begins [bytes], its messages, and what it declares.
 
-    file: BinaryIO
+    Its size is that of its content [bytes]. Without a CRC nothing guards it: it may not be as it
+    was written.
+    """
+
+    offset: int
+    messages: Sequence[Message]
+    channels: Mapping[int, Channel]
+    schemas: Mapping[int, Schema]
     size: int
-    foreign: bool
-    wanted: Container[int] | None
+    guarded: bool
+
+
+class End(NamedTuple):
+    """The end of a closed file: how many messages of each channel were written."""
+
+    counts: Mapping[int, int]
 
 
 def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk | Fault | End]:
-    """What a file holds, in order; the summary comes last, if the file was closed.
-
-    The messages of a chunk can be read until the next one is asked for: two might not find room.
+    """What a file holds, in order; the end comes last, if the file was closed.
 
     Args:
         file: The file.
@@ -75,212 +94,160 @@ def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk
 
     Raises:
         OSError: The file cannot be read.
+        LogError: Its chunks are compressed by lz4.
     """
     size = file.seek(0, io.SEEK_END)
-    at: int | None = len(MAGIC)
-    source, counts = _Source(file, size, is_foreign(file), wanted), Counter[int]()
+    at, closed, unpacked, counts = len(MAGIC), False, 0, Counter[int]()
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         yield Fault(0, "no MCAP file")
-        at = _next_chunk(file, 0)
-    closed, unpacked = False, 0
-    while at is not None and at < size and not closed:
-        found, then = _record(source, at)
-        closed = then is None and not isinstance(found, Fault)
-        if isinstance(found, Chunk):
-            unpacked += found.size
+        at = _next_chunk(file, 0, size)
+    while at < size and not closed:
+        place, end = _record(file, at, size), size
+        if not isinstance(place, Fault):
+            kind, content, end = place
+            closed = kind == Opcode.DATA_END
+            if kind == Opcode.CHUNK:
+                place = _chunk(at, content, wanted is None or at in wanted)
+        if isinstance(place, Chunk):
+            unpacked += place.size
             if unpacked > _RATIO * size:
                 yield Fault(at, f"more than {_RATIO} bytes unpacked for each byte of the file")
                 break
-            counts.update(message.channel for message in found.messages)
-        if found is not None:
-            yield found
-        if isinstance(found, Chunk) and isinstance(found.messages, Messages):
-            found.messages.release()
-        if isinstance(found, Fault) and (then is None or _damaged(source, then)):
-            then = _next_chunk(file, at + 1)
-        at = then
-    end = summary(file)
-    if end is not None:
-        yield end if end.told else End(counts)
-    elif closed:
-        yield Fault(size, "damaged summary")
-
-
-def is_foreign(file: BinaryIO) -> bool:
-    """Whether a file says that another program wrote it.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
-    from mcap.data_stream import ReadDataStream  # slow to import
-    from mcap.exceptions import McapError
-    from mcap.records import Header
-
-    file.seek(len(MAGIC))
-    head = file.read(RECORD.size)
-    if len(head) < RECORD.size or head[0] != _HEADER:
-        return False
+            counts.update(message.channel_id for message in place.messages)
+            yield place
+        elif isinstance(place, Fault):
+            yield place
+            end = _next_chunk(file, at + 1, size)
+        at = end
     try:
-        content = file.read(min(RECORD.unpack(head)[1], _LONGEST))
-        library = Header.read(ReadDataStream(io.BytesIO(content))).library
-    except (struct.error, ValueError, McapError):
-        return False
-    return not library.startswith(LIBRARY)
+        statistics = (each for each in summary(file) if isinstance(each, Statistics))
+        end_of_file = End(next((each.channel_message_counts for each in statistics), counts))
+    except UNSOUND:
+        end_of_file = Fault(size, "damaged summary") if closed else None
+    if end_of_file is not None:
+        yield end_of_file
 
 
-def _record(source: _Source, at: int) -> tuple[Chunk | Fault | None, int | None]:
-    """What one record is and where it ends: None and no end for that of all data."""
-    file, size, foreign, _ = source
+def _record(file: BinaryIO, at: int, size: int) -> tuple[int, bytes, int] | Fault:
+    """Kind, content and end of a record that may stand outside of chunks."""
     file.seek(at)
     head = file.read(RECORD.size)
     if len(head) < RECORD.size:
-        return Fault(at, "cut record"), None
+        return Fault(at, "cut record")
     kind, length = RECORD.unpack(head)
     end = at + RECORD.size + length
     if kind in _LOOSE and end <= size:
-        if foreign:
-            return _loose(file, at, size)
-        return Fault(at, "record outside of a chunk, so without a CRC"), end
-    if kind not in _KINDS or (length > _LONGEST and kind != _ATTACHMENT):
-        return Fault(at, "damaged record"), None
+        return Fault(at, "record outside of a chunk; `mcap sort` writes it into one")
+    if kind not in (*_SKIPPED, Opcode.CHUNK, Opcode.DATA_END) or (
+        length > _LONGEST and kind != Opcode.ATTACHMENT
+    ):
+        return Fault(at, "damaged record")
     if end > size:
-        return Fault(at, "cut record"), None
+        return Fault(at, "cut record")
     content = file.read(min(length, _LONGEST))
-    if kind == _CHUNK:
-        return _chunk(at, content, source) or Fault(at, _fault_of(content)), end
-    if not _is_sound(kind, at, content, length):
-        return Fault(at, "damaged record"), None
-    return None, None if kind == _DATA_END else end
+    if kind == Opcode.MESSAGE_INDEX and content[2:6] != struct.pack("<I", max(0, length - 6)):
+        return Fault(at, "damaged record")  # its length may lead into the midst of a chunk
+    return kind, content, end
 
 
-def _is_sound(kind: int, at: int, content: bytes, length: int) -> bool:
-    """Whether a record of which nothing is used looks sound, by its place or the lengths in it."""
-    try:
-        if kind == _INDEX:
-            return _after(content, 2) == length
-        if kind == _METADATA:
-            return _after(content, _after(content, 0)) == length
-        if kind == _ATTACHMENT:
-            data = _after(content, _after(content, 16))
-            return data + 8 + struct.unpack_from("<Q", content, data)[0] + 4 == length
-    except struct.error:
-        return False
-    return at == len(MAGIC) if kind == _HEADER else length == 4
-
-
-def _after(content: bytes, at: int) -> int:
-    """Where a text or a table ends that begins with its length."""
-    return at + 4 + struct.unpack_from("<I", content, at)[0]
-
-
-def _loose(file: BinaryIO, at: int, size: int) -> tuple[Chunk | Fault, int]:
-    """Records outside of chunks that follow one another, some at a time, and where they end."""
-    end = at
-    while end - at <= _BLOCK:
-        file.seek(end)
-        head = file.read(RECORD.size)
-        if len(head) < RECORD.size:
-            break
-        kind, length = RECORD.unpack(head)
-        if kind not in _LOOSE or length > _LONGEST or end + RECORD.size + length > size:
-            break
-        end += RECORD.size + length
-    file.seek(at)
-    found = contents_of(at, file.read(end - at))
-    return Fault(at, "damaged record") if found is None else found._replace(
-        guarded=False, foreign=True
-    ), end
-
-
-def _damaged(source: _Source, at: int) -> bool:
-    """Whether what begins at a place is no record."""
-    return at < source.size and isinstance(_record(source, at)[0], Fault)
-
-
-def _next_chunk(file: BinaryIO, at: int) -> int | None:
-    """Where the next chunk begins that says the same length twice, from a place on."""
-    while True:
+def _next_chunk(file: BinaryIO, at: int, size: int) -> int:
+    """Where the next chunk begins that says the same length twice; the end of the file if none."""
+    while at < size:
         file.seek(at)
         block = file.read(_BLOCK)
-        found = _BEGIN.search(block)
-        while found is not None:
-            if _frames_a_chunk(file, at + found.start()):
-                return at + found.start()
-            found = _BEGIN.search(block, found.start() + 1)
-        if len(block) < _BLOCK:
-            return None
-        at += _BLOCK - _LONGEST_BEGIN + 1
+        match = _BEGIN.search(block)
+        while match is not None:
+            if _frames_a_chunk(file, at + match.start()):
+                return at + match.start()
+            match = _BEGIN.search(block, match.start() + 1)
+        at += max(1, len(block) - _LONGEST_BEGIN + 1) if len(block) == _BLOCK else _BLOCK
+    return size
 
 
 def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
     file.seek(at)
     head = file.read(RECORD.size + _LONGEST_BEGIN + 8)
     try:
-        kind, length = RECORD.unpack_from(head)
+        _, length = RECORD.unpack_from(head)
         word = _PREFIX.unpack_from(head, RECORD.size)[-1]
         (packed,) = struct.unpack_from("<Q", head, RECORD.size + _PREFIX.size + word)
     except struct.error:
         return False
-    return kind == _CHUNK and length - _PREFIX.size - word - 8 == packed
+    return length - _PREFIX.size - word - 8 == packed
 
 
-def _chunk(at: int, content: bytes, source: _Source) -> Chunk | None:
-    """An intact chunk, None if it is damaged; one of another program may be without a CRC."""
-    guarded = not (source.foreign and _lacks_crc(content))
-    data = _unpacked(content, guarded)
-    if data is None:
-        return None
-    size = len(data)
-    if source.wanted is not None and at not in source.wanted:
-        data = b""
-    found = contents_of(at, data)
-    return found and found._replace(size=size, guarded=guarded, foreign=source.foreign)
-
-
-def _fault_of(content: bytes) -> str:
-    """What is wrong with a chunk."""
-    return "chunk without a CRC" if _lacks_crc(content) else "damaged chunk"
-
-
-def _lacks_crc(content: bytes) -> bool:
-    return len(content) >= _PREFIX.size and _PREFIX.unpack_from(content)[3] == 0
-
-
-def _unpacked(content: bytes, guarded: bool) -> bytes | None:
-    """The records of a chunk, None if it is damaged; other programs compress in other ways."""
+def _chunk(at: int, content: bytes, wanted: bool) -> Chunk | Fault:
+    """The chunk of a record, without what is in it unless that is wanted."""
+    if content[_PREFIX.size - 4 :].startswith(_LZ4):
+        raise LogError(
+            "expected chunks compressed by zstd, found lz4; `mcap compress --compression zstd` "
+            "writes the log anew"
+        )
     try:
-        _, _, wanted, crc, word = _PREFIX.unpack_from(content)
-        begin = _PREFIX.size + word
-        (length,) = struct.unpack_from("<Q", content, begin)
-    except struct.error:
-        return None
-    packed = memoryview(content)[begin + 8 :]
-    unpack = _UNPACK.get(content[_PREFIX.size : begin])
-    if unpack is None or length != len(packed) or wanted > _LARGEST:
-        return None
-    data = unpack(packed, wanted + 1)
-    sound = len(data) == wanted and (zlib.crc32(data) == crc or not guarded)
-    return data if sound else None
+        chunk = ChunkRecord.read(ReadDataStream(io.BytesIO(content)))
+        packed, size = len(chunk.data), chunk.uncompressed_size
+        unpacked = frame_content_size(chunk.data) if chunk.compression == "zstd" else packed
+        whole = len(content) == _PREFIX.size + len(chunk.compression) + 8 + packed
+        if chunk.compression not in ("zstd", "") or not whole or unpacked not in (size, -1):
+            return Fault(at, "damaged chunk")
+        if size > _LARGEST:
+            return Fault(at, f"chunk of more than {_LARGEST} bytes")
+        records = list[McapRecord]()
+        if wanted:
+            records = breakup_chunk(chunk, validate_crc=True)
+        else:
+            get_chunk_data_stream(chunk, validate_crc=True)
+    except UNSOUND:
+        return Fault(at, "damaged chunk")
+    return Chunk(
+        at,
+        [each for each in records if isinstance(each, Message)],
+        {each.id: each for each in records if isinstance(each, Channel)},
+        {each.id: each for each in records if isinstance(each, Schema)},
+        size,
+        guarded=chunk.uncompressed_crc != 0,
+    )
 
 
-def _of_zstd(packed: memoryview, most: int) -> bytes:
-    from zstandard import ZstdDecompressor, ZstdError  # slow to import
+def summary(file: BinaryIO) -> Iterator[McapRecord]:
+    """The records at the end of a closed file; none where they have no CRC.
 
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: The file was not closed, or its end is damaged. A hostile one may make it raise
+            any of `UNSOUND` later.
+    """
+    foot = file.seek(0, io.SEEK_END) - _FOOT.size - len(MAGIC)
+    if foot < 0:
+        raise ValueError("not closed")
+    file.seek(foot)
+    last = file.read()
+    kind, length, start, _, crc = _FOOT.unpack_from(last)
+    if kind != Opcode.FOOTER or length != _FOOT.size - RECORD.size or not last.endswith(MAGIC):
+        raise ValueError("not closed")
+    start = start or foot  # there is none
+    if crc == 0 and start <= foot:
+        return iter(())
+    if not 0 <= foot - start <= _LONGEST_SUMMARY:
+        raise ValueError("damaged summary")
+    file.seek(start)
+    data = file.read(foot - start)
+    if zlib.crc32(last[: _FOOT.size - 4], zlib.crc32(data)) != crc:
+        raise ValueError("damaged summary")
+    return StreamReader(io.BytesIO(data + last), skip_magic=True).records
+
+
+def is_own(file: BinaryIO) -> bool:
+    """Whether a file says that antennate wrote it.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    record = _record(file, len(MAGIC), file.seek(0, io.SEEK_END))
+    if isinstance(record, Fault) or record[0] != Opcode.HEADER:
+        return False
     try:
-        return ZstdDecompressor(max_window_size=_WINDOW).stream_reader(packed).read(most)
-    except ZstdError:
-        return b""
-
-
-def _of_lz4(packed: memoryview, most: int) -> bytes:
-    from lz4.frame import LZ4FrameDecompressor
-
-    try:
-        return LZ4FrameDecompressor().decompress(packed, most)
-    except RuntimeError:
-        return b""
-
-
-_UNPACK = {b"zstd": _of_zstd, b"lz4": _of_lz4, b"": lambda packed, most: bytes(packed[:most])}
-"""What unpacks at most so many bytes, by the word for it."""
+        return Header.read(ReadDataStream(io.BytesIO(record[1]))).library.startswith(LIBRARY)
+    except UNSOUND:
+        return False

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from io import BufferedIOBase
 from typing import Any
@@ -31,7 +31,7 @@ from mcap.records import (
 from zstandard import ZstdCompressor
 
 from antennate.telemetry.cdr import Form
-from antennate.telemetry.summary import MAGIC
+from antennate.telemetry.chunks import MAGIC
 from antennate.types import Ints
 
 _COMPRESSION = "zstd"
@@ -60,7 +60,7 @@ class Container:
     def __init__(self, file: BufferedIOBase, library: str) -> None:
         self._file, self._packer = file, ZstdCompressor(_EFFORT)
         self._schemas, self._channels = list[Schema](), list[Channel]()
-        self._content, self._indexes = bytearray(), dict[int, list[int]]()
+        self._content, self._indexes = bytearray(), defaultdict[int, list[int]](list)
         self._chunks, self._counts = bytearray(), Counter[int]()
         self._statistics = Statistics(
             attachment_count=0,
@@ -91,7 +91,7 @@ class Container:
         """Add a message to the chunk, with its number and its time [ns]."""
         content, length = self._content, _MESSAGE.size - _HEAD + len(data)
         record = _MESSAGE.pack(Opcode.MESSAGE, length, channel, number, time, time) + data
-        self._index_of(channel).extend((time, len(content)))
+        self._indexes[channel].extend((time, len(content)))
         content += record
 
     def add_rows(
@@ -118,8 +118,8 @@ class Container:
             begin = starts[channel] + _MESSAGE.size
             head = block[:, starts[channel] : begin].view(_MESSAGES)[:, 0]
             length = _MESSAGE.size - _HEAD + form.size
-            found = Opcode.MESSAGE, length, channel, numbers, times, times
-            for name, value in zip(head.dtype.names or (), found, strict=True):
+            values = Opcode.MESSAGE, length, channel, numbers, times, times
+            for name, value in zip(head.dtype.names or (), values, strict=True):
                 head[name] = value
             form.fill(block[:, begin : begin + form.size], columns)
         begins, done = np.empty(len(times), np.int64), 0
@@ -130,20 +130,16 @@ class Container:
             for channel, data in beside.get(row, {}).items():
                 self.add(channel, int(numbers[row]), int(times[row]), data)
         for channel, start in starts.items():
-            self._index_of(channel).extend(
+            self._indexes[channel].extend(
                 np.stack([times, begins + start], axis=1).ravel().tolist()
             )
-
-    def _index_of(self, channel: int) -> list[int]:
-        """Times and places of the messages of a channel in this chunk."""
-        return self._indexes.setdefault(channel, [])
 
     def end_chunk(self) -> None:
         """Write the chunk, unless no message is in it."""
         if not self._indexes:
             return
         content, indexes = self._content, self._indexes
-        self._content, self._indexes = bytearray(), {}
+        self._content, self._indexes = bytearray(), defaultdict(list)
         times = [time for index in indexes.values() for time in (min(index[::2]), max(index[::2]))]
         chunk = Chunk(
             compression=_COMPRESSION,
@@ -175,15 +171,12 @@ class Container:
             message_end_time=chunk.message_end_time,
         )
         self._chunks += _bytes([place])
-        self._count(chunk)
-
-    def _count(self, chunk: Chunk) -> None:
-        """Note a chunk in the statistics."""
-        found = self._statistics
-        first = found.message_start_time if found.chunk_count else chunk.message_start_time
-        found.message_start_time = min(first, chunk.message_start_time)
-        found.message_end_time = max(found.message_end_time, chunk.message_end_time)
-        found.chunk_count += 1
+        statistics = self._statistics
+        if not statistics.chunk_count:
+            statistics.message_start_time = chunk.message_start_time
+        statistics.message_start_time = min(statistics.message_start_time, chunk.message_start_time)
+        statistics.message_end_time = max(statistics.message_end_time, chunk.message_end_time)
+        statistics.chunk_count += 1
 
     def finish(self) -> None:
         """Write the last chunk and the summary. Nothing may follow."""

@@ -152,13 +152,13 @@ class Feed:
         message = _HEAD.pack(len(content), self.dropped + self._lost) + content
         self._pass_on()
         room = len(self._waiting) < _WAITING and not self.failed
-        taken = room and len(message) <= PIPE_BUF  # more may be taken in part
-        if taken:
+        fits = room and len(message) <= PIPE_BUF  # more may be taken in part
+        if fits:
             self._waiting.append(message)
             self._pass_on()
         self.offered += 1
-        self.dropped += not taken
-        return taken
+        self.dropped += not fits
+        return fits
 
     def _pass_on(self) -> bool:
         """Write what waits to the pipe, a few ticks at most; whether any was taken."""
@@ -212,28 +212,28 @@ class Feed:
 
     def _start(self) -> None:
         """Start a process; what is sent goes to it from now on."""
-        theirs, ours = os.pipe()
+        reading, writing = os.pipe()
         try:
             with contextlib.suppress(OSError, AttributeError):  # less room where not allowed
-                fcntl.fcntl(ours, fcntl.F_SETPIPE_SZ, _ROOM)
-            os.write(ours, _HEAD.pack(len(self._first), self.dropped + self._lost) + self._first)
-            os.set_blocking(ours, False)
+                fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, _ROOM)
+            os.write(writing, _HEAD.pack(len(self._first), self.dropped + self._lost) + self._first)
+            os.set_blocking(writing, False)
             if self._pipe < 0:
-                self._pipe = os.dup(ours)
+                self._pipe = os.dup(writing)
             else:
-                os.dup2(ours, self._pipe, inheritable=False)  # at once: the loop may be writing
+                os.dup2(writing, self._pipe, inheritable=False)  # at once: the loop may be writing
             self.started += 1
             self._passed_before = self._passed
             self._process = subprocess.Popen(  # noqa: S603 our own words
                 self._words(self.started),
-                stdin=theirs,
+                stdin=reading,
                 stdout=subprocess.PIPE,
                 pass_fds=self._files,
                 process_group=0,  # Ctrl-C in the terminal is for the loop alone
             )
         finally:
-            os.close(theirs)
-            os.close(ours)
+            os.close(reading)
+            os.close(writing)
 
 
 def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterator[Message]:
@@ -265,7 +265,7 @@ def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterat
 
 def read(stream: BinaryIO, count: int) -> bytes:
     """So many bytes, fewer at the end."""
-    found = b""
-    while len(found) < count and (more := stream.read(count - len(found))):
-        found += more
-    return found
+    data = b""
+    while len(data) < count and (piece := stream.read(count - len(data))):
+        data += piece
+    return data

@@ -78,16 +78,16 @@ class Course:
             count: Ticks in it.
             replayed: `Maneuver` decided now, one a tick; None without a replay.
         """
-        every = -(-count // _MOST_DRAWN)
-        kept = list(islice(log, 0, None, every))
+        step = -(-count // _MOST_DRAWN)
+        ticks = list(islice(log, 0, None, step))
         return cls(
-            t=_drawable([tick.now for tick in kept]),
-            reading=_drawable([tick.reading for tick in kept]),
-            level=_drawable([tick.level for tick in kept]),
-            contact=np.array([tick.contact for tick in kept]),
-            recorded=np.array([tick.maneuver for tick in kept]),
-            replayed=None if replayed is None else np.array(replayed[::every]),
-            state=[tick.state for tick in kept],
+            t=_drawable([tick.now for tick in ticks]),
+            reading=_drawable([tick.reading for tick in ticks]),
+            level=_drawable([tick.level for tick in ticks]),
+            contact=np.array([tick.contact for tick in ticks]),
+            recorded=np.array([tick.maneuver for tick in ticks]),
+            replayed=None if replayed is None else np.array(replayed[::step]),
+            state=[tick.state for tick in ticks],
             threshold=log.header.params.rule.threshold,
         )
 
@@ -96,14 +96,14 @@ def of_arrays(
     t: Floats, reading: Floats, level: Floats, contact: Ints, maneuver: Ints, threshold: float
 ) -> Figure:
     """The figure of one tick or more; arrays as in `Course`, of a long series some ticks."""
-    kept = slice(None, None, -(-len(t) // _MOST_DRAWN))
+    shown = slice(None, None, -(-len(t) // _MOST_DRAWN))
     return replay(
         Course(
-            *(_drawable(values[kept]) for values in (t, reading, level)),
-            contact=contact[kept],
-            recorded=maneuver[kept],
+            *(_drawable(values[shown]) for values in (t, reading, level)),
+            contact=contact[shown],
+            recorded=maneuver[shown],
             replayed=None,
-            state=[""] * len(t[kept]),
+            state=[""] * len(t[shown]),
             threshold=threshold,
         )
     )
@@ -111,8 +111,8 @@ def of_arrays(
 
 def _drawable(values: Floats | Sequence[float] | Sequence[Pair]) -> Floats:
     """Numbers as they are, NaN for those that no axis can show."""
-    found = np.array(values)
-    return np.where(np.abs(found) <= _LARGEST, found, np.nan)
+    numbers = np.array(values)
+    return np.where(np.abs(numbers) <= _LARGEST, numbers, np.nan)
 
 
 def drawn(path: Path) -> tuple[LogReader, Figure]:

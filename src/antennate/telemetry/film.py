@@ -177,12 +177,12 @@ class WalkRecorder(FilmRecorder):
         if not len(self):
             raise nothing(title)
         maneuver = self.values("maneuver")
-        known = bool((maneuver >= 0).any())
+        decides = bool((maneuver >= 0).any())
         return self.walk(
             title,
             [level_trace(self.values("level"), threshold)],
             [
-                *([maneuver_band(maneuver)] if known else ()),
+                *([maneuver_band(maneuver)] if decides else ()),
                 *contact_bands(self.values("contact"), ("left", "right")),
             ],
             ending,
@@ -209,8 +209,8 @@ def bench_shot(antenna: AntennaSpec) -> Shot:
 
 def trace(label: str, values: Floats, form: str = ".2f") -> Trace:
     """A chart of shape (n, lines) whose axis is as wide as its values."""
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     margin = 0.05 * (high - low) or 1.0
     return Trace(label, values, low - margin, high + margin, form)
 
@@ -254,13 +254,13 @@ def _encoder() -> str:
         raise MissingPackageError(
             f"video: expected the package PyAV, found none; install it with {extra('video')}"
         ) from None
-    found = [name for name in _ENCODERS if name in av.codecs_available]
-    if not found:
+    encoders = [name for name in _ENCODERS if name in av.codecs_available]
+    if not encoders:
         raise BadInputError(
             f"video: expected PyAV with an encoder for H.264 ({', '.join(_ENCODERS)}), found none; "
             "install PyAV from its wheel with `pip install --force-reinstall av`"
         )
-    return found[0]
+    return encoders[0]
 
 
 def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Picture]:

@@ -1,4 +1,8 @@
-"""What a log says before its first tick: everything that its replay needs besides the readings."""
+"""What a log says before its first tick, and the names of its files.
+
+The header holds everything that a replay needs besides the readings. A new file is begun whenever
+the process that keeps the log dies.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +30,8 @@ from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSI
 
 TWIN = "twin"
 """The controller of a twin's log: what its client decides is not known."""
+MOST_PARTS = 10
+"""Files that one log can have."""
 _OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
 """How a log from before MCAP begins: its schema and the kind of its first record."""
 _OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')
@@ -38,7 +44,7 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
     Args:
         packages: Optional packages that count too; one that is not installed is left out.
     """
-    found = {
+    table = {
         "antennate": __version__,
         "python": platform.python_version(),
         "numpy": metadata.version("numpy"),
@@ -47,10 +53,10 @@ def versions(packages: tuple[str, ...] = ()) -> Mapping[str, str]:
         "platform": f"{platform.system()} {platform.machine()}",
     }
     for name in packages:
-        if name not in found:
+        if name not in table:
             with contextlib.suppress(metadata.PackageNotFoundError):
-                found[name] = metadata.version(name)
-    return found
+                table[name] = metadata.version(name)
+    return table
 
 
 class Header(Strict):
@@ -116,14 +122,16 @@ class Header(Strict):
         return {topic: topic.type.encode(text) for topic, text in texts.items()}
 
     @classmethod
-    def of_messages(cls, found: Mapping[Topic, bytes]) -> Header:
+    def of_messages(cls, messages: Mapping[Topic, bytes]) -> Header:
         """Back from `messages`.
 
         Raises:
             LogError: One is missing or damaged.
         """
         texts = {
-            topic: topic.decode(found[topic])["data"] for topic in HEADER_TOPICS if topic in found
+            topic: topic.decode(messages[topic])["data"]
+            for topic in HEADER_TOPICS
+            if topic in messages
         }
         if CONFIG not in texts:
             raise LogError(f"expected a header of a log, found no {CONFIG.name}")
@@ -156,3 +164,19 @@ def refuse_old(path: Path, begin: bytes) -> None:
             f"{path}: expected an MCAP file, found a log of antennate {by} from before logs were "
             "MCAP; read it with the antennate that wrote it"
         )
+
+
+def log_name(name: str) -> str:
+    """File of the log of a simulated trial or walk with a name of any characters."""
+    return re.sub(r"[^\w.-]", "_", name) + ".mcap"
+
+
+def part(path: Path, number: int) -> Path:
+    """The n-th file of a log, 1 the first: `drive.mcap`, then `drive-2.mcap` beside it."""
+    return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+
+
+def parts(path: Path) -> tuple[Path, ...]:
+    """The first file and those that continue it; one that was never begun is left out."""
+    following = (part(path, number) for number in range(2, MOST_PARTS + 1))
+    return (path, *(each for each in following if each.exists()))

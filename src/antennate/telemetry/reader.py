@@ -1,26 +1,23 @@
-"""Reads one log, all its files. What is damaged is left out and counted; the rest is read."""
+"""One log, all its files, read or recovered; what is damaged is left out and counted."""
 
 from __future__ import annotations
 
-from collections import Counter
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple, Never
+from typing import TYPE_CHECKING, NamedTuple
 
+from antennate import __version__
 from antennate.errors import LogError, reason
-from antennate.files import in_units, open_regular
-from antennate.telemetry.chunks import Fault
-from antennate.telemetry.contents import Chunk
-from antennate.telemetry.header import Header, refuse_old
-from antennate.telemetry.order import in_order
-from antennate.telemetry.parts import parts
-from antennate.telemetry.records import BESIDE, Record, by_tick, repeats
-from antennate.telemetry.summary import End
-from antennate.telemetry.survey import Survey, by_summary, span
+from antennate.files import lock, open_regular, replacing
+from antennate.telemetry.header import Header, parts, refuse_old
+from antennate.telemetry.survey import Record, Survey, by_summary, tick_by_tick
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
+    CONTACT_FORCES,
+    COORDINATES,
     EVENTS,
     HEADER_TOPICS,
     MANEUVER,
@@ -29,15 +26,25 @@ from antennate.telemetry.topics import (
     Topic,
     by_channel,
 )
+from antennate.telemetry.writer import LogWriter
+
+if TYPE_CHECKING:
+    from mcap.records import Schema
+
+    from antennate.telemetry.chunks import Chunk
 
 _LISTED = 100
 """Most damaged places that are listed."""
-_OURS = dict(enumerate(TOPICS, 1))
+_CHANNELS = dict(enumerate(TOPICS, 1))
 """Channels of a file that declares none, as its first chunk is lost."""
-_HELD = 1 << 25
-"""Most bytes of messages of one time."""
+_BESIDE = (EVENTS, CONTACT_FORCES, COORDINATES)
+"""Topics whose messages are no part of a tick."""
+_LARGEST = 1 << 25
+"""Most bytes of messages that are taken for those of one tick."""
 _EACH = 500
 """Bytes that a message takes in memory beside its content."""
+RECOVERED = "-recovered"
+"""What the name of a recovered log has behind that of the log."""
 
 
 class Damage(NamedTuple):
@@ -71,7 +78,7 @@ class LogReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.ticks = self.last = self.bad = self._repeated = 0
+        self.ticks = self.last = self.bad = 0
         self.damage: list[Damage] = []
         self.guarded = True
         self.end: int | None = None
@@ -82,9 +89,9 @@ class LogReader:
         self.parts = parts(path)
         self._part, self._before = path, 0
         self._declared: dict[int, Topic] = {}
-        self._schemas: dict[int, tuple[str, str]] = {}
+        self._schemas: dict[int, Schema] = {}
         self._first: dict[Topic, bytes] = {}
-        self._places: Iterator[Chunk] = self._read()
+        self._chunks: Iterator[Chunk | None] = self._read()
         try:
             self.header = self._header()
         except LogError:
@@ -94,19 +101,19 @@ class LogReader:
     @property
     def _channels(self) -> Mapping[int, Topic]:
         """The topics by their channel, as far as they are known."""
-        return self._declared or _OURS
+        return self._declared or _CHANNELS
 
     @property
     def missing(self) -> int:
         """Ticks known to have been written or to have happened that were not read."""
-        after = 0 if self.end is None else max(0, self.end - self._repeated - self.ticks)
+        after = 0 if self.end is None else max(0, self.end - self.ticks)
         return max(after, self.last - self.ticks)
 
     def __iter__(self) -> Iterator[Tick]:
         """The ticks, in order.
 
         Raises:
-            LogError: The disk fails.
+            LogError: As of `groups`.
         """
         for _, tick in self.groups():
             if tick is not None:
@@ -123,46 +130,37 @@ class LogReader:
             raise LogError(f"{self.path}: expected a log with ticks, found none{why}")
 
     def groups(self) -> Iterator[tuple[Sequence[Record], Tick | None]]:
-        """All messages as they are: those of one tick, with it, then those of none, one by one.
+        """All messages as they are: those of one tick, with it, then those of none.
+
+        The messages of one time are a tick; another one begins where a topic of ticks comes again.
 
         Raises:
-            LogError: The disk fails.
+            LogError: The disk fails, or another program wrote the messages in another order or
+                compressed them by lz4.
         """
-        held, begin, size = list[Record](), 0, 0
-        for chunk in self._places:
-            self._learn(chunk)
+        group, begin, size, last = list[Record](), 0, 0, 0
+        for chunk in self._chunks:
+            if chunk is None:  # the end of a file
+                yield from self._grouped(begin, group)
+                group, last = [], 0
+                continue
             for message in chunk.messages:
-                topic = self._channels.get(message.channel)
+                topic = self._channels.get(message.channel_id)
                 if topic is None or topic in HEADER_TOPICS:
                     continue
-                record = Record(topic, message.number, message.time, message.data)
-                if held and held[0].time != record.time:
-                    yield from self._by_tick(begin, held)
-                    held = []
-                begin, size = (begin, size) if held else (chunk.offset, 0)
+                record = Record(topic, message.sequence, message.log_time, message.data)
+                if record.time < last:
+                    raise LogError(
+                        f"{self._part}: expected messages in the order of their times, found one "
+                        f"that goes back at byte {chunk.offset}; `mcap sort` writes them so"
+                    )
+                if record.time > last or size > _LARGEST or _comes_again(topic, group):
+                    yield from self._grouped(begin, group)
+                    group = []
+                begin, size = (begin, size) if group else (chunk.offset, 0)
                 size += len(record.data) + _EACH
-                if size > _HELD:
-                    self._refuse_one_time(chunk.offset)
-                held.append(record)
-            if held and not chunk.foreign:
-                yield from self._by_tick(begin, held)
-                held = []
-        yield from self._by_tick(begin, held)
-
-    def _refuse_one_time(self, offset: int) -> Never:
-        raise LogError(
-            f"{self._part}: expected at most {in_units(_HELD)} of messages of one time, "
-            f"found more at byte {offset}"
-        )
-
-    def _by_tick(
-        self, offset: int, held: Sequence[Record]
-    ) -> Iterator[tuple[Sequence[Record], Tick | None]]:
-        """The messages of one time, tick by tick."""
-        ticks = by_tick(held, doubled=self._repeated > 0)
-        self._repeated += _maneuvers(held) - sum(map(_maneuvers, ticks))
-        for tick in ticks:
-            yield from self._grouped(offset, tick)
+                last = record.time
+                group.append(record)
 
     def survey(self) -> Survey:
         """What all of it holds, and what is damaged or missing.
@@ -171,50 +169,38 @@ class LogReader:
         the rest, and the CRC of each chunk is checked. All others are read as by `groups`.
 
         Raises:
-            LogError: The disk fails.
+            LogError: As of `groups`.
         """
-        found = self._summarised()
-        if found is not None:
-            self.ticks = self.end = found.messages.get(MANEUVER, 0)
-            self.last = found.number
-            return found
-        counts, events, times = Counter[Topic](), list[tuple[int, bytes]](), list[int]()
-        for records, tick in self.groups():
-            counts.update(record.topic for record in records)
-            events += [(record.time, record.data) for record in records if record.topic is EVENTS]
-            if tick is not None:
-                times = [*times[:1], records[0].time]
-        kept = {topic: counts[topic] for topic in TOPICS if counts[topic]}
-        return Survey(kept, events, *span(times), self.last)
-
-    def _summarised(self) -> Survey | None:
-        if len(self.parts) > 1:
-            return None
         try:
-            return by_summary(self._file, self._channels)
+            survey = by_summary(self._file, self._channels) if len(self.parts) == 1 else None
         except OSError as error:
             raise LogError(f"expected to read {self._part}, found: {reason(error)}") from None
+        if survey is None:
+            return tick_by_tick(self.groups())
+        self.ticks = self.end = survey.messages.get(MANEUVER, 0)
+        self.last = survey.number
+        return survey
 
     def _grouped(
-        self, offset: int, held: Sequence[Record]
+        self, offset: int, group: Sequence[Record]
     ) -> Iterator[tuple[Sequence[Record], Tick | None]]:
         """The messages of one tick, with it if it is whole and new.
 
         Those beside the tick that are not of their type are left out.
         """
-        held = [each for each in held if each.topic not in BESIDE or self._is_sound(offset, each)]
-        found = {record.topic: record.data for record in held}
-        if not any(topic in found for topic in TICK_TOPICS):
-            if held:
-                yield held, None
+        group = [
+            each for each in group if each.topic not in _BESIDE or self._is_sound(offset, each)
+        ]
+        data = {record.topic: record.data for record in group}
+        if not any(topic in data for topic in TICK_TOPICS):
+            if group:
+                yield group, None
             return
         try:
-            missing = [topic.name for topic in TICK_TOPICS if topic not in found]
+            missing = [topic.name for topic in TICK_TOPICS if topic not in data]
             if missing:
                 raise LogError(f"tick without {missing[0]}")
-            if repeats(held):
-                raise LogError("tick with two messages in a topic")
-            tick = Tick.of_messages(found)
+            tick = Tick.of_messages(data)
         except LogError as error:
             self._note(offset, str(error))
             return
@@ -223,7 +209,7 @@ class LogReader:
             return
         self.ticks += 1
         self.last = tick.number
-        yield held, tick
+        yield group, tick
 
     def _is_sound(self, offset: int, record: Record) -> bool:
         try:
@@ -239,8 +225,10 @@ class LogReader:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    def _read(self) -> Iterator[Chunk]:
-        """The intact chunks of all files; those of later files without their header."""
+    def _read(self) -> Iterator[Chunk | None]:
+        """The intact chunks of all files; None behind those of each file."""
+        from antennate.telemetry.chunks import End, Fault, walk  # slow to import
+
         closed = None
         try:
             for path in self.parts:
@@ -248,53 +236,59 @@ class LogReader:
                     self._file.close()
                     self._part, self._before, closed = path, self.ticks, self.end
                     self.end, self._file = None, open_regular(path)
-                for place in in_order(self._file):
+                for place in walk(self._file):
                     if isinstance(place, Fault):
                         self._note(*place)
-                    elif isinstance(place, End):
+                        continue
+                    if isinstance(place, End):
+                        topics = self._channels
                         ticks = (
-                            count
-                            for channel, count in place.counts.items()
-                            if self._channels.get(channel) is MANEUVER
+                            n for each, n in place.counts.items() if topics.get(each) is MANEUVER
                         )
                         self.end = self._before + sum(ticks)
-                    elif self._is_of_this_log(place):
+                        continue
+                    self._schemas |= place.schemas
+                    self._declared |= by_channel(place.channels, self._schemas)
+                    if self._is_of_this_log(place):
                         self.guarded = self.guarded and place.guarded
                         yield place
                     else:
                         self._note(place.offset, "a file of another log")
                         self.end = closed
                         break
+                yield None
         except OSError as error:
             raise LogError(f"expected to read {self._part}, found: {reason(error)}") from None
+        except LogError as error:
+            raise LogError(f"{self._part}: {error}") from None
 
     def _is_of_this_log(self, chunk: Chunk) -> bool:
         """Whether a later file has the header of the first one, and ticks after its last one."""
         if self._part == self.path:
             return True
-        self._learn(chunk)
-        found = self._of_header(chunk)
-        if any(self._first.get(topic) != data for topic, data in found.items()):
+        header = self._of_header(chunk)
+        if any(self._first.get(topic) != data for topic, data in header.items()):
             return False
         if self.ticks > self._before:
             return True
-        ticks = [m.data for m in chunk.messages if self._channels.get(m.channel) is MANEUVER]
+        ticks = [m.data for m in chunk.messages if self._channels.get(m.channel_id) is MANEUVER]
         with suppress(LogError):  # it is noted where it is read
             return all(MANEUVER.decode(data)["number"] > self.last for data in ticks)
         return True
 
     def _of_header(self, chunk: Chunk) -> dict[Topic, bytes]:
-        found = {self._channels.get(m.channel): m.data for m in chunk.messages}
-        return {topic: found[topic] for topic in HEADER_TOPICS if topic in found}
+        data = {self._channels.get(m.channel_id): m.data for m in chunk.messages}
+        return {topic: data[topic] for topic in HEADER_TOPICS if topic in data}
 
     def _header(self) -> Header:
         """The header, from the first chunks; other programs may divide them in another way."""
-        for chunk in self._places:
-            self._learn(chunk)
+        for chunk in self._chunks:
+            if chunk is None:
+                break
             self._first |= self._of_header(chunk)
-            topics = {self._channels.get(message.channel) for message in chunk.messages}
-            if topics.difference(HEADER_TOPICS) or len(self._first) == len(HEADER_TOPICS):
-                self._places = chain([chunk], self._places)
+            topics = {self._channels.get(message.channel_id) for message in chunk.messages}
+            if topics.difference({None, *HEADER_TOPICS}) or len(self._first) == len(HEADER_TOPICS):
+                self._chunks = chain([chunk], self._chunks)
                 break
         if self._first and self._declared:
             try:
@@ -304,20 +298,12 @@ class LogReader:
         self._file.seek(0)
         refuse_old(self.path, self._file.read(1 << 16))
         ticks = sum(1 for _ in self)
-        found = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
+        content = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
         if self.bad:
-            found += f", the first at byte {self.damage[0].offset}: {self.damage[0].reason}"
+            content += f", the first at byte {self.damage[0].offset}: {self.damage[0].reason}"
         if self.end is not None and not (self.bad or ticks):
-            found = "one of another program"
-        raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {found}")
-
-    def _learn(self, chunk: Chunk) -> None:
-        """Take note of the channels that a chunk declares."""
-        self._schemas |= chunk.schemas
-        try:
-            self._declared |= by_channel(chunk.channels, self._schemas)
-        except LogError as error:
-            raise LogError(f"{self.path}: {error}") from None
+            content = "one of another program"
+        raise LogError(f"{self.path}: expected a log of antennate, an MCAP file, found {content}")
 
     def _note(self, offset: int, reason: str) -> None:
         self.bad += 1
@@ -325,8 +311,9 @@ class LogReader:
             self.damage.append(Damage(offset, reason, self._part))
 
 
-def _maneuvers(held: Sequence[Record]) -> int:
-    return sum(record.topic is MANEUVER for record in held)
+def _comes_again(topic: Topic, group: Sequence[Record]) -> bool:
+    """Whether a group has a message of a topic of which a tick has one."""
+    return topic not in _BESIDE and any(record.topic is topic for record in group)
 
 
 def count(path: Path) -> int:
@@ -335,8 +322,47 @@ def count(path: Path) -> int:
         with LogReader(path) as log:
             return sum(1 for _ in log)
     except LogError:
-        found = 0
-    for each in parts(path)[1:]:
-        with suppress(LogError), LogReader(each) as log:
-            found += sum(1 for _ in log)
-    return found
+        ticks = 0
+    for later in parts(path)[1:]:
+        with suppress(LogError), LogReader(later) as log:
+            ticks += sum(1 for _ in log)
+    return ticks
+
+
+def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
+    """Write all that can be read of a log, all its files, to one new file with its summary.
+
+    An event at its end says what was left out.
+
+    Args:
+        path: The log.
+        target: The new file; it is there once all of it is written.
+        overwrite: Whether it may replace a file.
+
+    Returns:
+        The reader, at the end: how many ticks there are, and what is damaged or missing.
+
+    Raises:
+        LogError: There is no log, nothing of it is intact, or the disk is full.
+        OutputError: The target exists or cannot be written. Nothing is left after an error.
+    """
+    with LogReader(path) as log, replacing(target, overwrite) as fresh:
+        room = 1.5 * sum(part.stat().st_size for part in log.parts)
+        out = LogWriter(fresh, log.header, room, flush=math.inf, called=target)
+        with fresh.open("rb") as file:
+            lock(file)
+            for records, _ in log.groups():
+                for record in records:
+                    out.add(*record)
+                out.settle()
+            words = f"recovered by antennate {__version__}: {log.ticks} ticks; {left_out(log)}"
+            out.event(words, "antennate log recover")
+            out.close()
+        if not log.ticks and log.bad:
+            raise LogError(f"{path}: expected intact ticks, found none; {left_out(log)}")
+    return log
+
+
+def left_out(log: LogReader) -> str:
+    """What could not be taken of a log that is read."""
+    return f"damaged places left out: {log.bad}; ticks missing: {log.missing}"

@@ -154,9 +154,9 @@ class _Guarded:
 def _wrong(command: JointCommand, robot: RobotSpec) -> str:
     """What is wrong with the angles of a command; empty if nothing is."""
     for name, shape in robot.command_shapes().items():
-        found = np.shape(angles := getattr(command, name))
-        if found != shape:
-            return f"expected {name} of shape {shape}, found {found}"
+        size = np.shape(angles := getattr(command, name))
+        if size != shape:
+            return f"expected {name} of shape {shape}, found {size}"
         if np.iscomplexobj(angles) or not np.isfinite(np.asarray(angles, float)).all():
             return f"expected finite angles in {name}, found {shortened(str(angles))}"
     return ""
@@ -235,20 +235,20 @@ def replay(
         on_tick: Called with each tick and what was decided now.
         readings: Change what the controller is given; None for what was recorded.
     """
-    log, found = ReplayRobot(ticks), Replayed()
+    log, result = ReplayRobot(ticks), Replayed()
     control = _Guarded(controller, log, header.robot, readings or Own())
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
         if log.tick is not None:
-            found.note(log.tick, control.decision.maneuver, command)
+            result.note(log.tick, control.decision.maneuver, command)
             on_tick(log.tick, control.decision)
         return log.more
 
     if log.tick is not None:
         with np.errstate(over="ignore", invalid="ignore"):  # recorded numbers may be anything
             run_loop(log, control, header.params.period, go_on)
-    found.failures, found.failure = control.failures, control.failure
-    return found
+    result.failures, result.failure = control.failures, control.failure
+    return result
 
 
 def changed_readings(

@@ -1,11 +1,20 @@
-"""The log of a simulated robot: what a drive logs, and the physics beside it."""
+"""The log of a simulated robot: what a drive logs, and the physics beside it.
+
+Simulated time runs much faster than a robot's, so ticks are collected as rows of numbers and
+encoded many at once, by a thread: the simulation goes on meanwhile, as the engine lets other
+threads run.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -15,10 +24,216 @@ from antennate.sim.trial import LOOK_EVERY
 from antennate.sim.world import World
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
-from antennate.telemetry.rows import HEAD, RowLog, Rows
 from antennate.telemetry.ticks import numbers_of
-from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, Topic
+from antennate.telemetry.topics import (
+    ANTENNA,
+    CONTACT_FORCES,
+    COORDINATES,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    MANEUVER,
+    Topic,
+)
+from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Floats, JointCommand
+
+Taken = TypeVar("Taken")
+HEAD = 9
+"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
+Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
+"""Numbers of some ticks, shape (n, HEAD + 4 joints): what `HEAD` says, then the angles commanded
+[rad], and angles [rad], speeds [rad/s] and torques [N·m] measured. Beside them, by tick, messages
+of `CONTACT_FORCES` and `COORDINATES`."""
+_LEAST_FREE = 1e8
+"""Room for many trials [byte] (assumed)."""
+_MOST = 256
+"""Ticks that are encoded at once."""
+_PATIENCE = 0.15
+"""Longest that a tick waits for others [s]; where there are many logs, for their thread too."""
+
+
+class RowLog(Generic[Taken]):
+    """One file, new; as a context it closes itself.
+
+    Args:
+        path: A file that does not exist yet.
+        header: What stands at its beginning.
+        rows: Makes the rows of ticks that were added, many at once.
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        LogError: The file exists or cannot be written, or the disk is nearly full.
+    """
+
+    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Taken]], Rows]) -> None:
+        self.path, self._rows = path, rows
+        self._out = LogWriter(path, header, _LEAST_FREE)
+        self._angles = len(header.robot.joint_names)
+        self._forms = _forms(header.robot.joint_names)
+        self._held: list[Taken] = []
+        self._since = math.inf
+        self._writing: Future[None] | None = None
+        self._process = os.getpid()
+
+    def add(self, tick: Taken) -> None:
+        """Keep one tick.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        now = time.monotonic()
+        if not self._held:
+            self._since = now
+        self._held.append(tick)
+        if len(self._held) == _MOST or now - self._since >= _PATIENCE:
+            self._begin()
+
+    def write(self, ticks: Sequence[Taken]) -> None:
+        """Write ticks at once, in this thread, after those that were added.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.flush()
+        if ticks and not self._forked:
+            self._write(ticks)
+
+    def settle(self) -> None:
+        """Write what has waited long enough; to be called where no tick may follow for a while.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if time.monotonic() - self._since >= _PATIENCE:
+            self.flush()
+        self._wait()
+        if not self._forked:
+            self._out.settle()
+
+    def event(self, text: str, t: float = 0.0) -> None:
+        """Keep what happened after the last tick, at a time of the loop [s].
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.flush()
+        self._out.event(text, t=t)
+
+    def close(self) -> None:
+        """End it.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        try:
+            self.flush()
+        except KeyboardInterrupt:
+            self.flush()  # the thread works on: the file is closed behind it
+            raise
+        finally:
+            if not self._forked:
+                self._out.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def flush(self) -> None:
+        """Encode what is held and hand it to the operating system.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self._begin()
+        self._wait()
+
+    def _begin(self) -> None:
+        """Let the thread write what is held, once it has written what was held before."""
+        self._wait()
+        ticks, self._held, self._since = self._held, [], math.inf
+        if ticks and not self._forked:
+            self._writing = _encoder().submit(self._write, ticks)
+
+    @property
+    def _forked(self) -> bool:
+        """Whether this is a copy in another process: the file is not its own, and has no thread."""
+        return os.getpid() != self._process
+
+    def _wait(self) -> None:
+        """Wait until the thread has written."""
+        if self._writing is not None and not self._forked:
+            try:
+                self._writing.result()
+            except Exception:
+                self._writing = None
+                raise
+        self._writing = None
+
+    def _write(self, ticks: Sequence[Taken]) -> None:
+        """Encode ticks, and hand them to the operating system."""
+        count, (rows, beside) = len(ticks), self._rows(ticks)
+        t, angles = rows[:, 0], self._angles
+        joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
+        stamps = self._out.stamps(t)
+        time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
+        columns: dict[Topic, dict[str, Any]] = {
+            ANTENNA: {
+                "t": t,
+                "counts": rows[:, 3:5],
+                "reading": rows[:, 3:5],
+                "level": rows[:, 5:7],
+                "contact": rows[:, 7:9].astype(np.int64),
+            },
+            MANEUVER: {
+                "number": self._out.written + 1 + np.arange(count),
+                "now": t,
+                "maneuver": rows[:, 1].astype(np.int64),
+                "phase": rows[:, 2],
+            },
+            JOINT_COMMANDS: time | {"position": joints[0]},
+            JOINT_STATES: time
+            | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
+        }
+        self._out.write_many(
+            stamps,
+            {topic: (self._forms[topic], numbers) for topic, numbers in columns.items()},
+            beside,
+        )
+
+
+@cache
+def _encoder() -> ThreadPoolExecutor:
+    """The thread of all logs of this process."""
+    return ThreadPoolExecutor(1, "logs")
+
+
+os.register_at_fork(after_in_child=_encoder.cache_clear)
+
+
+def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
+    """Messages of a tick in which all that is known in simulation varies."""
+    pair, angles = (0.0, 0.0), (0.0,) * len(names)
+    joints, time = (0, 0, "", names), ("sec", "nanosec")
+    return {
+        ANTENNA: Form(
+            ANTENNA.type,
+            (0.0, pair, pair, pair, (0, 0), math.nan),
+            ("t", "counts", "reading", "level", "contact"),
+        ),
+        MANEUVER: Form(
+            MANEUVER.type, (0, 0.0, 0, 0.0, True), ("number", "now", "maneuver", "phase")
+        ),
+        JOINT_COMMANDS: Form(JOINT_COMMANDS.type, (*joints, angles, (), ()), (*time, "position")),
+        JOINT_STATES: Form(
+            JOINT_STATES.type,
+            (*joints, angles, angles, angles),
+            (*time, "position", "velocity", "effort"),
+        ),
+    }
 
 
 class Decisions:
@@ -47,25 +262,32 @@ class Decisions:
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> bytes:
         """One tick, for `rows`: a copy, in one piece, as this is done in every tick."""
-        made = self._controller
+        controller = self._controller
         try:
-            phase: Any = made.phase
+            phase: Any = controller.phase
             usual = phase.shape == self._unknown.shape and phase.dtype == float
         except KeyboardInterrupt:
             raise
         except BaseException:  # noqa: BLE001 a property of anybody may raise anything
             phase, usual = None, False
         if not usual:
-            phase = np.array(numbers_of(made, "phase"))
+            phase = np.array(numbers_of(controller, "phase"))
             phase = phase if phase.shape == self._unknown.shape else self._unknown
-        found = [frame.t, made.maneuver, phase, frame.counts, made.level, made.contact]
-        found += [getattr(command, name) for name in self._parts]
-        if [part.dtype for part in found] != self._kinds:
-            found = [part.astype(kind) for part, kind in zip(found, self._kinds, strict=True)]
+        parts = [
+            frame.t,
+            controller.maneuver,
+            phase,
+            frame.counts,
+            controller.level,
+            controller.contact,
+        ]
+        parts += [getattr(command, name) for name in self._parts]
+        if [part.dtype for part in parts] != self._kinds:
+            parts = [part.astype(kind) for part, kind in zip(parts, self._kinds, strict=True)]
         try:
-            return b"".join(found)
+            return b"".join(parts)
         except TypeError:  # one is a view with gaps
-            return b"".join([part.tobytes() for part in found])
+            return b"".join([part.tobytes() for part in parts])
 
     def rows(self, ticks: Sequence[bytes], row: int, into: Floats) -> None:
         """Write how one row of the batch begins in some ticks, shape (n, HEAD + joints)."""
@@ -108,30 +330,34 @@ class TickRows:
 
     def rows(self, ticks: Sequence[TakenTick]) -> Rows:
         """What `RowLog` writes of some ticks; many at once take hardly longer than one."""
-        found = np.empty((len(ticks), HEAD + 4 * self._angles))
+        rows = np.empty((len(ticks), HEAD + 4 * self._angles))
         end = HEAD + self._angles
-        self._decisions.rows([tick.decided for tick in ticks], self._row, found[:, :end])
+        self._decisions.rows([tick.decided for tick in ticks], self._row, rows[:, :end])
         measured, places = self._world.measured([tick.measured for tick in ticks])
-        found[:, end:] = measured.reshape(len(ticks), -1)
+        rows[:, end:] = measured.reshape(len(ticks), -1)
         looks = {i: tick.contacts for i, tick in enumerate(ticks) if tick.contacts is not None}
-        return found, self._messages(looks, places) if looks else {}
+        return rows, self._messages(looks, places) if looks else {}
 
     def _messages(
         self, looks: Mapping[int, Contacts], places: Floats
     ) -> dict[int, dict[Topic, bytes]]:
         """The messages beside the ticks at which one looked."""
         coordinates = self._form.encode(len(looks), {"position": places[[*looks]]})
-        found = {i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)}
+        messages = {
+            i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)
+        }
         contacts = Contacts.joined([*looks.values()])
         which, names, points, forces = self._world.obstacle_contacts(contacts)
         columns = names, *points.T.tolist(), forces.tolist()
-        ends = np.cumsum([len(each.geoms) for each in looks.values()])
+        ends = np.cumsum([len(contact.geoms) for contact in looks.values()])
         begin, encode = 0, CONTACT_FORCES.type.encode
-        for message, end in zip(found.values(), np.searchsorted(which, ends).tolist(), strict=True):
+        for message, end in zip(
+            messages.values(), np.searchsorted(which, ends).tolist(), strict=True
+        ):
             if begin < end:
                 message[CONTACT_FORCES] = encode(*(column[begin:end] for column in columns))
             begin = end
-        return found
+        return messages
 
 
 class SimulatedLog(RowLog[TakenTick]):

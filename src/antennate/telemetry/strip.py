@@ -140,8 +140,8 @@ class Strip:
         across = self._x(left, right, first, frame)
         for k, colour in enumerate(colours):
             height = y(trace.values[first : frame + 1, k])
-            known = np.isfinite(height)
-            points = np.stack([across[known], height[known]], axis=1).ravel().tolist()
+            finite = np.isfinite(height)
+            points = np.stack([across[finite], height[finite]], axis=1).ravel().tolist()
             if len(points) >= 4:
                 draw.line(points, colour, _FINE + 1, joint="curve")
         self._draw_ends(draw, trace, (left, top, right, low))

@@ -130,8 +130,8 @@ class Tick:
     @property
     def values(self) -> tuple[float, ...]:
         """All numbers but the measured ones of the joints, in the order of `fields`."""
-        held = (getattr(self, name) for name in _NUMBERS)
-        return tuple(n for each in held for n in (each if isinstance(each, tuple) else (each,)))
+        values = (getattr(self, name) for name in _NUMBERS)
+        return tuple(n for each in values for n in (each if isinstance(each, tuple) else (each,)))
 
     def row(self, robot: RobotSpec, measured: Container[str] = ()) -> dict[str, Any]:
         """It as a row of a table: numbers as they are, so that they come back exactly.
@@ -140,13 +140,13 @@ class Tick:
             robot: Gives the names of the joints.
             measured: Which of positions, velocities and efforts have columns.
         """
-        found = _named(fields(robot), self.values)
+        table = _named(fields(robot), self.values)
         for kind in JOINTS[1:]:
             if kind in measured:
                 columns = [f"{name}_{_ONE[kind]}" for name in robot.joint_names]
-                found |= _named(columns, getattr(self, kind))
+                table |= _named(columns, getattr(self, kind))
         texts = {"state": self.state, "note": self.note, "causes": "; ".join(self.causes)}
-        return found | texts
+        return table | texts
 
     def frame(self) -> AntennaFrame:
         """What the controller got."""
@@ -179,10 +179,10 @@ class Tick:
         Raises:
             LogError: A number does not fit.
         """
-        for topic, values in _OWN:
-            found = values(self)
-            if topic in TICK_TOPICS or any(found):
-                yield topic, topic.type.encode(*found)
+        for topic, getter in _OWN:
+            numbers = getter(self)
+            if topic in TICK_TOPICS or any(numbers):
+                yield topic, topic.type.encode(*numbers)
         time = (*divmod(stamp, 10**9), "", names)
         yield JOINT_COMMANDS, JOINT_COMMANDS.type.encode(*time, self.angles, (), ())
         if self.positions:
@@ -190,7 +190,7 @@ class Tick:
             yield JOINT_STATES, JOINT_STATES.type.encode(*time, *measured)
 
     @classmethod
-    def of_messages(cls, found: Mapping[Topic, bytes]) -> Tick:
+    def of_messages(cls, messages: Mapping[Topic, bytes]) -> Tick:
         """Back from `messages`.
 
         Raises:
@@ -198,11 +198,11 @@ class Tick:
         """
         values: dict[str, Any] = {}
         for topic, _ in _OWN:
-            if topic in found:
-                values |= topic.decode(found[topic])
-        values["angles"] = JOINT_COMMANDS.decode(found[JOINT_COMMANDS])["position"]
-        if JOINT_STATES in found:
-            state = JOINT_STATES.decode(found[JOINT_STATES])
+            if topic in messages:
+                values |= topic.decode(messages[topic])
+        values["angles"] = JOINT_COMMANDS.decode(messages[JOINT_COMMANDS])["position"]
+        if JOINT_STATES in messages:
+            state = JOINT_STATES.decode(messages[JOINT_STATES])
             values |= {kind: state[name] for kind, name in _ONE.items()}
         return cls(**values)
 

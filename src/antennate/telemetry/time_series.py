@@ -93,12 +93,12 @@ class TimeSeries:
         ticks = len(checks.array("t", self.t, ("n",), "s", finite=False))
         for name, (sizes, kind) in _ARRAYS.items():
             values, shape = getattr(self, name), (ticks, *sizes)
-            found = (
+            array = (
                 checks.whole_array(name, values, shape)
                 if kind is np.int64
                 else checks.array(name, values, shape, finite=False)
             )
-            object.__setattr__(self, name, found)
+            object.__setattr__(self, name, array)
         for name, value in checks.mapping("meta", self.meta).items():
             if not isinstance(value, str | int | float | None):
                 raise BadInputError(
@@ -119,19 +119,19 @@ class TimeSeries:
 
         theta = self.meta.get("threshold")
         theta = theta if isinstance(theta, float) else np.nan
-        known = (self.t, self.counts, self.level, self.contact, self.maneuver)
-        figure = of_arrays(*known, theta) if len(self) else None
+        signals = (self.t, self.counts, self.level, self.contact, self.maneuver)
+        figure = of_arrays(*signals, theta) if len(self) else None
         return html(self._sentence, _SHOWN_COLUMNS, self._by_maneuver(), figure)
 
     @property
     def _sentence(self) -> str:
-        told = ", ".join(
+        facts = ", ".join(
             f"{name} {shortened(str(value))}"
             for name, value in self.meta.items()
             if value is not None
         )
         span = self.t[-1] - self.t[0] if len(self) else 0.0
-        return f"TimeSeries of {len(self)} ticks, {span:.2f} s{told and f': {told}'}"
+        return f"TimeSeries of {len(self)} ticks, {span:.2f} s{facts and f': {facts}'}"
 
     def _by_maneuver(self) -> Iterator[tuple[str, list[str]]]:
         """Of each maneuver, and of all: its share of the ticks, mean levels, shares of contact."""
@@ -141,8 +141,8 @@ class TimeSeries:
         for name, ticks in parts.items():
             if not ticks.any():
                 continue
-            known = (self.level[ticks, side] for side in (0, 1))
-            levels = [float(np.nanmean(b)) if np.isfinite(b).any() else np.nan for b in known]
+            sides = (self.level[ticks, side] for side in (0, 1))
+            levels = [float(np.nanmean(b)) if np.isfinite(b).any() else np.nan for b in sides]
             touched = 100.0 * (self.contact[ticks] == Contact.CONTACT).mean(axis=0)
             cells = [f"{100.0 * ticks.mean():.1f}", *(f"{level:.2f}" for level in levels)]
             yield name, [*cells, *(f"{share:.1f}" for share in touched)]
@@ -153,15 +153,15 @@ class TimeSeries:
         The names are `t`, `counts_left`, `counts_right`, …, `head_x`, `head_y`; joints along the
         body are numbered, head first: `yaw_0`, `leg_5_right`.
         """
-        found: dict[str, Floats | Ints] = {}
+        columns: dict[str, Floats | Ints] = {}
         for name in _ARRAYS:
             values = getattr(self, name)
             for index in np.ndindex(values.shape[1:]):
                 words = [name, *map(str, index)]
                 if index and index[-1] < len(_ENDS.get(name, ())):
                     words[-1] = _ENDS[name][index[-1]]
-                found["_".join(words)] = values[(slice(None), *index)]
-        return found
+                columns["_".join(words)] = values[(slice(None), *index)]
+        return columns
 
     def to_dataframe(self) -> Any:
         """A pandas DataFrame with one row for each tick and the columns of `columns`.
@@ -226,8 +226,8 @@ class TimeSeriesRecorder:
         ):
             for name in names:
                 batch = getattr(source, name)
-                here = batch[self._row] if batch.size else ()  # pitch may have no joints
-                self._ticks[name].append(np.array(here))
+                values = batch[self._row] if batch.size else ()  # pitch may have no joints
+                self._ticks[name].append(np.array(values))
         self._ticks["head"].append(np.array(self._head()))
 
     def series(self, meta: Mapping[str, str | int | float | None]) -> TimeSeries:

@@ -8,11 +8,14 @@ written from here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from antennate.errors import LogError
 from antennate.messages import shortened
 from antennate.telemetry.cdr import MessageType
+
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
 
 
 class Topic(NamedTuple):
@@ -190,34 +193,34 @@ TICK = _own(
 """A whole tick, on its way from the loop to the process that writes the log."""
 
 
-def by_channel(
-    channels: Mapping[int, tuple[str, int, str]], schemas: Mapping[int, tuple[str, str]]
-) -> dict[int, Topic]:
-    """The topics of a log by their channel.
+def by_channel(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -> dict[int, Topic]:
+    """The topics of a log by the number of their channel.
 
     Args:
-        channels: Topic, number of the schema and encoding of each channel.
-        schemas: Type and definition of each schema.
+        channels: The channels by their number.
+        schemas: The definitions of messages by their number.
 
     Raises:
         LogError: A topic has messages of another definition.
     """
-    ours = {topic.name: topic for topic in TOPICS}
+    known = {topic.name: topic for topic in TOPICS}
     named: dict[int, Topic] = {}
-    for channel, (name, about, encoding) in channels.items():
-        topic = ours.get(name)
+    for number, channel in channels.items():
+        topic = known.get(channel.topic)
         if topic is None:
             continue
-        kind, schema = schemas.get(about, ("nothing", ""))
-        if (kind, _bare(schema)) != (topic.type.name, _bare(topic.type.schema)):
+        schema = schemas.get(channel.schema_id)
+        kind = "nothing" if schema is None else schema.name
+        definition = "" if schema is None else schema.data.decode(errors="replace")
+        if (kind, _bare(definition)) != (topic.type.name, _bare(topic.type.schema)):
             raise LogError(
-                f"expected {topic.type.name} as now defined in {name}, found {shortened(kind)} of "
-                "another definition; read it with the version that wrote it"
+                f"expected {topic.type.name} as now defined in {topic.name}, found "
+                f"{shortened(kind)} of another definition; read it with the version that wrote it"
             )
-        if encoding != "cdr":
-            found = shortened(encoding)
-            raise LogError(f"expected messages in {name} encoded as cdr, found {found}")
-        named[channel] = topic
+        if channel.message_encoding != "cdr":
+            encoding = shortened(channel.message_encoding)
+            raise LogError(f"expected messages in {topic.name} encoded as cdr, found {encoding}")
+        named[number] = topic
     return named
 
 

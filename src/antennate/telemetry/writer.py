@@ -156,10 +156,10 @@ class LogWriter:
         self._container.add_rows(
             numbers,
             stamps,
-            {channels[topic]: found for topic, found in messages.items()},
+            {channels[topic]: rows for topic, rows in messages.items()},
             {
-                tick: {channels[topic]: data for topic, data in each.items()}
-                for tick, each in beside.items()
+                tick: {channels[topic]: data for topic, data in more.items()}
+                for tick, more in beside.items()
             },
         )
         self.flush()
@@ -167,17 +167,20 @@ class LogWriter:
     def stamps(self, times: Floats) -> Ints:
         """Times of the messages of ticks at times [s] that follow one another [ns], shape (n,)."""
         since = np.rint(1e9 * np.where(np.abs(times) < _LONGEST, times, 0.0)).astype(np.int64)
-        found = np.clip(self._header.start + since, 0, _LATEST)
-        return np.maximum.accumulate(np.maximum(found, self._time))
+        stamps = np.clip(self._header.start + since, 0, _LATEST)
+        return np.maximum.accumulate(np.maximum(stamps, self._time))
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
-        """Add a message as it is, of a tick and a time [ns]; it is not counted as a tick."""
+        """Add a message as it is, of a tick and a time [ns], not before the last one's.
+
+        It is not counted as a tick.
+        """
         if self.failure:
             return
         self._since = min(self._since, time.monotonic())
         self._size += len(data)
         self._time = max(self._time, stamp)
-        self._container.add(self._channels[topic], number & _NUMBERS, stamp, data)
+        self._container.add(self._channels[topic], number & _NUMBERS, self._time, data)
 
     def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
         """Add an event at a time of the loop [s], not before the last tick."""
@@ -287,16 +290,16 @@ class _NewFile(io.BufferedIOBase):
 
     def flush(self) -> None:
         """Hand over what is held."""
-        held, self._held = self._held, bytearray()
+        data, self._held = self._held, bytearray()
         if self._lost:
             raise OSError(self._lost)
         self._require_name()
-        if not held:
+        if not data:
             return
-        count = os.write(self._file, held)
+        count = os.write(self._file, data)
         self._at += count
-        if count < len(held):
-            raise OSError(f"only {count} of {len(held)} bytes were taken; the disk is full")
+        if count < len(data):
+            raise OSError(f"only {count} of {len(data)} bytes were taken; the disk is full")
 
     def _require_name(self) -> None:
         """Whether it is still where it was made; a file that was removed goes on to take bytes."""
@@ -325,7 +328,7 @@ class _NewFile(io.BufferedIOBase):
                 os.close(folder)
         try:
             while not self._over.wait(period):
-                _sync_data(self._file)
+                getattr(os, "fdatasync", os.fsync)(self._file)  # the bytes, if not its times
         except OSError as error:
             self._lost = reason(error)
 
@@ -338,8 +341,3 @@ class _NewFile(io.BufferedIOBase):
         if self._file >= 0:
             file, self._file = self._file, -1
             os.close(file)
-
-
-def _sync_data(file: int) -> None:
-    """Wait until the disk has the bytes of a file, if not its times."""
-    getattr(os, "fdatasync", os.fsync)(file)

@@ -32,8 +32,7 @@ from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
-from antennate.telemetry.header import Header
-from antennate.telemetry.parts import log_name
+from antennate.telemetry.header import Header, log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver

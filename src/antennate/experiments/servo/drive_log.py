@@ -13,7 +13,7 @@ from antennate.experiments.servo.recording import FEWEST, Recording, ServoConfig
 from antennate.files import open_regular
 from antennate.messages import nearest, shown
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.parts import parts
+from antennate.telemetry.header import parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.ticks import Tick
 from antennate.types import Bools, Floats

@@ -32,8 +32,7 @@ from antennate.sim.trial import (
     time_limit_of,
 )
 from antennate.sim.world import World
-from antennate.telemetry.header import Header
-from antennate.telemetry.parts import log_name
+from antennate.telemetry.header import Header, log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.pace import Restart
 from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver

@@ -16,7 +16,7 @@ from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.studies.experiment import Experiment, Trials
 from antennate.studies.measures import Table, few, successes
-from antennate.telemetry.parts import log_name
+from antennate.telemetry.header import log_name
 
 _JOINED = (
     "Intervals of restricted times join Wilson's of the failures with Student's of the times:\n"

@@ -3,3 +3,8 @@
 A process of its own serves the page. A loop or a simulation sends it small messages and never
 waits for it.
 """
+
+PAGE_PORT = 8777
+"""Usual port of the page (assumed: nothing known uses it)."""
+FOXGLOVE_PORT = 8765
+"""Usual port of the WebSocket of Foxglove."""

@@ -122,15 +122,15 @@ class Channel:
 
     def _send(self, parts: Sequence[bytes]) -> bool:
         if sum(map(len, parts)) <= _LONGEST:
-            taken = self._put(parts)  # before what is left: it may pass
+            sent = self._put(parts)  # before what is left: it may pass
             self._go_on()
         else:
             self._go_on()
-            if taken := not self._left:
+            if sent := not self._left:
                 self._left += _pieces(b"".join(parts))
                 self._go_on()
-        self.dropped += not taken and not self.closed
-        return taken and not self.closed
+        self.dropped += not sent and not self.closed
+        return sent and not self.closed
 
     def _go_on(self) -> None:
         """Send what is left of a long message, as far as there is room."""

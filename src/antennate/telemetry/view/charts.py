@@ -157,7 +157,7 @@ def _data(columns: Floats, which: tuple[int, ...]) -> tuple[Floats, ...]:
 
 def _known(columns: Floats) -> set[int]:
     """First columns of the charts in which there is something."""
-    found = {
+    signals = {
         1: np.isfinite(columns[1:3]).any(),
         3: np.isfinite(columns[3:5]).any(),
         5: (columns[5:7] != Contact.UNKNOWN).any(),
@@ -165,15 +165,15 @@ def _known(columns: Floats) -> set[int]:
         _STATE[0]: np.isfinite(columns[_STATE[0]]).any(),
         _COUNTS[0]: np.isfinite(columns[_STATE[0]]).any(),
     }
-    return {which for which, known in found.items() if known}
+    return {which for which, is_known in signals.items() if is_known}
 
 
 def _limits(counts: Floats) -> tuple[float, float]:
     """Whole steps around the readings that are known [counts]."""
-    known = counts[np.isfinite(counts)]
-    if not known.size:
+    finite = counts[np.isfinite(counts)]
+    if not finite.size:
         return 0.0, _STEP
-    low, high = _STEP * np.floor(known.min() / _STEP), _STEP * np.ceil(known.max() / _STEP)
+    low, high = _STEP * np.floor(finite.min() / _STEP), _STEP * np.ceil(finite.max() / _STEP)
     return float(low), float(max(high, low + _STEP))
 
 

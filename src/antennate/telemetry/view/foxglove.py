@@ -102,7 +102,10 @@ class FoxgloveSink:
     def take(self, kind: bytes, content: bytes) -> None:
         """Send a message on."""
         if kind == TICK:
-            self._tick(Tick.unpack(content))
+            tick = Tick.unpack(content)
+            self._now = max(0, self._start + round(1e9 * tick.now))
+            for topic, data in tick.messages(self._names, self._now):
+                self._send(topic, data)
         elif kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
         elif kind == SNAPSHOT and self._shapes is not None:
@@ -119,11 +122,6 @@ class FoxgloveSink:
             self._names, self._start = header.robot.joint_names, header.start
             self._now = header.start
             self._send(CONFIG, header.messages()[CONFIG])
-
-    def _tick(self, tick: Tick) -> None:
-        self._now = max(0, self._start + round(1e9 * tick.now))
-        for topic, data in tick.messages(self._names, self._now):
-            self._send(topic, data)
 
     def _send(self, topic: Topic, data: bytes) -> None:
         self._channels[topic].log(data, log_time=self._now)

@@ -63,9 +63,9 @@ class ViewProcess:
             )
         listener = socket.socket() if port is None else _listener(port, flag)
         self.port: int = 0 if port is None else listener.getsockname()[1]
-        ours, theirs = Channel.pair()
-        with listener, theirs:
-            files = [theirs.fileno()] + ([] if port is None else [listener.fileno()])
+        near, far = Channel.pair()
+        with listener, far:
+            files = [far.fileno()] + ([] if port is None else [listener.fileno()])
             words = [*map(str, files), *(["-"] if port is None else [])]
             words.append("-" if foxglove is None else str(foxglove))
             words += [IDLE] if idle else []
@@ -76,7 +76,7 @@ class ViewProcess:
                 pass_fds=files,
                 process_group=0,  # Ctrl-C in the terminal is for the program alone
             )
-        self.channel, self._closing, self._why = Channel(ours), False, ""
+        self.channel, self._closing, self._why = Channel(near), False, ""
         try:
             self._wait()
         except BaseException:

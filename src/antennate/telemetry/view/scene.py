@@ -1,10 +1,13 @@
-"""The 3-D scene: the shapes of a model, where they are, and contact forces as arrows.
+"""The 3-D scene of a page and what a person may do there.
 
 Shapes of one kind are one node, so that a picture is a few messages, however many shapes there are.
+Each change is an order to the program; a page of a robot has no controls: nothing on it can move
+anything.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes
-from antennate.telemetry.view.channel import Poses
+from antennate.telemetry.view.channel import ORDER, Channel, Poses
 from antennate.types import Floats, Ints
 
 ROOT = "/world"
@@ -92,8 +95,8 @@ class SceneView:
     def _aim(self, places: NDArray[np.float32]) -> None:
         """Look from behind and above at the robot, once."""
         self._aimed = True
-        ours = places[self.shapes.robot]
-        reach = float(np.ptp(ours if len(ours) else places, axis=0).max())
+        robot = places[self.shapes.robot]
+        reach = float(np.ptp(robot if len(robot) else places, axis=0).max())
         for name, size in _thickness(min(1.0, reach / _ROBOT)).items():
             setattr(self._arrows, name, size)
         camera = self._server.initial_camera
@@ -110,8 +113,8 @@ def arrows(forces: NDArray[np.float32], scale: float, least: float) -> NDArray[n
         least: Length of the arrow of a weak force, so that it is seen [m].
     """
     size = np.linalg.norm(forces[:, 3:], axis=1, keepdims=True)
-    some = size[:, 0] > 0
-    at, force, size = forces[some, :3], forces[some, 3:], size[some]
+    acting = size[:, 0] > 0
+    at, force, size = forces[acting, :3], forces[acting, 3:], size[acting]
     return np.stack([at, at + np.maximum(scale, least / size) * force], axis=1)
 
 
@@ -158,13 +161,13 @@ class _Group:
 
     def place(self, places: NDArray[np.float32], turned: NDArray[np.float32]) -> None:
         """Put its shapes where they are, if anything has moved."""
-        mine = Rotation.from_matrix(turned[self.which])
-        at = places[self.which] + mine.apply(self._shift)
-        now = np.concatenate([at.ravel(), mine.as_quat().ravel()]).astype(np.float32)
+        rotation = Rotation.from_matrix(turned[self.which])
+        at = places[self.which] + rotation.apply(self._shift)
+        now = np.concatenate([at.ravel(), rotation.as_quat().ravel()]).astype(np.float32)
         if not np.array_equal(now, self._before):
             self._before = now
             self.node.batched_positions = at
-            self.node.batched_wxyzs = mine.as_quat(scalar_first=True)
+            self.node.batched_wxyzs = rotation.as_quat(scalar_first=True)
 
 
 def _linear(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -183,17 +186,17 @@ def _groups(
     """Name, shapes, mesh, scale and shift along their own axes, and colour of each group."""
     round_, box = trimesh.creation.icosphere(2), trimesh.creation.box((2.0, 2.0, 2.0))
     tube = trimesh.creation.cylinder(1.0, 2.0, sections=24)
-    found = []
+    groups = []
     kind, size = what.kind, what.size.astype(np.float64)
 
     def add(name: str, which: Ints, mesh: Any, scale: Floats, shift: float = 0.0) -> None:
         for moves in (False, True):
-            mine = what.moves[which] == moves
-            if mine.any():
-                some = which[mine]
-                along = shift * size[some, 1:2] * _ALONG_Z
+            chosen = what.moves[which] == moves
+            if chosen.any():
+                numbers = which[chosen]
+                along = shift * size[numbers, 1:2] * _ALONG_Z
                 label = f"{name}_{'moving' if moves else 'fixed'}"
-                found.append((label, some, mesh, scale[mine], along, what.colour[some]))
+                groups.append((label, numbers, mesh, scale[chosen], along, what.colour[numbers]))
 
     def of(*kinds: int) -> Ints:
         return np.flatnonzero(np.isin(kind, kinds))
@@ -212,7 +215,7 @@ def _groups(
         mesh = (what.vertices[first:corners], what.faces[start:triangles])
         which = np.flatnonzero(what.mesh == number)
         add(f"mesh{number}", which, mesh, np.ones((len(which), 3)))
-    return found
+    return groups
 
 
 def _floor(server: viser.ViserServer, height: float) -> None:
@@ -228,3 +231,145 @@ def _floor(server: viser.ViserServer, height: float) -> None:
         fade_distance=_FADE,
         position=(0.0, 0.0, height),
     )
+
+
+SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "max": 0.0}
+"""Times real time; 0 is as fast as it goes."""
+SLIDERS = {
+    "threshold": ("θ: level that is contact", 0.02, 0.98, 0.01),
+    "averaging_time": ("T_avg [s]", 0.01, 1.0, 0.01),
+    "hold_time": ("T_hold [s]", 0.1, 5.0, 0.1),
+    "turn_offset": ("offset of turns [rad]", 0.05, 1.0, 0.01),
+}
+"""Label, least, most and step of each number of the controller that can be changed."""
+
+
+class Controls:
+    """The buttons and sliders.
+
+    Args:
+        server: Where they are shown.
+        channel: Where orders go.
+        state: What can be changed, and its values.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, channel: Channel, state: Mapping[str, Any]
+    ) -> None:
+        self._channel, self._quiet = channel, False
+        gui, self._folders = server.gui, list[Any]()
+        with self._folder(gui, "time"):
+            self._pause = gui.add_checkbox("pause", bool(state.get("paused")))
+            self._pause.on_update(lambda event: self._order(event, "pause", on=self._pause.value))
+            step = gui.add_button("one step")
+            step.on_click(lambda event: self._order(event, "step"))
+            self._speed = gui.add_dropdown(
+                "speed", list(SPEEDS), initial_value=_named(state.get("speed", 1.0))
+            )
+            self._speed.on_update(
+                lambda event: self._order(event, "speed", value=SPEEDS[self._speed.value])
+            )
+            self._seed = None
+            if "seed" in state:
+                self._seed = gui.add_number("seed", int(state["seed"]), min=0, step=1)
+                restart = gui.add_button("restart with this seed")
+                restart.on_click(self._restart)
+            elif state.get("again"):
+                again = gui.add_button("from the beginning")
+                again.on_click(lambda event: self._order(event, "restart"))
+        self._sliders: dict[str, Any] = {}
+        values = state.get("values", {})
+        if values:
+            with self._folder(gui, "controller: a change starts it anew"):
+                for name, (label, low, high, step_) in SLIDERS.items():
+                    if name in values:
+                        self._add(gui, name, label, min(low, values[name]), high, step_, values)
+
+    def _folder(self, gui: viser.GuiApi, label: str) -> Any:
+        self._folders.append(gui.add_folder(label))
+        return self._folders[-1]
+
+    def remove(self) -> None:
+        """Take them off the page."""
+        for folder in self._folders:
+            folder.remove()
+
+    def _add(
+        self, gui: Any, name: str, label: str, low: float, high: float, step: float, values: Any
+    ) -> None:
+        value = float(values[name])
+        slider = gui.add_slider(label, low, max(high, value), step, value)
+        slider.on_update(lambda event: self._order(event, "set", name=name, value=slider.value))
+        self._sliders[name] = slider
+
+    def show(self, state: Mapping[str, Any]) -> None:
+        """Show values that the program has now, without an order."""
+        self._quiet = True
+        try:
+            for name, slider in self._sliders.items():
+                value = state.get("values", {}).get(name)
+                if value is not None and value != slider.value:
+                    slider.value = value
+            if bool(state.get("paused")) != self._pause.value:
+                self._pause.value = bool(state.get("paused"))
+        finally:
+            self._quiet = False
+
+    def drags(self, scene: SceneView) -> None:
+        """Let a person drag what can be moved."""
+        for group in scene.groups:
+            if (scene.shapes.body[group.which] >= 0).any():
+                _Drag(scene, group, self._tell).begin()
+
+    def _restart(self, event: Any) -> None:
+        if self._seed is not None:
+            self._order(event, "restart", seed=int(self._seed.value))
+
+    def _order(self, event: Any, do: str, **more: Any) -> None:
+        """Send what a person did; a value that the program set itself has no client."""
+        if event.client_id is not None and not self._quiet:
+            self._tell(do=do, **more)
+
+    def _tell(self, **order: Any) -> None:
+        self._channel.tell(ORDER, **order)
+
+
+class _Drag:
+    """Drags the shapes of one group over the floor."""
+
+    def __init__(self, scene: SceneView, group: Any, tell: Callable[..., None]) -> None:
+        self._scene, self._group, self._tell = scene, group, tell
+        self._body, self._held = -1, np.zeros(3)
+
+    def begin(self) -> None:
+        """Take drags from now on."""
+
+        async def drag(event: Any) -> None:
+            if event.phase == "start":
+                self._start(event)
+            elif self._body >= 0:
+                x, y, _ = self._over_floor(event) + self._held
+                over = event.phase == "end"
+                self._tell(do="move", body=self._body, x=float(x), y=float(y), end=over)
+
+        self._group.node.on_drag("left")(drag)
+
+    def _start(self, event: Any) -> None:
+        number = int(self._group.which[event.instance_index or 0])
+        self._body = int(self._scene.shapes.body[number])
+        place = self._scene.places[number]
+        self._held = place - (np.array(event.start_position) - self._scene.middle)
+
+    def _over_floor(self, event: Any) -> Any:
+        """Where the pointer is at the height at which the shape is held [m]."""
+        eye = np.array(event.client.camera.position)
+        to, height = np.array(event.end_position), event.start_position[2]
+        share = (height - eye[2]) / (to[2] - eye[2]) if to[2] != eye[2] else 1.0
+        return eye + share * (to - eye) - self._scene.middle
+
+
+def _named(speed: float) -> str:
+    """The name of a speed; of another one the nearest."""
+    if speed <= 0:
+        return "max"
+    return min((abs(value - speed), name) for name, value in SPEEDS.items() if value)[1]

@@ -18,7 +18,6 @@ import viser
 from antennate.colours import SERIES, called, rgba
 from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
-from antennate.telemetry.log_scene import LogScene
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import (
     END,
@@ -34,9 +33,9 @@ from antennate.telemetry.view.channel import (
     read,
 )
 from antennate.telemetry.view.charts import LABELS, Charts, Map
-from antennate.telemetry.view.controls import Controls
 from antennate.telemetry.view.pace import RATE
-from antennate.telemetry.view.scene import SceneView
+from antennate.telemetry.view.player import LogScene
+from antennate.telemetry.view.scene import Controls, SceneView
 
 _SLOW = 0.1
 """Time between two pictures of charts, map and status [s]: they are read, not watched."""
@@ -199,9 +198,9 @@ class Page:
 
     def _note_head(self) -> None:
         if self._scene is not None and self._poses is not None:
-            ours = np.flatnonzero(self._scene.shapes.robot)
-            if len(ours) and len(self._poses.poses) == len(self._scene.shapes.kind):
-                self._map.take(self._poses.t, self._poses.poses[ours[0], :2])
+            robot = np.flatnonzero(self._scene.shapes.robot)
+            if len(robot) and len(self._poses.poses) == len(self._scene.shapes.kind):
+                self._map.take(self._poses.t, self._poses.poses[robot[0], :2])
 
     def _draw(self) -> None:
         now, scene = self._poses, self._scene
@@ -209,8 +208,8 @@ class Page:
         if now is None or scene is None or len(now.poses) != len(scene.shapes.kind):
             return
         scene.follow, scene.arrow_scale = self._follow.value, 1e-3 * self._arrow.value
-        ours = now.poses[scene.shapes.robot, :2]
-        scene.show(now, ours.mean(axis=0) if len(ours) else np.zeros(2))
+        robot = now.poses[scene.shapes.robot, :2]
+        scene.show(now, robot.mean(axis=0) if len(robot) else np.zeros(2))
 
     def _draw_slow(self) -> None:
         self._charts.show()

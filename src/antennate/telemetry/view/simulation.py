@@ -17,8 +17,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
 from antennate.telemetry.ticks import Tick, numbers_of
 from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
-from antennate.telemetry.view.pace import Pace, Restart
-from antennate.telemetry.view.tuning import Tuning
+from antennate.telemetry.view.pace import Pace, Restart, Tuning
 from antennate.types import AntennaFrame, Contact, Controller
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
@@ -108,7 +107,9 @@ class SimulationView(Pace):
         """
         self._number += 1
         if self._seen is not model:
-            self._show_model(model)
+            self._seen, self._model = model, VisibleModel(model, _SIDES)
+            self.tell()
+            self.channel.send_whole(SCENE, self._model.shapes().pack())
         elif self.idle:
             return ()
         self._data, self._last = data, (frame, controller, maneuver)
@@ -123,11 +124,6 @@ class SimulationView(Pace):
         if self._model is not None and self._data is not None:
             tick = self._tick(self._data.time, *self._last)
             self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick.pack()))
-
-    def _show_model(self, model: Any) -> None:
-        self._seen, self._model = model, VisibleModel(model, _SIDES)
-        self.tell()
-        self.channel.send_whole(SCENE, self._model.shapes().pack())
 
     def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
