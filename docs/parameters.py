@@ -20,10 +20,10 @@ paper does not say).
 ROBOTS = ("spec", "joints", "servos", "antenna", "sensor")
 """Modules of `antennate.robots` that describe robots."""
 OTHERS = (
-    "antennate.hardware.robot_file",
-    "antennate.hardware.robot",
-    "antennate.hardware.driving.config",
-    "antennate.hardware.esp32.recorder",
+    "antennate.hardware.config",
+    "antennate.hardware.config",
+    "antennate.hardware.config",
+    "antennate.hardware.esp32.recording",
     "antennate.telemetry.replay",
     "antennate.twin.config",
 )

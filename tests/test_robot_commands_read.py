@@ -23,16 +23,20 @@ from worlds import simulated
 
 from antennate.cli import doctor, drive, jog, main, record, replay, setup, teleop, twin, zero
 from antennate.control.registry import BUILT_IN
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import (
+    DoctorConfig,
+    DriveConfig,
+    JogConfig,
+    RecordConfig,
+    RobotFile,
+    SetupConfig,
+    TeleopConfig,
+    ZeroConfig,
+)
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive as walk
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.teleop import TeleopConfig
-from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.ports.finder import finder
-from antennate.hardware.robot import DoctorConfig
-from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
+from antennate.hardware.safety.session import Session
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.params.base import Params
 from antennate.params.network import NetworkParams

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate.hardware.driving.timing import LoopTiming
+from antennate.hardware.pace import LoopTiming
 
 PERIOD = 0.01
 LIBRARY = Path(antennate.__path__[0])

@@ -13,7 +13,7 @@ from torque_writes import GOAL, TORQUE, Written, watch
 
 from antennate.cli import drive
 from antennate.dxl.bus import Bus
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import torque
 
 PWM, PROFILE, DOG = 100, 108, 98

@@ -14,10 +14,9 @@ from antennate.cli.arguments import FromFile, parse
 from antennate.cli.options import option
 from antennate.cli.status import write
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.ports import same
-from antennate.hardware.ports.finder import is_udp
-from antennate.hardware.ports.keys import read_key
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
+from antennate.hardware.doctor.check import same
+from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
 from antennate.params.reading import Config, read_file
 from antennate.params.setup import PortsParams

@@ -23,18 +23,14 @@ from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.cli.view_options import PageOptions, page_of
 from antennate.control.readings import short_names
 from antennate.errors import ConfigError, LogError, OutputError
-from antennate.hardware.driving.arrival import Arrival
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig, RobotFile
 from antennate.hardware.driving.connect import connect
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.lateness import MANY, Recent, late_sentence
-from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.priority import Priority, urgent
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.safety.causes import State
-from antennate.hardware.safety.cures import what_to_do
+from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.report import MANY, Recent, late_sentence
+from antennate.hardware.driving.stopping import Arrival, StopOnce
+from antennate.hardware.pace import Priority, urgent
+from antennate.hardware.safety.causes import State, what_to_do
+from antennate.hardware.safety.session import Session
 from antennate.messages import typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json

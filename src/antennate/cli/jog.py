@@ -14,13 +14,12 @@ from antennate.cli.options import option
 from antennate.cli.status import StatusLine, write
 from antennate.dxl.bus import Bus
 from antennate.errors import ConfigError
+from antennate.hardware.config import JogConfig, RobotFile
 from antennate.hardware.doctor.bus_survey import master
-from antennate.hardware.doctor.ports import opener_of
-from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.doctor.check import opener_of
+from antennate.hardware.driving.stopping import StopOnce
+from antennate.hardware.pace import HostClock
 from antennate.hardware.safety.deadlines import JOG_PERIOD
-from antennate.hardware.setup.config import JogConfig
 from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.servos import joints_of
 from antennate.messages import nearest, shortened

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from antennate.hardware.driving.signals import STOPS
+from antennate.hardware.driving.stopping import STOPS
 
 _LINES = 10
 """Plain lines over a whole run."""

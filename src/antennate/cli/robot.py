@@ -12,7 +12,7 @@ from antennate.cli.addresses import RobotFileOptions, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.dxl.model import EXTENDED_MODE
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
 from antennate.params.base import Params
 from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec

@@ -16,15 +16,12 @@ from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
 from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.ports import opener_of
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.setup import ports
-from antennate.hardware.setup.assembly import Assembly, JointState
-from antennate.hardware.setup.config import SetupConfig
-from antennate.hardware.setup.person import Quit, confirm
+from antennate.hardware.config import RobotFile, SetupConfig
+from antennate.hardware.doctor.check import opener_of
+from antennate.hardware.pace import HostClock
+from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port, ports_like
 from antennate.hardware.setup.robot_toml import change
-from antennate.hardware.setup.servos import ServoSetup
+from antennate.hardware.setup.servos import Assembly, JointState, ServoSetup
 from antennate.hardware.setup.zeros import by_group
 from antennate.messages import nearest, shortened, typed
 from antennate.studies.measures import Table
@@ -91,11 +88,11 @@ def _ports(person: TerminalPerson, config: SetupConfig, orders: Orders, path: Pa
     if orders.bus:
         with opener_of(orders.bus, "--bus")(config.robot.baud):
             pass
-    listing = ports.ports_like(orders.among) if orders.among else ports.all_ports
+    listing = ports_like(orders.among) if orders.among else all_ports
     clock, found = HostClock(), {"bus": orders.bus, "esp32": orders.esp32}
     for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):
         if not found[name]:
-            found[name] = ports.find_port(
+            found[name] = find_port(
                 person,
                 what,
                 listing,

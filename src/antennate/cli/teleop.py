@@ -14,12 +14,10 @@ from antennate.cli.addresses import parse_robot
 from antennate.cli.keys import END, typed_keys
 from antennate.cli.options import option
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.gamepad import Gamepad
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.teleop import KeyController, TeleopConfig
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import DriveConfig, RobotFile, TeleopConfig
+from antennate.hardware.driving.teleop import Gamepad, KeyController
+from antennate.hardware.pace import HostClock
+from antennate.hardware.safety.session import Session
 from antennate.robots.spec import require_antennae
 
 DESCRIPTION = """\

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from antennate.cli.status import StatusLine, write
 from antennate.errors import AntennateError, LogError
-from antennate.hardware.driving.signals import STOPS
+from antennate.hardware.driving.stopping import STOPS
 from antennate.messages import one_line
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
 from antennate.telemetry.header import Header

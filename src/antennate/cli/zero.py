@@ -14,14 +14,13 @@ from antennate.cli.options import option
 from antennate.cli.person import TerminalPerson
 from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
+from antennate.hardware.config import RobotFile, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master
-from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.pace import HostClock
 from antennate.hardware.safety import torque
-from antennate.hardware.setup.config import ZeroConfig
 from antennate.hardware.setup.person import Quit
 from antennate.hardware.setup.robot_toml import change, require_changeable
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group

@@ -12,12 +12,11 @@ from antennate.dxl.bus import Bus
 from antennate.dxl.inquiry import look, read_some
 from antennate.dxl.model import BAUD_RATES
 from antennate.dxl.models import XC430_W240
-from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.joints import Setting, settings
 from antennate.hardware.safety import torque
-from antennate.hardware.settings import Setting
 from antennate.robots.spec import RobotSpec
 
 _ID, _BAUD = "id", "baud_rate"
@@ -72,7 +71,7 @@ def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
 
 def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
-    wanted = {**settings.settings(robot), "return_delay_time": delay}
+    wanted = {**settings(robot), "return_delay_time": delay}
     return [
         Change(servo, survey.baud, name, there[name], setting.cure)
         for servo, there in survey.registers.items()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.hardware.driving.decision import Decision
+from antennate.hardware.safety.controller import Decision
 from antennate.params.control import ControlParams
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
