@@ -163,7 +163,8 @@ def findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding
     if hello is None:
         return
     least = f"{_version(frame.FIRMWARE)} or newer, protocol {frame.PROTOCOL}"
-    yield _firmware(hello), "firmware", least
+    version = f"{_version(hello.firmware)}, protocol {frame.PROTOCOL}"
+    yield Finding(version, "bad" if objections(hello) else "ok", _COPY), "firmware", least
     yield _boot(board, hello), "boot", "once, not by its watchdog"
     rate, error = config.limits.rate, config.limits.rate_error
     low, high = rate * (1 - error), rate * (1 + error)
@@ -200,11 +201,6 @@ def _greeting(board: BoardSurvey) -> Finding:
         return Finding(f"{board.received} bytes, no frame", "bad", cure)
     cure = "check its cable and power, press its reset button, copy firmware/ to it"
     return Finding("nothing", "bad", cure)
-
-
-def _firmware(hello: Hello) -> Finding:
-    version = f"{_version(hello.firmware)}, protocol {frame.PROTOCOL}"
-    return Finding(version, "bad" if objections(hello) else "ok", _COPY)
 
 
 def _version(numbers: tuple[int, ...]) -> str:
@@ -257,14 +253,15 @@ def _antenna(
     low, high = _limits(_curve(config, name))
     if shown is diagnosis.Finding.OUT_OF_CAL and low <= middle <= high:
         shown = diagnosis.Finding.OK  # noise reaches beyond, which has a row of its own
-    told = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
+    text = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
     signal = Finding(
-        f"{told} ({middle:.0f} counts)",
+        f"{text} ({middle:.0f} counts)",
         "ok" if shown is diagnosis.Finding.OK else "warn" if shown in _DEGRADED else "bad",
         _CURES.get(shown, "check plug, cable and divider of this antenna"),
     )
     plateau = plateau_of(np.array(counts))
-    if plateau is not None and not _at_ground(shown):
+    shorted = shown in (diagnosis.Finding.SHORT_LO, diagnosis.Finding.SHORT_HI)
+    if plateau is not None and not shorted:
         signal = Finding(plateau.text("the readings"), "bad", _CURES[diagnosis.Finding.STUCK])
     yield signal, f"{name} antenna", "ok"
     if shown.usable:
@@ -274,15 +271,10 @@ def _antenna(
 def _usual(seen: list[diagnosis.Finding]) -> diagnosis.Finding:
     """What a tenth of the readings say of a channel that is not usable, else most of them."""
     counted = Counter(seen[diagnosis.AGREE :] or seen)
-    worse = [found for found in counted if not found.usable]
-    found = max(worse, key=lambda one: counted[one], default=seen[-1])
-    often = worse and counted[found] > _OFTEN * len(seen)
-    return found if often else counted.most_common(1)[0][0]
-
-
-def _at_ground(shown: diagnosis.Finding) -> bool:
-    """Whether the readings stand at a rail for another reason than saturation."""
-    return shown in (diagnosis.Finding.SHORT_LO, diagnosis.Finding.SHORT_HI)
+    worse = [state for state in counted if not state.usable]
+    commonest = max(worse, key=lambda state: counted[state], default=seen[-1])
+    often = worse and counted[commonest] > _OFTEN * len(seen)
+    return commonest if often else counted.most_common(1)[0][0]
 
 
 def _noise(
@@ -295,18 +287,18 @@ def _noise(
     noise, usual = float(np.std(counts)), usual_noise(counts)
     usually = max(before or 0.0, 1.0)
     louder = noise > good.noise_ratio * usually
-    found, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
+    text, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
     cure = "leave the antenna alone; then check its plug, cable and ground"
     bad = noise > good.noise
     if bad and usual.hums and board.rate is not None:
-        found += f": a hum of {usual.text(board.rate)}"
+        text += f": a hum of {usual.text(board.rate)}"
         cure = _CURES[diagnosis.Finding.NOISE]
     if before is not None:
         expected += f", {before:.1f} when it was calibrated"
         if louder:
-            bad, found = True, f"{found}, {noise / usually:.0f} times that"
+            bad, text = True, f"{text}, {noise / usually:.0f} times that"
             cure = _RADIO if board.radio else cure
-    return Finding(found, "warn" if bad else "ok", cure), f"{name} noise", expected
+    return Finding(text, "warn" if bad else "ok", cure), f"{name} noise", expected
 
 
 def _curve(config: DoctorConfig, name: str) -> CurveParams:

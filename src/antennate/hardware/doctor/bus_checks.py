@@ -64,13 +64,13 @@ def _values(bus: BusSurvey, config: DoctorConfig, register: str) -> dict[int, in
     return {i: v[register] for i, v in servos if i in config.robot.ids and register in v}
 
 
-def _of_servos(grades: Mapping[int, Grade], found: str, cure: str) -> Finding:
+def _of_servos(grades: Mapping[int, Grade], text: str, cure: str) -> Finding:
     ids = ids_text(servo for servo, grade in grades.items() if grade != "ok")
-    return Finding(found, worst(grades.values()), cure.replace("{ids}", ids))
+    return Finding(text, worst(grades.values()), cure.replace("{ids}", ids))
 
 
 def _required(register: str) -> Grading:
-    """What `drive` requires, as `hardware.settings` says."""
+    """What `drive` requires, as `hardware.joints` says."""
     return lambda bus, config, servo, value: (
         "ok" if settings(config.robot)[register][servo].allows(value) else "bad"
     )
@@ -295,9 +295,9 @@ def _ids(bus: BusSurvey, robot: RobotSpec) -> Finding:
 def _answers(bus: BusSurvey) -> Finding:
     parts: list[str] = []
     cures: list[str] = []
-    for state, found in _FOUND.items():
+    for state, words in _FOUND.items():
         if ids := ids_text(i for i, seen in bus.here.items() if seen.state == state):
-            parts.append(f"{found} {ids}")
+            parts.append(f"{words} {ids}")
             cures.append(f"{ids}: {FOUND[state]}; {CURE[state]}")
     grade: Grade = "bad" if parts else "ok"
     return Finding(", ".join(parts) or "all whole", grade, "; ".join(cures))

@@ -172,7 +172,7 @@ def _elsewhere(
     for baud in _BAUDS:
         if baud != robot.baud:
             with master(opener, baud, now) as bus:
-                others += [(baud, one) for one in _present(bus, ()).values()]
+                others += [(baud, servo) for servo in _present(bus, ()).values()]
     return others
 
 

@@ -138,6 +138,6 @@ def latency_row(path: str, slow: bool, params: DoctorParams, timers: Path = _TIM
     return finding.row("bus", "latency timer", f"at most {most} ms")
 
 
-def same(one: str, other: str) -> bool:
+def same(path: str, other: str) -> bool:
     """Whether two paths are one device."""
-    return os.path.realpath(one) == os.path.realpath(other)
+    return os.path.realpath(path) == os.path.realpath(other)

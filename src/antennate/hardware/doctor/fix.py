@@ -55,17 +55,17 @@ def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
 
 def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     missing = [servo for servo in robot.ids if servo not in survey.here]
-    extra = [(survey.baud, one) for i, one in survey.here.items() if i not in robot.ids]
-    extra += [(baud, one) for baud, one in survey.elsewhere if one.servo not in missing]
+    extra = [(survey.baud, seen) for i, seen in survey.here.items() if i not in robot.ids]
+    extra += [(baud, seen) for baud, seen in survey.elsewhere if seen.servo not in missing]
     if len(missing) == 1 and len(extra) == 1:
-        baud, one = extra[0]
-        if one.state == "ok" and one.model == robot.models[missing[0]]:
-            return [Change(one.servo, baud, _ID, one.servo, missing[0])]
-    ids = [one.servo for _, one in survey.elsewhere]
+        baud, lone = extra[0]
+        if lone.state == "ok" and lone.model == robot.models[missing[0]]:
+            return [Change(lone.servo, baud, _ID, lone.servo, missing[0])]
+    ids = [seen.servo for _, seen in survey.elsewhere]
     return [
-        Change(one.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
-        for baud, one in survey.elsewhere
-        if one.servo in missing and one.state == "ok" and ids.count(one.servo) == 1
+        Change(seen.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
+        for baud, seen in survey.elsewhere
+        if seen.servo in missing and seen.state == "ok" and ids.count(seen.servo) == 1
     ]
 
 

@@ -110,14 +110,14 @@ class DryRun:
 
 def latched_causes(out: Outputs | None) -> str:
     """A hardware error, which keeps torque off until a reboot; empty if there is none."""
-    found = () if out is None or out.torque else out.causes
-    return "; ".join(a.text for a in found if a.present and a.cause is Cause.SERVO_ERROR)
+    causes = () if out is None or out.torque else out.causes
+    return "; ".join(a.text for a in causes if a.present and a.cause is Cause.SERVO_ERROR)
 
 
 def _ill(out: Outputs | None) -> list[str]:
     """What is wrong with the robot itself, as a board that fell silent during the check."""
-    found = () if out is None else (a for a in out.causes if a.present)
-    return [a.text for a in found if a.cause.severity >= State.HOLD and a.cause not in _EXPECTED]
+    causes = () if out is None else (a for a in out.causes if a.present)
+    return [a.text for a in causes if a.cause.severity >= State.HOLD and a.cause not in _EXPECTED]
 
 
 _NOBODY = Operator()

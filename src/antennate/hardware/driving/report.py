@@ -188,7 +188,7 @@ class Report:
     def _explain(self, out: Outputs, why: str) -> None:
         """Keep why the worst state lasted longest."""
         causes, spell = {active.cause for active in out.causes}, self._spell
-        noise = "".join(each.detail for each in out.causes if each.cause is Cause.NOISE)
+        noise = "".join(a.detail for a in out.causes if a.cause is Cause.NOISE)
         if spell is None or out.state is not spell.state:
             spell = _Spell(out.state, why, causes | (spell.causes if spell else set()))
             self._spell = spell
@@ -203,8 +203,9 @@ class Report:
             self._wait(self._waits)
         causes = () if session.outputs is None else session.outputs.causes
         begun = math.inf if self._felt else session.clock.now() - _FILLED
-        found = [each for each in causes if _missing(each)]
-        missing = [x.text for x in found if x.cause not in _FILLING or x.since <= begun]
+        missing = [
+            a.text for a in causes if _missing(a) and (a.cause not in _FILLING or a.since <= begun)
+        ]
         if not self._torque and missing:
             self._wait("; ".join(missing))
 
@@ -230,6 +231,7 @@ class Report:
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
+            "overdue_samples": board.overdue,
             "resets": board.clock.resets,
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,

@@ -282,20 +282,20 @@ def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Flo
     number, first = np.unique(seq[0] + np.cumsum(ahead), return_index=True)
     ticks = np.array([samples[i].ticks for i in first])
     modulus, period = 1 << hello.tick_bits, 1e6 / hello.rate
-    kept = np.arange(len(number))
+    places = np.arange(len(number))
     while True:
-        expected = period * np.diff(number[kept])
-        step = np.diff(ticks[kept]) % modulus
+        expected = period * np.diff(number[places])
+        step = np.diff(ticks[places]) % modulus
         step = step + modulus * np.maximum(0, np.rint((expected - step) / modulus)).astype(int)
         bad = (step == 0) | (step - expected > modulus / 2)
         if not bad.any():
             break
-        kept = np.delete(kept, 1 + int(np.argmax(bad)))
-    chosen = [samples[i] for i in first[kept]]
+        places = np.delete(places, 1 + int(np.argmax(bad)))
+    chosen = [samples[i] for i in first[places]]
     counts = np.array([(s.left, s.right) for s in chosen], dtype=np.float64)
     flags = np.array([s.flags for s in chosen], dtype=np.int64)
     t = 1e-6 * np.concatenate([[0], np.cumsum(step)])
-    return t, number[kept], counts, flags, len(number) - len(kept)
+    return t, number[places], counts, flags, len(number) - len(places)
 
 
 def _empty(

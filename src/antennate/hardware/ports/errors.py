@@ -20,12 +20,12 @@ def holders(path: str) -> list[str]:
 
     The process that made a pseudo-terminal holds both its ends, and is left out.
     """
-    found: dict[int, str] = {}
+    names: dict[int, str] = {}
     for process in (*_lockers(path), *_openers(path)):
         with contextlib.suppress(OSError):
             name = re.sub(r"\s+", " ", (_PROC / str(process) / "comm").read_text().strip())
-            found[process] = f"pid {process} ({name})"
-    return [found[process] for process in sorted(found) if process != os.getpid()]
+            names[process] = f"pid {process} ({name})"
+    return [names[process] for process in sorted(names) if process != os.getpid()]
 
 
 def _lockers(path: str) -> Iterator[int]:
@@ -111,5 +111,5 @@ def known_ports() -> str:
     from serial.tools import list_ports
 
     lasting = {os.path.realpath(name): str(name) for name in sorted(_NAMES.glob("*"))}
-    here = sorted(port.device for port in list_ports.comports())
-    return ", ".join(lasting.get(path, path) for path in here) or "none (no adapter is plugged in)"
+    paths = sorted(port.device for port in list_ports.comports())
+    return ", ".join(lasting.get(path, path) for path in paths) or "none (no adapter is plugged in)"

@@ -241,27 +241,27 @@ class Reconnecting(Port):
         old, self._old = self._old, None
         try:
             _close(old)
-            found: Line | PortError = self._find()
+            result: Line | PortError = self._find()
         except PortError as error:
-            found = error
+            result = error
         except Exception as error:  # noqa: BLE001 a thread that ends would never look again
-            found = PortError(f"could not look for the port: {type(error).__name__}: {error}")
+            result = PortError(f"could not look for the port: {type(error).__name__}: {error}")
         with self._lock:
             if not self._closed:
-                self._results.put(found)
+                self._results.put(result)
                 return
-        if not isinstance(found, PortError):
-            _close(found)
+        if not isinstance(result, PortError):
+            _close(result)
 
     def _collect(self) -> None:
         with contextlib.suppress(Empty):
-            found = self._results.get_nowait()
+            result = self._results.get_nowait()
             self._looking = False
-            if isinstance(found, PortError):
+            if isinstance(result, PortError):
                 self._due = self._clock() + RETRY
-                self._why = str(found)
+                self._why = str(result)
             else:
-                self._line = found
+                self._line = result
 
 
 def _close(line: Line | None) -> None:

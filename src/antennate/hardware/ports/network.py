@@ -47,7 +47,7 @@ class Bucket:
 
 
 @dataclass(slots=True)
-class Tally:
+class DatagramCounts:
     """What became of every datagram.
 
     Attributes:
@@ -79,7 +79,7 @@ class Verifier:
     def __init__(self, key: bytes, nonce: bytes, params: NetworkParams) -> None:
         if len(nonce) != datagram.NONCE_SIZE:
             raise ValueError(f"expected a nonce of {datagram.NONCE_SIZE} bytes, found {len(nonce)}")
-        self.tally = Tally()
+        self.tally = DatagramCounts()
         self._signer = datagram.Signer(key)
         self._nonce = nonce
         self._period = params.ask_period
@@ -264,16 +264,16 @@ class UdpPort(Port):
 
     def _look(self, now: float) -> bytes:
         """Frames of the datagrams that wait; a flood is looked at in part only."""
-        found = bytearray()
+        frames = bytearray()
         while self._looks.take(now):
             data = self._receive()
             if data is None:
                 break
             frame, again = self._verifier.take(data, now)
-            found += frame
+            frames += frame
             if again:
                 self._send(self._verifier.ask())
-        return bytes(found)
+        return bytes(frames)
 
     def _receive(self) -> bytes | None:
         try:

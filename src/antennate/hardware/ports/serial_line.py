@@ -125,11 +125,11 @@ def identity(path: str) -> Identity | None:
 
     A serial number that another adapter has too, such as the 0001 of many boards, is no number.
     """
-    there = adapters()
-    found = there.get(str(Path(path).resolve()))
-    if found is None or sum(_alike(found, other) for other in there.values()) == 1:
-        return found
-    return replace(found, serial_number="")
+    known = adapters()
+    own = known.get(str(Path(path).resolve()))
+    if own is None or sum(_alike(own, other) for other in known.values()) == 1:
+        return own
+    return replace(own, serial_number="")
 
 
 def find(known: Identity, path: str) -> str:
@@ -146,8 +146,8 @@ def find(known: Identity, path: str) -> str:
         return same[0]
     what = f"USB adapter {known.vid:04x}:{known.pid:04x}"
     what += f" with serial number {known.serial_number}" if known.serial_number else ""
-    found = f"{len(same)} of them" if same else "none"
-    raise PortError(f"{path}: expected its {what} in socket {known.location}, found {found}")
+    count = f"{len(same)} of them" if same else "none"
+    raise PortError(f"{path}: expected its {what} in socket {known.location}, found {count}")
 
 
 def _alike(known: Identity, other: Identity) -> bool:

@@ -41,8 +41,8 @@ _SLOWEST = 0.25
 _SAME = 0.025
 """Frequencies nearer than this to half the rate are written as one [samples^-1]; ten readings, some
 from before the hum, tell no finer."""
-_WINDOW = 10
-"""Readings of a window."""
+WINDOW = 10
+"""Readings from which a hum or a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ def noise_of(readings: Sequence[float]) -> Noise:
 
 def usual_noise(readings: Sequence[float]) -> Noise:
     """Noise of many readings at rest: of a hum if most windows have one, else of them all."""
-    starts = range(0, len(readings) - _WINDOW + 1, _WINDOW)
-    parts = [noise_of(readings[start : start + _WINDOW]) for start in starts]
+    starts = range(0, len(readings) - WINDOW + 1, WINDOW)
+    parts = [noise_of(readings[start : start + WINDOW]) for start in starts]
     humming = [part for part in parts if part.hums]
     if parts and 2 * len(humming) > len(parts):
         return Noise(
@@ -106,8 +106,6 @@ def usual_noise(readings: Sequence[float]) -> Noise:
     return Noise(0.5 * float(np.ptp(readings)) if readings else 0.0)
 
 
-WINDOW = 10
-"""Readings from which a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
 OPEN_BAD = 6
 """Bad readings in the window that mean an open wire: a floating input fails one window in 10^4, and
 20 % of spikes pass 99 in 100 (assumed)."""
@@ -299,10 +297,15 @@ class ChannelDiagnosis:
         self._times.append(t)
         self._count_near(counts)
         self._believe(counts)
-        finding = self._find()
-        value = self._used(finding) if finding.usable else math.nan
+        finding, good, band = self._find(), self._good, self._band
+        if finding is Finding.SATURATED:  # how far a flex sensor at the rail is bent is not known
+            good = min(max(good, band.low), band.high)
         self.counted[finding] += 1
-        self.reading = Reading(value, finding, counts if self._plausible(counts) else math.nan)
+        self.reading = Reading(
+            good if finding.usable else math.nan,
+            finding,
+            counts if band.believes(counts) else math.nan,
+        )
         return self.reading
 
     @property
@@ -321,23 +324,14 @@ class ChannelDiagnosis:
             self._least = self._most = counts
             self._near_equal = 1
 
-    def _used(self, finding: Finding) -> float:
-        """The reading to use; how far a flex sensor at the rail is bent is not known."""
-        if finding is Finding.SATURATED:
-            return min(max(self._good, self._band.low), self._band.high)
-        return self._good
-
-    def _plausible(self, counts: float) -> bool:
-        return self._band.believes(counts)
-
-    def _near(self, one: float, other: float) -> bool:
-        return abs(one - other) <= JUMP * self._band.span
+    def _near(self, counts: float, other: float) -> bool:
+        return abs(counts - other) <= JUMP * self._band.span
 
     def _believe(self, counts: float) -> None:
         """Accept a reading as the good one, or count it as bad."""
-        good = self._plausible(counts)
+        band, doubted = self._band, self._doubted
+        good = band.believes(counts)
         if good and not self._near(counts, self._good):
-            doubted = self._doubted
             follows = doubted and self._near(counts, doubted[-1])
             self._doubted = [*doubted, counts] if follows else [counts]
             good = len(self._doubted) >= AGREE
@@ -347,12 +341,9 @@ class ChannelDiagnosis:
             self._good = counts
             self._doubted = []
         self._bad_run = 0 if good else self._bad_run + 1
-        self._count(good, counts)
-
-    def _count(self, good: bool, counts: float) -> None:
-        outside = not self._band.low - MARGIN <= counts <= self._band.high + MARGIN
-        self._outside.append(good and outside)
-        self.outside += good and outside
+        outside = good and not band.low - MARGIN <= counts <= band.high + MARGIN
+        self._outside.append(outside)
+        self.outside += outside
         self.bad += not good
         self._share.append(not good)
         self._bad.append(not good and not math.isnan(counts))
@@ -382,7 +373,7 @@ class ChannelDiagnosis:
             return Finding.STUCK
         if not full:
             return None
-        if self._at_both_rails():
+        if min(self._at_rail(low=True), self._at_rail(low=False)) >= 2:  # no flex sensor can
             return Finding.OPEN
         return self._noise_or_open(spoiled=sum(self._bad) >= OPEN_BAD)
 
@@ -394,7 +385,11 @@ class ChannelDiagnosis:
             return Finding.OPEN if spoiled else None
         noise = noise_of(raw)
         quiet = self._t - self._hummed
-        self._remember(noise, quiet)
+        if noise.hums:
+            self._hummed = self._t
+        if quiet >= self._hum_time or (noise.hums and noise.size > self.noise.size):
+            self.noise = noise  # of a hum in force the largest
+            self._usual = median(after - before for before, after in pairwise(self._times))
         if noise.hums or (quiet < _MEMORY and sum(self._bad) >= SATURATED):
             return Finding.NOISE
         older, newer = raw[: WINDOW // 2], raw[WINDOW // 2 :]
@@ -404,25 +399,13 @@ class ChannelDiagnosis:
             return Finding.OPEN
         return Finding.NOISE if max(older) - min(older) >= least else None
 
-    def _remember(self, noise: Noise, quiet: float) -> None:
-        """Keep the largest hum while one is in force; a hum was seen last so long before [s]."""
-        if noise.hums:
-            self._hummed = self._t
-        if quiet >= self._hum_time or (noise.hums and noise.size > self.noise.size):
-            self.noise = noise  # though some readings were skipped, the median is the period
-            self._usual = median(after - before for before, after in pairwise(self._times))
-
-    def _at_both_rails(self) -> bool:
-        """Whether the window has two readings or more at either rail, which no flex sensor can."""
-        return min(self._at_rail(low=True), self._at_rail(low=False)) >= 2
-
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; that of a bent sensor there has noise."""
         bent_low = self._band.polarity < 0
         if low:
-            bound = 0.0 if bent_low and self._plausible(LOW_RAIL) else LOW_RAIL
+            bound = 0.0 if bent_low and self._band.believes(LOW_RAIL) else LOW_RAIL
             return all(counts <= bound for counts in self._raw)
-        bent = not bent_low and self._plausible(HIGH_RAIL)
+        bent = not bent_low and self._band.believes(HIGH_RAIL)
         bound = FULL_SCALE if bent else HIGH_RAIL
         return all(counts >= bound for counts in self._raw)
 

@@ -207,10 +207,10 @@ class SignalQuality:
             contact: `Contact` that the controller saw in the tick before, left and right.
         """
         fresh, self._t = t > self._t, t
-        found = [channel.step(t, c) for channel, c in zip(self.channels, counts, strict=True)]
+        readings = [channel.step(t, c) for channel, c in zip(self.channels, counts, strict=True)]
         if self.check is not None and fresh:
-            self.check.step(*(math.nan if r.finding.broken else r.taken for r in found))
-        for drift, reading, seen in zip(self.drifts, found, contact, strict=True):
+            self.check.step(*(math.nan if r.finding.broken else r.taken for r in readings))
+        for drift, reading, seen in zip(self.drifts, readings, contact, strict=True):
             resting = reading.taken if reading.finding in _RESTING else math.nan
             drift.step(t, resting, seen == Contact.FREE)
         if min(drift.bent_for for drift in self.drifts) >= self._together:

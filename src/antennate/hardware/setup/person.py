@@ -146,9 +146,9 @@ def _require_gone(before: frozenset[str], after: frozenset[str]) -> None:
         return
     if new := sorted(after - before):
         raise SetupError(f"expected a port that is gone, found a new one, {new[0]}; now unplug it")
-    here = ", ".join(sorted(after)) or "none"
+    paths = ", ".join(sorted(after)) or "none"
     raise SetupError(
-        f"expected a port that is gone, found none gone (ports here: {here}); if it was not "
+        f"expected a port that is gone, found none gone (ports here: {paths}); if it was not "
         "plugged in before, plug it in now and press Enter"
     )
 

@@ -124,7 +124,10 @@ class ServoSetup:
         changes = self._plan(baud, servo.servo, joint)
         for change in changes:
             apply(self._opener, change, self._now)
-        self._verify(joint)
+        with self._master(self._baud) as bus:
+            lacks = self._lacks(bus, joint)
+        if lacks:
+            raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
         return changes
 
     def alone(self) -> tuple[int, Present]:
@@ -133,31 +136,32 @@ class ServoSetup:
         Raises:
             SetupError: There is none, or more than one.
         """
-        found: list[tuple[int, Present]] = []
+        present: list[tuple[int, Present]] = []
         usual = (FACTORY_BAUD, self._baud)
         others = [b for b in BAUD_RATES if b not in usual and b <= _FASTEST]
         for speeds in (tuple(dict.fromkeys(usual)), others):
             for baud in speeds:
                 with self._master(baud) as bus:
-                    found += [(baud, one) for one in self._here(bus)]
-            if found:
+                    present += [(baud, servo) for servo in self._answering(bus)]
+            if present:
                 break
-        if not found:
+        if not present:
             raise SetupError(
                 "expected one servo, found none at any speed; check its cable and its supply"
             )
-        if len(found) > 1:
+        if len(present) > 1:
+            names = ", ".join(f"id {servo.servo} at {baud}" for baud, servo in present)
             raise SetupError(
-                f"expected one servo alone, found {len(found)}: {_named(found)}; unplug the others"
+                f"expected one servo alone, found {len(present)}: {names}; unplug the others"
             )
-        return found[0]
+        return present[0]
 
-    def _here(self, bus: Bus) -> list[Present]:
+    def _answering(self, bus: Bus) -> list[Present]:
         """Servos that answer at the speed of a bus."""
         ids = sorted({status.id for status in bus.scan(self._scan)})
         if not ids and bus.tally.bad_crc:
             return [Present(0, None, None, "broken")]
-        return [one for servo in ids if (one := look(bus, servo)) is not None]
+        return [present for servo in ids if (present := look(bus, servo)) is not None]
 
     def _owner(self, baud: int, servo: int, done: Collection[str], joint: Joint) -> Joint | None:
         """The joint, done already, whose servo this is."""
@@ -184,13 +188,6 @@ class ServoSetup:
             changes.append(Change(joint.servo, baud, "baud_rate", old, new))
         return changes
 
-    def _verify(self, joint: Joint) -> None:
-        """The servo is where it has to be, with all that it has to hold."""
-        with self._master(self._baud) as bus:
-            lacks = self._lacks(bus, joint)
-        if lacks:
-            raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
-
     def _lacks(self, bus: Bus, joint: Joint) -> str:
         """What is wrong with the servo of a joint, empty if nothing is."""
         servo = look(bus, joint.servo)
@@ -212,7 +209,7 @@ class ServoSetup:
 
     def _read(self, bus: Bus, servo: int) -> dict[str, int]:
         """The registers of a servo that have to hold something."""
-        found: dict[str, int] = {}
+        values: dict[str, int] = {}
         for name in self._rules:
             value = read_some(bus, [servo], XC430_W240[name]).get(servo)
             if value is None:
@@ -220,12 +217,8 @@ class ServoSetup:
                     f"expected {name.replace('_', ' ')} of servo {servo}, found no answer; check "
                     "its cable"
                 )
-            found[name] = value
-        return found
-
-
-def _named(found: Iterable[tuple[int, Present]]) -> str:
-    return ", ".join(f"id {one.servo} at {baud}" for baud, one in found)
+            values[name] = value
+        return values
 
 
 Keep = Callable[[tuple[str, ...]], None]
