@@ -188,7 +188,7 @@ def run_setup(patch: Patch, config: SetupConfig, tmp_path: Path) -> None:
     script = Script([*steps, ("whole|connect all", box.plug_all, "")])
     patch.setattr(script, "close", lambda: None, raising=False)
     patch.setattr(setup, "TerminalPerson", lambda: script)
-    patch.setattr(setup.ports, "find_port", lambda *_: "the bus")
+    patch.setattr(setup, "find_port", lambda *_: "the bus")
     told(patch, setup, config, tmp_path / "robot.toml")
 
 

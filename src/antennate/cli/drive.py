@@ -28,7 +28,7 @@ from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import Operator, drive
 from antennate.hardware.driving.report import MANY, Recent, late_sentence
 from antennate.hardware.driving.stopping import Arrival, StopOnce
-from antennate.hardware.pace import Priority, urgent
+from antennate.hardware.host import Priority, urgent
 from antennate.hardware.safety.causes import State, what_to_do
 from antennate.hardware.safety.session import Session
 from antennate.messages import typed

@@ -18,7 +18,7 @@ from antennate.hardware.config import JogConfig, RobotFile
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.stopping import StopOnce
-from antennate.hardware.pace import HostClock
+from antennate.hardware.host import HostClock
 from antennate.hardware.safety.deadlines import JOG_PERIOD
 from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.servos import joints_of

@@ -18,7 +18,7 @@ from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile, SetupConfig
 from antennate.hardware.doctor.check import opener_of
-from antennate.hardware.pace import HostClock
+from antennate.hardware.host import HostClock
 from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port, ports_like
 from antennate.hardware.setup.robot_toml import change
 from antennate.hardware.setup.servos import Assembly, JointState, ServoSetup

@@ -16,7 +16,7 @@ from antennate.cli.options import option
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.config import DriveConfig, RobotFile, TeleopConfig
 from antennate.hardware.driving.teleop import Gamepad, KeyController
-from antennate.hardware.pace import HostClock
+from antennate.hardware.host import HostClock
 from antennate.hardware.safety.session import Session
 from antennate.robots.spec import require_antennae
 

@@ -23,7 +23,7 @@ from antennate.cli.view_options import PageOptions, page_of
 from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, reason
 from antennate.hardware.config import RobotFile
-from antennate.hardware.pace import LEVEL, urgent
+from antennate.hardware.host import LEVEL, urgent
 from antennate.hardware.ports.finder import read_key
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from antennate.cli.status import write
 from antennate.errors import AntennateError
-from antennate.hardware.pace import give_way
+from antennate.hardware.host import give_way
 from antennate.messages import one_line
 from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 

@@ -19,7 +19,7 @@ from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.pace import HostClock
+from antennate.hardware.host import HostClock
 from antennate.hardware.safety import torque
 from antennate.hardware.setup.person import Quit
 from antennate.hardware.setup.robot_toml import change, require_changeable

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Generic, NamedTuple, Self
 
 from antennate.errors import LogError, in_one_line
-from antennate.hardware.pace import LEVEL, claim
+from antennate.hardware.host import LEVEL, claim
 from antennate.telemetry.rows import RowLog, Taken
 
 _MOST = 3000

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from antennate.hardware.pace import LoopTiming
 from antennate.hardware.safety.causes import DATA, Active, Cause, State
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.supervisor import Outputs
+from antennate.hardware.timing import LoopTiming
 from antennate.types import Maneuver
 
 
