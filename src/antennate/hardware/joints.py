@@ -64,6 +64,17 @@ def settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
     }
 
 
+def all_settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
+    """The same, and the return delay: it makes answers late, and forbids no torque."""
+    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
+    return {**settings(robot), "return_delay_time": delay}
+
+
+def settings_of(rules: Mapping[str, Mapping[int, Setting]], servo: int) -> dict[str, Setting]:
+    """Those of one servo by register."""
+    return {name: by_id[servo] for name, by_id in rules.items() if servo in by_id}
+
+
 def profile_velocities(robot: RobotSpec) -> dict[int, int]:
     """Profile velocity by id [0.229 rev/min]: `fastest` of its group with some room."""
     limits = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +20,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.wire import Counters, Hello, Reset, objections, require_sensor
 from antennate.hardware.safety import channel as diagnosis
-from antennate.hardware.safety.channel import Band, ChannelDiagnosis, usual_noise
+from antennate.hardware.safety.channel import WINDOW, Band, ChannelDiagnosis, Noise, noise_of
 from antennate.messages import typed
 from antennate.params.control import CurveParams
 from antennate.params.doctor import DoctorParams
@@ -277,6 +277,19 @@ def _usual(seen: list[diagnosis.Finding]) -> diagnosis.Finding:
     return commonest if often else counted.most_common(1)[0][0]
 
 
+def _usual_noise(readings: Sequence[float]) -> Noise:
+    """Noise of many readings at rest: of a hum if most windows have one, else of them all."""
+    starts = range(0, len(readings) - WINDOW + 1, WINDOW)
+    parts = [noise_of(readings[start : start + WINDOW]) for start in starts]
+    humming = [part for part in parts if part.hums]
+    if parts and 2 * len(humming) > len(parts):
+        return Noise(
+            max(part.size for part in humming),
+            float(np.median([part.frequency for part in humming])),
+        )
+    return Noise(0.5 * float(np.ptp(readings)) if readings else 0.0)
+
+
 def _noise(
     board: BoardSurvey, config: DoctorConfig, name: str, counts: list[float]
 ) -> tuple[Finding, str, str]:
@@ -284,7 +297,7 @@ def _noise(
     good = config.doctor
     before, right = good.calibrated_noise, good.calibrated_noise_right
     before = right if name == "right" and right is not None else before
-    noise, usual = float(np.std(counts)), usual_noise(counts)
+    noise, usual = float(np.std(counts)), _usual_noise(counts)
     usually = max(before or 0.0, 1.0)
     louder = noise > good.noise_ratio * usually
     text, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"

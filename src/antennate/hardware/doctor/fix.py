@@ -15,7 +15,7 @@ from antennate.dxl.models import XC430_W240
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.joints import Setting, settings
+from antennate.hardware.joints import all_settings, settings_of
 from antennate.hardware.safety import torque
 from antennate.robots.spec import RobotSpec
 
@@ -70,16 +70,13 @@ def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
 
 
 def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
-    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
-    wanted = {**settings(robot), "return_delay_time": delay}
+    rules = all_settings(robot)
     return [
-        Change(servo, survey.baud, name, there[name], setting.cure)
-        for servo, there in survey.registers.items()
+        Change(servo, survey.baud, name, values[name], setting.cure)
+        for servo, values in survey.registers.items()
         if servo in robot.ids
-        for name, rules in wanted.items()
-        if name in there
-        and (setting := rules.get(servo)) is not None
-        and not setting.allows(there[name])
+        for name, setting in settings_of(rules, servo).items()
+        if name in values and not setting.allows(values[name])
     ]
 
 

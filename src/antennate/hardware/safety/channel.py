@@ -93,19 +93,6 @@ def noise_of(readings: Sequence[float]) -> Noise:
     return Noise(size, frequency if hums else math.nan)
 
 
-def usual_noise(readings: Sequence[float]) -> Noise:
-    """Noise of many readings at rest: of a hum if most windows have one, else of them all."""
-    starts = range(0, len(readings) - WINDOW + 1, WINDOW)
-    parts = [noise_of(readings[start : start + WINDOW]) for start in starts]
-    humming = [part for part in parts if part.hums]
-    if parts and 2 * len(humming) > len(parts):
-        return Noise(
-            max(part.size for part in humming),
-            float(np.median([part.frequency for part in humming])),
-        )
-    return Noise(0.5 * float(np.ptp(readings)) if readings else 0.0)
-
-
 OPEN_BAD = 6
 """Bad readings in the window that mean an open wire: a floating input fails one window in 10^4, and
 20 % of spikes pass 99 in 100 (assumed)."""
@@ -129,7 +116,6 @@ _FLOATING = FULL_SCALE / 3
 noise over the whole range in 3000 differs less (computed)."""
 _MEMORY = 1.0
 """Time for which wide readings are still a hum where some that were skipped break its sine [s]."""
-_HUM_TIME = SupervisorParams().hum_time
 JUMP = 1 / 3
 """Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
@@ -232,9 +218,6 @@ class Reading:
     taken: float = math.nan
 
 
-_NOTHING = Reading(math.nan, Finding.LOST)
-
-
 class ChannelDiagnosis:
     """Diagnoses the readings of one antenna by its calibrated range.
 
@@ -251,7 +234,7 @@ class ChannelDiagnosis:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
     """
 
-    def __init__(self, band: Band, hum_time: float = _HUM_TIME) -> None:
+    def __init__(self, band: Band, hum_time: float = SupervisorParams().hum_time) -> None:
         if not LOW_RAIL < band.low < band.high < HIGH_RAIL:
             raise CalibrationError(
                 f"a calibrated range must lie within {LOW_RAIL:g} and {HIGH_RAIL:g} "
@@ -267,7 +250,7 @@ class ChannelDiagnosis:
 
     def reset(self) -> None:
         """Forget all readings, but neither the counters nor a hum."""
-        self.reading = _NOTHING
+        self.reading = Reading(math.nan, Finding.LOST)
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)
         self._times: deque[float] = deque(maxlen=WINDOW)

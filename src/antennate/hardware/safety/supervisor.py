@@ -43,9 +43,7 @@ class RateMeter:
         self._window = window
         self._ticks: deque[tuple[float, int]] = deque()
         self._sum = 0
-        self._start = math.nan
-        self._right = math.nan
-        self.rate = math.nan
+        self._start = self._right = self.rate = math.nan
         self.wrong = False
 
     def step(self, now: float, samples: int) -> None:

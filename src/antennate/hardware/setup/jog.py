@@ -25,7 +25,7 @@ from antennate.dxl.model import (
 )
 from antennate.dxl.models import MODELS_BY_NUMBER
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.joints import settings
+from antennate.hardware.joints import settings, settings_of
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
 from antennate.hardware.setup.person import SetupError
@@ -68,11 +68,7 @@ class Jog:
         at = robot.joint_names.index(joint.name)
         self.joint, self._bus, self._params = joint, bus, params
         self._table = MODELS_BY_NUMBER[joint.model]
-        self._rules = {
-            name: rules[joint.servo]
-            for name, rules in settings(robot).items()
-            if joint.servo in rules
-        }
+        self._rules = settings_of(settings(robot), joint.servo)
         self._sign, self._limit = robot.directions[at], robot.limits[at]
         self._zero, self._lost = float(robot.zeros[at]), 0
         self._full = 0

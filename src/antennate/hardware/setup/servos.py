@@ -7,7 +7,7 @@ last: one that was interrupted before is found as a new one again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -19,7 +19,7 @@ from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.joints import Setting, settings
+from antennate.hardware.joints import all_settings, settings_of
 from antennate.hardware.setup.person import Person, SetupError, agrees, confirm
 from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
@@ -85,8 +85,7 @@ class ServoSetup:
         self._opener, self._scan, self._now = opener, scan, now
         self._master = partial(master, opener, now=now)
         self._baud = robot.baud
-        delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
-        self._rules = {**settings(robot), "return_delay_time": delay}
+        self._rules = all_settings(robot)
 
     def present(self) -> dict[str, str]:
         """What each joint's servo lacks, of those that answer at the robot's speed; "" is nothing.
@@ -178,7 +177,7 @@ class ServoSetup:
             there = self._read(bus, servo)
         changes = [
             Change(servo, baud, name, there[name], rule.cure)
-            for name, rule in self._wanted(joint).items()
+            for name, rule in settings_of(self._rules, joint.servo).items()
             if not rule.allows(there[name])
         ]
         if servo != joint.servo:
@@ -200,12 +199,9 @@ class ServoSetup:
         there = self._read(bus, joint.servo)
         return "; ".join(
             f"{name.replace('_', ' ')} {there[name]} (expected {rule})"
-            for name, rule in self._wanted(joint).items()
+            for name, rule in settings_of(self._rules, joint.servo).items()
             if not rule.allows(there[name])
         )
-
-    def _wanted(self, joint: Joint) -> Mapping[str, Setting]:
-        return {n: rules[joint.servo] for n, rules in self._rules.items() if joint.servo in rules}
 
     def _read(self, bus: Bus, servo: int) -> dict[str, int]:
         """The registers of a servo that have to hold something."""
