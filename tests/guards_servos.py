@@ -32,6 +32,7 @@ from antennate.hardware.driving import connect
 from antennate.hardware.driving import drive as dry_run
 from antennate.hardware.dynamixel import actuators, bringup
 from antennate.hardware.dynamixel import leg_turns as turns
+from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.ports import serial_line as serial_port
@@ -404,7 +405,7 @@ SERVOS = [
     ),
     Guard(
         "operating mode while armed",
-        put(actuators, "ServoMonitor", lambda *words, modes: actuators.ServoMonitor(*words)),
+        put(actuators, "ServoMonitor", lambda *words, modes: ServoMonitor(*words)),
         partial(does_wrong, *test_following.CASES[1]),
     ),
     Guard(
