@@ -36,7 +36,7 @@ from antennate.dxl.bus import Bus
 from antennate.dxl.models import XC430_W240, XL330_M288
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
-from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.ports.serial_line import SerialPort
 
 IDS = tuple(range(1, 20))
 BAUD = 1_000_000

@@ -81,7 +81,7 @@ def tick() -> Walk:
     watched = importlib.import_module("twin_rig").Watch
 
     from antennate.experiments.tunnel.run import TunnelConfig
-    from antennate.hardware.driving.config import DriveConfig
+    from antennate.hardware.config import DriveConfig
     from antennate.hardware.driving.drive import drive
     from antennate.twin.robot import TwinRobot
 

@@ -3,7 +3,6 @@
 from generated import finish, heads, row
 
 from antennate.hardware.safety.causes import Cause
-from antennate.hardware.safety.cures import CURES
 
 PAGE = """\
 # States and causes
@@ -17,7 +16,7 @@ does in each state: [States](hardware.md#states).
 
 def main() -> None:
     """Write the page, or compare it."""
-    rows = [row(f"`{c.name}`", c.severity.name, c.text, CURES[c]) for c in Cause]
+    rows = [row(f"`{c.name}`", c.severity.name, c.text, c.cure) for c in Cause]
     finish(__file__, PAGE.format(table="\n".join([heads("cause", "state", "means", "do"), *rows])))
 
 

@@ -9,6 +9,7 @@ from types import ModuleType
 from generated import finish, heads, row
 
 from antennate import experiments, params
+from antennate.hardware import config as robot_file
 from antennate.messages import command_words
 from antennate.params.base import Params, meaning
 
@@ -21,14 +22,14 @@ paper does not say).
 """
 ROBOTS = ("spec", "joints", "servos", "antenna", "sensor")
 """Modules of `antennate.robots` that describe robots."""
-OTHERS = (
-    "antennate.hardware.robot_file",
-    "antennate.hardware.robot",
-    "antennate.hardware.driving.config",
-    "antennate.hardware.esp32.recorder",
-    "antennate.telemetry.replay",
-    "antennate.twin.config",
+HARDWARE = (
+    robot_file.RobotFile,
+    robot_file.RobotConfig,
+    robot_file.DoctorConfig,
+    robot_file.DriveConfig,
+    robot_file.RecordConfig,
 )
+OTHERS = ("antennate.telemetry.replay", "antennate.twin.config")
 """Modules beside the experiments that hold the parameters of a command."""
 COMMANDS = """\
 # Parameters of commands
@@ -54,6 +55,7 @@ def commands() -> list[type[Params]]:
     """Return the classes that hold the top level of a command's parameters."""
     ours = sorted(name for name in experiments.names() if experiments.is_ours(name))
     found = [group for name in ours for group in nested(experiments.load(name).config)]
+    found += HARDWARE
     found += [group for name in OTHERS for group in groups(importlib.import_module(name))]
     return list(dict.fromkeys(found))
 

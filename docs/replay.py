@@ -11,10 +11,10 @@ from importlib import import_module
 from pathlib import Path
 
 from antennate.cli import main as antennate
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.session import Session
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter

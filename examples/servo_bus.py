@@ -16,7 +16,7 @@ from antennate.dxl.models import servo_model
 from antennate.dxl.server import Server
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
-from antennate.hardware.ports.tcp_port import TcpPort
+from antennate.hardware.ports.network import TcpPort
 
 IDS = (1, 2, 3)
 MODEL = servo_model("xl430-w250")

@@ -7,7 +7,7 @@ import time
 
 from antennate.dxl.answers import MOTION, Timing
 from antennate.dxl.bus import Bus
-from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.ports.serial_line import SerialPort
 from antennate.hardware.safety import torque
 
 IDS = range(1, 20)

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from lockstep import BoardPort, LockstepClock
 
+from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import apply, plan
-from antennate.hardware.robot import DoctorConfig
 from antennate.port import Port
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read

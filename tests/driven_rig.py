@@ -26,13 +26,13 @@ from twin_rig import Watch
 
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.twin.robot import TwinRobot

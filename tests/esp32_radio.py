@@ -9,9 +9,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 from esp32_board import Board
 
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.verifier import Verifier
-from antennate.hardware.esp32.wire import Hello, Sample
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
+from antennate.hardware.ports.network import Verifier
 from antennate.params.network import NetworkParams
 
 KEY = bytes(range(32))

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from antennate.hardware.safety.causes import Outputs
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.params.base import Params
 
 Patch = pytest.MonkeyPatch

@@ -24,10 +24,12 @@ from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
 from antennate.control import conditioning, contact, maneuver
-from antennate.hardware.esp32 import board, clock, decoder, frame
+from antennate.hardware.esp32 import board, clock, frame
+from antennate.hardware.esp32 import wire as decoder
 from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Reset
-from antennate.hardware.safety import diagnosis, touch_check
+from antennate.hardware.safety import channel
+from antennate.hardware.safety import signal_quality as touch_check
 from antennate.types import Maneuver
 
 
@@ -164,7 +166,7 @@ CLOCK = [
 FILMS = [
     Guard(
         "open wire",
-        together(put(diagnosis, "OPEN_BAD", 10**6), put(diagnosis, "HIGH_RAIL", 1e6)),
+        together(put(channel, "OPEN_BAD", 10**6), put(channel, "HIGH_RAIL", 1e6)),
         partial(
             test_diagnosis.test_S1_a_floating_wire_is_open_within_ten_readings,
             test_diagnosis.rail_to_rail,
@@ -173,70 +175,70 @@ FILMS = [
     ),
     Guard(
         "short circuit",
-        put(diagnosis, "LOW_RAIL", -1.0),
+        put(channel, "LOW_RAIL", -1.0),
         partial(
             test_diagnosis.test_S2_shorts_are_named_at_the_tenth_reading,
             [0.0] * 10,
-            diagnosis.Finding.SHORT_LO,
+            channel.Finding.SHORT_LO,
             BAND,
             test_diagnosis.FREE,
         ),
     ),
     Guard(
         "stuck reading",
-        together(put(diagnosis, "STUCK", 10**6), put(diagnosis, "NEARLY_STUCK", 10**6)),
+        together(put(channel, "STUCK", 10**6), put(channel, "NEARLY_STUCK", 10**6)),
         test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
         by=(ValueError,),
     ),
     Guard(
         "reading stuck but for its last bit",
-        put(diagnosis, "NEARLY_STUCK", 10**6),
+        put(channel, "NEARLY_STUCK", 10**6),
         test_noise.test_S4_a_converter_whose_last_bit_toggles_is_stuck_after_150,
         by=(ValueError,),
     ),
     Guard(
         "hum",
-        put(diagnosis, "HIDDEN", 10.0),
+        put(channel, "HIDDEN", 10.0),
         partial(test_noise.test_S14_a_hum_is_named_with_size_and_frequency, 120.0, 50.0, "50 Hz"),
     ),
     Guard(
         "hum that its beat hides",
-        put(diagnosis.ChannelDiagnosis.__init__, "__defaults__", (0.1,)),
+        put(channel.ChannelDiagnosis.__init__, "__defaults__", (0.1,)),
         partial(test_noise.test_S14_a_hum_stays_in_force_while_its_beat_hides_it, 400.0, 50.02),
     ),
     Guard(
         "isolated spikes",
-        put(diagnosis, "AGREE", 1),
+        put(channel, "AGREE", 1),
         test_diagnosis.test_S6_a_real_jump_is_believed_after_three_readings,
     ),
     Guard(
         "share of bad readings",
-        put(diagnosis, "SHARE", 1.0),
+        put(channel, "SHARE", 1.0),
         partial(test_diagnosis.test_S6_more_than_a_fifth_bad_is_degraded_or_worse, 0.3),
     ),
     Guard(
         "a sensor at its rail is flagged",
-        put(diagnosis, "SATURATED", 10**6),
+        put(channel, "SATURATED", 10**6),
         test_diagnosis.test_S3_a_saturated_film_is_flagged_and_still_contact,
     ),
     Guard(
         "readings far beyond the range",
-        put(diagnosis, "BEYOND", 1e6),
+        put(channel, "BEYOND", 1e6),
         test_diagnosis.test_S11_far_beyond_is_not_believed,
     ),
     Guard(
         "findings that say nothing of contact",
-        put(diagnosis.Finding, "usable", True),
+        put(channel.Finding, "usable", True),
         test_diagnosis.test_S4_a_repeated_reading_is_stuck_after_100,
     ),
     Guard(
         "a sample is counted once",
-        around(diagnosis.ChannelDiagnosis, "step", afresh),
+        around(channel.ChannelDiagnosis, "step", afresh),
         test_diagnosis.test_S4_the_same_sample_seen_twice_is_not_counted_twice,
     ),
     Guard(
         "gap in time",
-        put(diagnosis, "GAP", 1e6),
+        put(channel, "GAP", 1e6),
         test_diagnosis.test_a_gap_in_time_forgets_what_was_before,
     ),
     Guard(

@@ -15,9 +15,10 @@ import test_touch_check
 from guard_tools import Guard, Off, after, around, blind, given, put
 from hardware_rig import PERIOD
 
-from antennate.hardware.safety import diagnosis, rate, supervisor
-from antennate.hardware.safety.causes import Cause, Outputs, State
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety import channel, supervisor
+from antennate.hardware.safety import supervisor as rate
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
@@ -78,7 +79,7 @@ SUPERVISOR = [
     ),
     Guard(
         "findings hold the robot",
-        blind(findings=(diagnosis.Finding.OK, diagnosis.Finding.OK)),
+        blind(findings=(channel.Finding.OK, channel.Finding.OK)),
         told(Cause.OPEN),
     ),
     Guard("restart of the board", blind(resets=0), told(Cause.REBOOT)),

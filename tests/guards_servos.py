@@ -27,14 +27,16 @@ from antennate.dxl import bus, inquiry, packets, parser
 from antennate.dxl.answers import PendingRequests, Timing, Value
 from antennate.dxl.model import FULL_DRIVE
 from antennate.dxl.models import XC430_W240
-from antennate.hardware import joints, settings
-from antennate.hardware.driving import dry_run, session
-from antennate.hardware.dynamixel import actuators, bringup, monitor
+from antennate.hardware import joints
+from antennate.hardware.driving import connect
+from antennate.hardware.driving import drive as dry_run
+from antennate.hardware.dynamixel import actuators, bringup
 from antennate.hardware.dynamixel import leg_turns as turns
+from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
-from antennate.hardware.ports import serial_port
-from antennate.hardware.safety import torque
+from antennate.hardware.ports import serial_line as serial_port
+from antennate.hardware.safety import session, torque
 from antennate.params.safety import FollowingParams
 from antennate.robots.spec import RobotSpec
 
@@ -301,7 +303,7 @@ SERVOS = [
     ),
     Guard(
         "settings of servos",
-        put(settings, "wrong", constant([])),
+        put(connect, "wrong_settings", constant([])),
         test_settings.test_all_that_is_wrong_is_said_at_once,
     ),
     Guard(
@@ -363,7 +365,7 @@ SERVOS = [
     ),
     Guard(
         "watchdog lost while armed",
-        put(monitor, "WATCHDOG_COUNTS", AnyNumber()),
+        put(actuators, "WATCHDOG_COUNTS", AnyNumber()),
         partial(
             test_session.test_B11_B9_a_servo_without_torque_or_watchdog_is_a_fault_within_a_second,
             7,
@@ -403,7 +405,7 @@ SERVOS = [
     ),
     Guard(
         "operating mode while armed",
-        put(actuators, "ServoMonitor", lambda *words, modes: monitor.ServoMonitor(*words)),
+        put(actuators, "ServoMonitor", lambda *words, modes: ServoMonitor(*words)),
         partial(does_wrong, *test_following.CASES[1]),
     ),
     Guard(
@@ -469,7 +471,7 @@ SERVOS = [
     ),
     Guard(
         "supply read long ago",
-        put(monitor, "SUPPLY_AGE", math.inf),
+        put(actuators, "SUPPLY_AGE", math.inf),
         test_session.test_B13_a_supply_that_cannot_be_read_any_more_is_not_known_after_4_s,
     ),
     Guard(

@@ -24,15 +24,12 @@ from guard_tools import Guard, around, before, constant, put
 
 from antennate.control import loop
 from antennate.hardware import joints
-from antennate.hardware.driving import session
-from antennate.hardware.driving.decision import StepResult
-from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.dynamixel import monitor
+from antennate.hardware.driving.stopping import StopOnce
+from antennate.hardware.dynamixel import actuators
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.safety import deadlines, torque
-from antennate.hardware.safety.causes import Outputs
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety import deadlines, session, torque
+from antennate.hardware.safety.controller import StepResult, SupervisedController
+from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.port import PortError
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
@@ -192,7 +189,7 @@ SESSION = [
     ),
     Guard(
         "dead wire ends nothing",
-        around(monitor.ServoMonitor, "step", raising),
+        around(actuators.ServoMonitor, "step", raising),
         test_bus.test_a_dead_wire_is_noted_by_the_watch_and_ends_nothing,
         by=(PortError,),
     ),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antennate.hardware.safety.causes import Cause, Outputs
-from antennate.hardware.safety.diagnosis import Finding
+from antennate.hardware.safety.causes import Cause
+from antennate.hardware.safety.channel import Finding
+from antennate.hardware.safety.supervisor import Outputs
 from antennate.types import Contact
 
 BAD: dict[Cause, dict[str, Any]] = {

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from antennate.control.registry import make_controller
-from antennate.hardware.safety.causes import Inputs, Outputs, State
-from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding
+from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.safety import SupervisorParams
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver

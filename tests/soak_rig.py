@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from esp32_streams import hello
 from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD, healthy
 
-from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.board import Board
-from antennate.hardware.safety.causes import Cause, Outputs, State
-from antennate.hardware.safety.diagnosis import ChannelDiagnosis
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.esp32.board import Board, BoardReader
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.channel import ChannelDiagnosis
+from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
 from antennate.types import Contact
 
@@ -146,8 +144,7 @@ class Soak:
         self._source = Source(self._rng)
         self._clock = Now()
         self._board = Board(self._source, SupervisorParams().stale_age)
-        nobody: Any = None
-        self._body = HardwareRobot(self._board, nobody, self._clock)
+        self._reader = BoardReader(self._board, self._clock)
         self._films = [ChannelDiagnosis(BAND) for _ in range(2)]
         self._supervisor = Supervisor(SupervisorParams())
         self._events = events
@@ -173,11 +170,9 @@ class Soak:
         self._send(now)
         self._clock.t = now
         clock = self._board.clock
-        before = sum(clock.states.values())
-        seen = self._body.read()
-        refused = sum(clock.states.values()) - before - self._body.used
-        t, counts = float(seen.t[0]), seen.counts[0].tolist()
-        said = [film.step(t, c).counts for film, c in zip(self._films, counts, strict=True)]
+        t, counts = self._reader.read()
+        sides = zip(self._films, counts[0].tolist(), strict=True)
+        said = [film.step(t, c).counts for film, c in sides]
         clear = self._out is not None and self._out.clear
         contact = [Contact.FREE if clear and c == c else Contact.UNKNOWN for c in said]
         self._out = self._supervisor.step(
@@ -185,8 +180,8 @@ class Soak:
             healthy(
                 now,
                 age=clock.age(now),
-                valid=self._body.used,
-                refused=refused,
+                valid=self._reader.used,
+                refused=self._reader.refused,
                 findings=(self._films[0].reading.finding, self._films[1].reading.finding),
                 noise=(self._films[0].noise_text, self._films[1].noise_text),
                 contact=(contact[0], contact[1]),

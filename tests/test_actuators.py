@@ -9,11 +9,11 @@ import pytest
 from twin_rig import rig
 
 from antennate.hardware.actuators import ActuatorError, ActuatorState, JointFaults, Tally
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.joints import CommandError
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.robots.spec import RobotSpec

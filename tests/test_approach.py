@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from twin_rig import rig
 
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.params.safety import SupervisorParams
 from antennate.twin.config import TwinConfig
 

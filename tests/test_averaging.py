@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from esp32_streams import BOOT, encoded, hello
 from hardware_rig import BENT, FREE, PERIOD
+from twin_rig import Bare
 
 from antennate.control.registry import make_controller
-from antennate.hardware.driving.hardware_robot import HardwareRobot
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.wire import Sample
 from antennate.params.control import ControlParams
@@ -58,9 +58,9 @@ class Stream:
 
 def levels(rate: int, phase: float) -> tuple[np.ndarray, np.ndarray]:
     """Bending level and age of the frame [s] of each tick from that of the bend on."""
-    stream, nobody = Stream(rate, phase), None
+    stream = Stream(rate, phase)
     board = Board(stream, SupervisorParams().stale_age)
-    body: Any = HardwareRobot(board, nobody, stream)  # type: ignore[arg-type]
+    body: Any = Bare(board, None, stream)  # type: ignore[arg-type]
     control, found, stamps = make_controller("paper", ControlParams()), [], []
     for tick in range(round(WARM_UP / PERIOD) + 60):
         stream.sleep_until(tick * PERIOD)

@@ -13,8 +13,8 @@ from twin_rig import rig
 from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.errors import AntennateError, CalibrationError, ConfigError
+from antennate.hardware.config import RobotConfig
 from antennate.hardware.esp32.wire import require_sensor
-from antennate.hardware.robot import RobotConfig
 from antennate.params.control import ConditioningParams, ControlParams, RuleParams
 from antennate.twin.config import TwinConfig
 

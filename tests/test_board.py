@@ -9,7 +9,7 @@ import numpy as np
 from esp32_streams import BOOT, encoded, framed, hello, made
 
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.board import Board, counts_of
+from antennate.hardware.esp32.board import Board, BoardReader
 
 
 class Wire:
@@ -29,6 +29,19 @@ class Wire:
         raise AssertionError("nothing is thrown away unseen")
 
 
+@dataclasses.dataclass
+class Now:
+    """A clock that stands still."""
+
+    time: float
+
+    def now(self) -> float:
+        return self.time
+
+    def sleep_until(self, t: float) -> None:
+        raise AssertionError("nothing waits here")
+
+
 def spoken(greeting: bytes, counts: tuple[int, int] = (1800, 1810), flags: int = 0) -> Board:
     """A board that has greeted and sent 20 samples, the last one taken at 0.19 s."""
     wire = Wire()
@@ -45,13 +58,18 @@ def test_a_reading_older_than_the_limit_is_none() -> None:
     board = spoken(hello())
     assert board.newest(0.19 + 0.049) is not None
     assert board.newest(0.19 + 0.051) is None
-    assert np.isnan(counts_of(board.newest(0.19 + 0.051))).all()
+    assert np.isnan(BoardReader(board, Now(0.19 + 0.051)).read()[1]).all()
 
 
 def test_S2_a_reading_at_a_rail_comes_as_it_was_read() -> None:
     """What it is worth is judged by the diagnosis of its channel, and nowhere before."""
     board = spoken(hello(), counts=(0, 4095), flags=frame.FLAG_LEFT_RAIL | frame.FLAG_RIGHT_RAIL)
-    assert counts_of(board.newest(0.19)).tolist() == [[0.0, 4095.0]]
+    assert BoardReader(board, Now(0.19)).read()[1].tolist() == [[0.0, 4095.0]]
+
+
+def test_samples_that_the_board_took_too_late_are_counted() -> None:
+    assert spoken(hello(), flags=frame.FLAG_LATE).overdue == 20
+    assert spoken(hello()).overdue == 0
 
 
 def test_E8_no_sample_of_a_board_with_old_firmware_is_used() -> None:

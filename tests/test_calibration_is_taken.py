@@ -8,7 +8,7 @@ import pytest
 
 from antennate.cli import main
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
 from antennate.params.reading import read_file
 
 

@@ -18,8 +18,8 @@ from worlds import TICKS, WORLDS, World, plain_tick, recorded, replayed, session
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import BUILT_IN
-from antennate.hardware.driving.hardware_robot import HardwareRobot
-from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.esp32.board import BoardReader
+from antennate.hardware.esp32.clock import DeviceClock, Timed
 from antennate.hardware.esp32.wire import Sample
 from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
@@ -118,6 +118,7 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
 
         def __init__(self) -> None:
             self.epoch, self.taken = 0, -1.0
+            self.clock = DeviceClock()
 
         def poll(self, now: float) -> int:
             self.epoch += rng.random() < 0.01
@@ -130,11 +131,11 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
             return Timed(EMPTY, self.epoch, 0, round(1e6 * self.taken), 0.0, 0.0)
 
     clock = Wandering(0, 0.01)
-    body = HardwareRobot(Chance(), None, clock)  # type: ignore[arg-type]
+    reader = BoardReader(Chance(), clock)  # type: ignore[arg-type]
     times = []
     for tick in range(5000):
         clock.sleep_until(0.01 * tick)
-        times.append(float(body.read().t[0]))
+        times.append(reader.read()[0])
     assert times == sorted(times)
     assert abs(np.array(times) - 0.01 * np.arange(5000)).max() <= 0.051
 

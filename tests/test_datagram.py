@@ -11,7 +11,7 @@ import pytest
 from esp32_streams import encoded, hello, made
 
 from antennate.hardware.esp32 import datagram, frame
-from antennate.hardware.esp32.verifier import Bucket, Verifier
+from antennate.hardware.ports.network import Bucket, Verifier
 from antennate.params.network import NetworkParams
 
 KEY = bytes(range(32))

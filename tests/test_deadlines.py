@@ -8,7 +8,7 @@ from twin_rig import rig
 
 from antennate.cli import main
 from antennate.errors import ConfigError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import deadlines
 from antennate.hardware.safety.causes import State
 from antennate.params.safety import SupervisorParams

@@ -18,9 +18,9 @@ from scipy.stats import binom, norm
 
 from antennate.antenna.sensor import reading_noise
 from antennate.errors import CalibrationError
-from antennate.hardware.safety import diagnosis
+from antennate.hardware.safety import channel as diagnosis
 from antennate.hardware.safety.causes import Cause, State
-from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding, Reading
+from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding, Reading
 from antennate.robots.sensor import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"

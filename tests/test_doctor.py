@@ -10,12 +10,11 @@ from doctor_rig import ROBOT, Patient, wrong
 
 from antennate.dxl.packets import StatusError
 from antennate.dxl.servo import Servo
-from antennate.hardware.doctor import board_checks
-from antennate.hardware.doctor.board_survey import BoardSurvey
-from antennate.hardware.doctor.check import grouped, ids_text
+from antennate.hardware.doctor import board as board_checks
+from antennate.hardware.doctor.board import BoardSurvey
+from antennate.hardware.doctor.check import grouped, ids_text, latency_row
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.ports.errors import OpenError
 from antennate.params.doctor import DoctorParams

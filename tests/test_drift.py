@@ -10,9 +10,8 @@ from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.control.contact import classify
 from antennate.hardware.safety.causes import Cause, State
-from antennate.hardware.safety.diagnosis import Finding
-from antennate.hardware.safety.drift import Drift
-from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.hardware.safety.channel import Finding
+from antennate.hardware.safety.signal_quality import Drift, SignalQuality
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.endurance import DriftParams
 from antennate.robots.sensor import SensorParams

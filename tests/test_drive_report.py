@@ -15,15 +15,12 @@ from lockstep import BoardPort, LockstepClock
 from twin_rig import Rig, rig
 
 from antennate.cli import main
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.lateness import late_sentence
-from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Session
-from antennate.hardware.safety.causes import Cause, State
-from antennate.hardware.safety.cures import CURES, what_to_do
+from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.report import Report, late_sentence
+from antennate.hardware.safety.causes import Cause, State, what_to_do
+from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
@@ -433,7 +430,7 @@ def test_B19_a_drive_that_is_stopped_before_readings_can_be_there_blames_no_wire
     assert not (report.why and worst is State.OK)
 
 
-@pytest.mark.parametrize("cause", [each for each in CURES if each.severity >= State.HOLD])
+@pytest.mark.parametrize("cause", [each for each in Cause if each.severity >= State.HOLD])
 def test_each_cure_ends_as_a_sentence(cause: Cause) -> None:
     (said,) = what_to_do(f"{cause.severity.name} {cause.name}: x")
     assert re.fullmatch(r"What to do: [A-Z`].*[^?.][?.] See docs/causes\.md\.", said), said

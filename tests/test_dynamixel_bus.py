@@ -27,8 +27,8 @@ from antennate.dxl.packets import Status, StatusError
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.safety import torque
 from antennate.port import PortError
 

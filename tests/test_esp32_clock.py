@@ -11,8 +11,7 @@ from esp32_streams import BOOT, BOOT_TEXTS, encoded, hello, made
 
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.clock import DeviceClock, SampleState, Sequence
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Reset, Sample
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Reset, Sample
 
 PERIOD = 10_000
 STALE = 0.05

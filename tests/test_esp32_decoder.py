@@ -24,8 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.decoder import LONGEST, TEXT_KEPT, Counters, FrameDecoder
-from antennate.hardware.esp32.wire import Frame, Sample
+from antennate.hardware.esp32.wire import LONGEST, TEXT_KEPT, Counters, Frame, FrameDecoder, Sample
 
 
 def closed(counters: Counters, held: int) -> bool:

@@ -12,8 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Refused, Reset, Sample, objections, parse
+from antennate.hardware.esp32.wire import (
+    FrameDecoder,
+    Hello,
+    Refused,
+    Reset,
+    Sample,
+    objections,
+    parse,
+)
 
 
 def span(first: int, last: int) -> bytes:

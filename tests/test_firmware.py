@@ -18,8 +18,7 @@ from esp32_board import BYTES_PER_S, ON_BOARD, WHOLE_PROGRAM, Board, machine_of
 from esp32_streams import encoded, made
 
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Reset, Sample
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Reset, Sample
 from antennate.twin.robot import BOARD_SETTINGS
 
 ROOT = Path(__file__).parents[1]

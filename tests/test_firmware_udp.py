@@ -20,10 +20,8 @@ from esp32_radio import HOST, KEY, Radio
 from test_firmware import FIRMWARE, load
 
 from antennate.hardware.esp32 import datagram, frame
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.verifier import Verifier
-from antennate.hardware.esp32.wire import Hello, Sample
-from antennate.hardware.ports.udp_port import UdpPort
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
+from antennate.hardware.ports.network import UdpPort, Verifier
 from antennate.params.network import NetworkParams
 
 Run = Callable[[Radio, int], None]

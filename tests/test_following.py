@@ -12,7 +12,7 @@ from test_session import DRY, at, walked
 from twin_rig import rig
 
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.bringup import BringUpError

@@ -20,9 +20,9 @@ from test_simulated_logs import HEADER, in_rows, rows, walked
 
 from antennate.cli import main
 from antennate.errors import LogError, reason
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
-from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.session import Session
 from antennate.port import PortError
 from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.simulated import RowLog

@@ -16,11 +16,10 @@ import pytest
 from test_drive_processes import ANTENNATE, twin
 from twin_rig import rig
 
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.dead_man import DeadMan
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.session import Session
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.stopping import DeadMan
+from antennate.hardware.safety.session import Session
 from antennate.messages import typed
 from antennate.params.dead_man import DeadManParams
 from antennate.twin.config import TwinConfig

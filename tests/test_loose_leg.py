@@ -12,11 +12,11 @@ from test_turns import Walk
 
 from antennate.dxl.packets import StatusError
 from antennate.dxl.servo import Servo
-from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 

@@ -19,11 +19,9 @@ from esp32_streams import encoded, hello, made
 from antennate.cli import main
 from antennate.dxl.endpoints import TcpEndpoint
 from antennate.errors import BadInputError
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Hello, Sample
-from antennate.hardware.ports.finder import finder
-from antennate.hardware.ports.keys import read_key
-from antennate.hardware.ports.udp_port import UdpPort
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
+from antennate.hardware.ports.finder import finder, read_key
+from antennate.hardware.ports.network import UdpPort
 from antennate.params.network import NetworkParams
 from antennate.port import Port, PortError
 from antennate.twin.udp import UdpEndpoint

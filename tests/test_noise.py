@@ -20,9 +20,9 @@ from antennate.control.loop import run_loop
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.run import CalibrateConfig, run
 from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.checkup import examine
-from antennate.hardware.robot import DoctorConfig
-from antennate.hardware.safety.diagnosis import ChannelDiagnosis, Finding
+from antennate.hardware.safety.channel import ChannelDiagnosis, Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.params.doctor import DoctorParams

@@ -18,11 +18,11 @@ from antennate.control.controllers import RuleController, closed_loop, open_loop
 from antennate.control.registry import CONTROLLERS, make_controller
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.run import TunnelConfig, run
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.scenes.registry import SCENES, make_scene
 from antennate.sim.scenes.scene import FlatScene

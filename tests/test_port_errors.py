@@ -15,9 +15,8 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import BAD_INPUT, main
-from antennate.hardware.ports.errors import explain
-from antennate.hardware.ports.holder import holders
-from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.ports.errors import explain, holders
+from antennate.hardware.ports.serial_line import SerialPort
 from antennate.messages import command_words
 
 VISER = find_spec("viser") is not None

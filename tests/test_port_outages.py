@@ -13,14 +13,14 @@ from antennate.control.loop import run_loop
 from antennate.dxl.answers import Timing
 from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.deadlines import ANSWER
+from antennate.hardware.safety.session import Session
 from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig

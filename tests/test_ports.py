@@ -22,17 +22,16 @@ from port_pieces import Pieces
 from antennate.hardware.driving.connect import await_board
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.frame import encode_request
-from antennate.hardware.ports import reconnecting
-from antennate.hardware.ports.reconnecting import RETRY, Reconnecting
+from antennate.hardware.ports import finder as reconnecting
+from antennate.hardware.ports.finder import RETRY, Reconnecting
 from antennate.port import PortError
 
 pytest.importorskip("serial")
 
 import serial
 
-from antennate.hardware.ports import serial_finder
-from antennate.hardware.ports.serial_finder import Identity, SerialFinder, find, identity
-from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.ports import serial_line as serial_finder
+from antennate.hardware.ports.serial_line import Identity, SerialFinder, SerialPort, find, identity
 
 OFF, ON = False, True
 RUNS = {(OFF, OFF), (ON, ON)}
@@ -137,7 +136,7 @@ def test_L15_the_second_program_on_a_port_is_refused_and_told_the_pid_of_the_fir
     plug()
     path = str(tmp_path / "port")
     program = (
-        "import sys\nfrom antennate.hardware.ports.serial_port import SerialPort\n"
+        "import sys\nfrom antennate.hardware.ports.serial_line import SerialPort\n"
         f"line = SerialPort({path!r}, 115200)\nprint('open', flush=True)\nsys.stdin.read()"
     )
     with subprocess.Popen(

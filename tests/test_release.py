@@ -16,13 +16,13 @@ from antennate.dxl.answers import SILENT, Answer, Span
 from antennate.dxl.packets import Instruction, StatusError
 from antennate.dxl.parser import Parser
 from antennate.dxl.servo_bus import Fault, Trouble
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
+from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.monitor import ServoMonitor
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.session import Session
 from antennate.port import PortError
 from antennate.twin.config import TwinConfig
 

@@ -24,16 +24,20 @@ from worlds import simulated
 
 from antennate.cli import doctor, drive, main, record, replay, setup, twin
 from antennate.control.registry import BUILT_IN
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import (
+    DoctorConfig,
+    DriveConfig,
+    JogConfig,
+    RecordConfig,
+    RobotFile,
+    SetupConfig,
+    TeleopConfig,
+    ZeroConfig,
+)
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive as walk
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.teleop import TeleopConfig
-from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.ports.finder import finder
-from antennate.hardware.robot import DoctorConfig
-from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
+from antennate.hardware.safety.session import Session
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.messages import command_words
 from antennate.params.base import Params
@@ -198,7 +202,7 @@ def run_setup(patch: Patch, config: SetupConfig, tmp_path: Path) -> None:
     script = Script([*steps, ("whole|connect all", box.plug_all, "")])
     patch.setattr(script, "close", lambda: None, raising=False)
     patch.setattr(setup, "TerminalPerson", lambda: script)
-    patch.setattr(setup.ports, "find_port", lambda *_: "the bus")
+    patch.setattr(setup, "find_port", lambda *_: "the bus")
     told(patch, setup.command, setup.SetupOptions(), config, tmp_path / "robot.toml")
 
 

@@ -16,8 +16,8 @@ from test_bad_calibrations import GOOD
 
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.robot import RobotOptions, parse_robot
+from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.checkup import examine
-from antennate.hardware.robot_file import RobotFile
 from antennate.messages import command_words
 from antennate.params.reading import read_file
 from antennate.studies.formats import to_toml

@@ -14,7 +14,7 @@ from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
 from antennate.messages import command_words
 from antennate.params.control import ControlParams, CurveParams
 from antennate.params.reading import read_file

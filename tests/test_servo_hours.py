@@ -20,7 +20,7 @@ from antennate.dxl.packets import LONGEST, Packet
 from antennate.dxl.parser import Parser
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
-from antennate.hardware.dynamixel.monitor import ServoMonitor
+from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.safety.causes import Cause, State
 
 GOAL = 116

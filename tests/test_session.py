@@ -17,15 +17,14 @@ from antennate.dxl.parser import Parser
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.errors import BadInputError, ConfigError
-from antennate.hardware.driving.adapter import require_quick
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.connect import await_board, require_servos
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.driving.connect import await_board, require_quick, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.signals import STOPS
+from antennate.hardware.driving.stopping import STOPS
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.params.safety import TouchCheckParams
 from antennate.port import PortError
@@ -811,7 +810,7 @@ def test_B17_an_adapter_that_keeps_bytes_back_is_refused_with_its_cure(latency: 
 
 
 def test_L15_B16_a_second_program_on_a_port_is_refused() -> None:
-    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_line")
     with PtyServer(rig(TwinConfig()).robot.bus) as server:
         first = serial_port.SerialPort(server.path, 1_000_000)
         with pytest.raises(PortError, match=server.path):

@@ -12,12 +12,12 @@ from antennate.dxl.driven import DrivenServo
 from antennate.dxl.models import XC430_W240
 from antennate.dxl.packets import StatusError
 from antennate.dxl.servo import Servo
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 

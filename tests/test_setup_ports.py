@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from setup_rig import Script
 
-from antennate.hardware.setup.person import Quit
-from antennate.hardware.setup.ports import find_port, ports_like
+from antennate.hardware.setup.person import Quit, find_port, ports_like
 
 
 class Ports:

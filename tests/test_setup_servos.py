@@ -9,9 +9,8 @@ from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.doctor.fix import Change
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.setup.assembly import Assembly
 from antennate.hardware.setup.person import Quit, SetupError
-from antennate.hardware.setup.servos import ServoSetup, joints_of
+from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
 
 YAW1, YAW2 = joints_of(ROBOT)[:2]
 LEG = joints_of(ROBOT)[5]

@@ -8,11 +8,11 @@ import pytest
 from twin_rig import Rig, rig
 
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.session import Session
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.config import TwinConfig

@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from twin_rig import Rig, rig
 
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.signals import STOPS, StopOnce
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.stopping import STOPS, StopOnce
 from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=4.0)

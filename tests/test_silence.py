@@ -16,15 +16,14 @@ from servo_rig import servos
 
 from antennate.dxl.model import EXTENDED_MODE
 from antennate.dxl.servo_bus import ServoBus
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.priority import claim, urgent
-from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.wire import Sample
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.ports.serial_port import SerialPort
+from antennate.hardware.host import HostClock, claim, urgent
+from antennate.hardware.ports.serial_line import SerialPort
+from antennate.hardware.safety.session import Session
 from antennate.params.safety import SupervisorParams
 from antennate.twin.serve import Terminal
 

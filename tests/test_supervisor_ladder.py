@@ -13,16 +13,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from antennate.hardware.safety.causes import (
-    DATA,
-    OF_CONTROLLER,
-    Active,
-    Cause,
-    Inputs,
-    Outputs,
-    State,
-)
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety.causes import DATA, OF_CONTROLLER, Active, Cause, State
+from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 

@@ -14,12 +14,11 @@ from twin_rig import rig
 
 from antennate.cli.keys import keys_of
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.gamepad import Gamepad
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.teleop import KeyController
+from antennate.hardware.driving.teleop import Gamepad, KeyController
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.params.setup import TeleopParams
 from antennate.twin.config import TwinConfig

@@ -18,13 +18,14 @@ from torque_writes import GOAL, Written, watch
 from antennate.dxl.answers import Timing
 from antennate.dxl.bus import Bus
 from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
-from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.causes import Outputs, State
+from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.deadlines import ANSWER
+from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.hardware.safety.supervisor import Outputs
 from antennate.params.control import ConditioningParams
 from antennate.port import PortError
 from antennate.robots.spec import RobotSpec

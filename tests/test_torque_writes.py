@@ -12,7 +12,7 @@ from test_turns import Walk
 from torque_writes import GOAL, TORQUE, Written, watch
 
 from antennate.dxl.bus import Bus
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import torque
 
 PWM, PROFILE, DOG = 100, 108, 98

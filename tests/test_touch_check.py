@@ -10,9 +10,8 @@ from hardware_rig import BAND, BENT, FREE, Ticker
 
 from antennate.errors import ConfigError
 from antennate.hardware.safety.causes import Cause
-from antennate.hardware.safety.diagnosis import Band
-from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.hardware.safety.touch_check import Ask, TouchCheck
+from antennate.hardware.safety.channel import Band
+from antennate.hardware.safety.signal_quality import Ask, SignalQuality, TouchCheck
 from antennate.params.control import ConditioningParams
 from antennate.params.safety import TouchCheckParams
 from antennate.types import Contact

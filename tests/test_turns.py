@@ -11,10 +11,10 @@ from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
 from antennate.dxl.servo_bus import Fault, Trouble
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay

@@ -394,7 +394,7 @@ def test_the_sdk_hears_refusals_alerts_and_reboots(
 
 def test_our_master_over_a_serial_line(server: PtyServer) -> None:
     """Patience is for a busy machine here; what is measured is that every value comes."""
-    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_line")
     port = serial_port.SerialPort(server.path, 1_000_000)
     try:
         bus = Bus(port, Timing(gap=0.1, latest=0.5))
@@ -409,7 +409,7 @@ def test_our_master_over_a_serial_line(server: PtyServer) -> None:
 
 
 def test_L12_a_line_that_goes_away_is_a_port_error() -> None:
-    serial_port = pytest.importorskip("antennate.hardware.ports.serial_port")
+    serial_port = pytest.importorskip("antennate.hardware.ports.serial_line")
     with PtyServer(ServoBus(servos())) as server:
         port = serial_port.SerialPort(server.path, 1_000_000)
         bus = Bus(port)

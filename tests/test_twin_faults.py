@@ -14,12 +14,11 @@ from antennate.dxl.faults import Noise
 from antennate.dxl.packets import Instruction
 from antennate.dxl.parser import Parser
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.session import Session
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Sample
+from antennate.hardware.esp32.wire import FrameDecoder, Sample
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.params.twin import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched

@@ -13,8 +13,7 @@ from lockstep import BoardPort, LockstepClock
 
 from antennate.dxl import packets
 from antennate.dxl.parser import Parser
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.wire import Sample
+from antennate.hardware.esp32.wire import FrameDecoder, Sample
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read

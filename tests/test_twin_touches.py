@@ -15,7 +15,7 @@ from twin_rig import rig
 from antennate.antenna.sensor import counts
 from antennate.dxl import packets
 from antennate.errors import BadInputError
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec

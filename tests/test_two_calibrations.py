@@ -11,8 +11,8 @@ from test_bad_calibrations import GOOD
 
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.safety.diagnosis import Finding
+from antennate.hardware.config import RobotFile
+from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.reading import read_file

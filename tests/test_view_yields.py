@@ -15,7 +15,7 @@ import pytest
 from view_rig import ANTENNATE
 
 from antennate.cli import pages
-from antennate.hardware.driving.lateness import MANY, Recent
+from antennate.hardware.driving.report import MANY, Recent
 from antennate.telemetry.view.channel import TICK
 from antennate.telemetry.view.process import ViewProcess
 

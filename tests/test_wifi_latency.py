@@ -11,14 +11,13 @@ from esp32_streams import hello
 from hardware_rig import LIMIT
 from twin_rig import Rig, rig
 
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.hardware_robot import HardwareRobot
-from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32 import datagram, frame
-from antennate.hardware.esp32.board import Board
-from antennate.hardware.esp32.verifier import Verifier
+from antennate.hardware.esp32.board import Board, BoardReader
+from antennate.hardware.ports.network import Verifier
 from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
 from antennate.params.network import NetworkParams
 from antennate.twin.config import TwinConfig
 
@@ -78,7 +77,7 @@ def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int) ->
     twin = rig(TwinConfig())
     session = twin.session
     session.board = Board(PowerSaving(twin, 0.1024 * beacons), LIMIT)
-    session.robot = HardwareRobot(session.board, session.actuators, twin.clock)
+    session.reader = BoardReader(session.board, twin.clock)
     states: list[State] = []
     ages: list[float] = []
 

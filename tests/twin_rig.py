@@ -19,14 +19,13 @@ from antennate.dxl.answers import Timing
 from antennate.dxl.bus import Bus
 from antennate.experiments.tunnel.monitor import TrialMonitor
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.hardware.driving.hardware_robot import HardwareRobot
-from antennate.hardware.driving.session import Session
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
-from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.board import Board, BoardReader
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import ANSWER
+from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
@@ -112,6 +111,21 @@ class Watch:
     def decisions(self) -> Decisions:
         """All of it."""
         return Decisions(self.maneuvers, self.counts, self.status)
+
+
+class Bare:
+    """A board and, where there are some, actuators as a robot that nobody supervises."""
+
+    def __init__(self, board: Board, actuators: DynamixelActuators | None, clock: Clock) -> None:
+        self.clock, self.reader, self.actuators = clock, BoardReader(board, clock), actuators
+
+    def read(self) -> AntennaFrame:
+        t, counts = self.reader.read()
+        return AntennaFrame(t=np.array([t]), counts=counts)
+
+    def write(self, command: JointCommand) -> None:
+        assert self.actuators is not None
+        self.actuators.command(command)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +226,7 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     torque.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))
     torque.enable(bus, spec.ids)
-    body = HardwareRobot(board, DynamixelActuators(bus, Joints(spec), clock.now), clock)
+    body = Bare(board, DynamixelActuators(bus, Joints(spec), clock.now), clock)
     return Stage(body, watch.controller, period, watch.go_on, watch.decisions, robot)
 
 

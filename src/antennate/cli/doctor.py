@@ -16,13 +16,11 @@ from antennate.cli.results import ResultOptions, folder_for
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.terminal import console, stop_signals, write_result
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.check import Opener, Row
+from antennate.hardware.config import DoctorConfig, RobotFile
+from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.doctor.ports import opener_of
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot import DoctorConfig
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.host import HostClock
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table

@@ -20,19 +20,14 @@ from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.errors import BadInputError, ConfigError, LogError, OutputError
-from antennate.hardware.driving.arrival import Arrival
-from antennate.hardware.driving.config import DriveConfig
+from antennate.hardware.config import DriveConfig, RobotFile, TeleopConfig
 from antennate.hardware.driving.connect import connect
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.gamepad import Gamepad
-from antennate.hardware.driving.lateness import MANY, Recent
-from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.priority import urgent
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.signals import StopOnce
-from antennate.hardware.driving.teleop import KeyController, TeleopConfig
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.report import MANY, Recent
+from antennate.hardware.driving.stopping import Arrival, StopOnce
+from antennate.hardware.driving.teleop import Gamepad, KeyController
+from antennate.hardware.host import HostClock, urgent
+from antennate.hardware.safety.session import Session
 from antennate.messages import typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json

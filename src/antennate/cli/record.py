@@ -21,12 +21,12 @@ from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.terminal import StatusLine, stop_signals
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.config import RobotFile
+from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.clock import Timed
-from antennate.hardware.esp32.recorder import Recorder
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.esp32.recording import Recorder
+from antennate.hardware.host import HostClock
 from antennate.messages import typed
 from antennate.params.record import RecordParams
 

@@ -20,10 +20,9 @@ from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.terminal import write
 from antennate.dxl.model import EXTENDED_MODE
 from antennate.errors import ConfigError
-from antennate.hardware.doctor.ports import same
-from antennate.hardware.ports.finder import is_udp
-from antennate.hardware.ports.keys import read_key
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
+from antennate.hardware.doctor.check import same
+from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file

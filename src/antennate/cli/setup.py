@@ -18,22 +18,19 @@ from antennate.cli.terminal import StatusLine, stop_signals, write
 from antennate.dxl.bus import Bus
 from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
+from antennate.hardware.config import JogConfig, RobotFile, SetupConfig, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master
-from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.connect import require_servos
-from antennate.hardware.driving.signals import StopOnce
+from antennate.hardware.driving.stopping import StopOnce
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.host import HostClock
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_PERIOD
-from antennate.hardware.setup import ports
-from antennate.hardware.setup.assembly import Assembly, JointState
-from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.setup.jog import Jog, JogState
-from antennate.hardware.setup.person import Quit, confirm
+from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port, ports_like
 from antennate.hardware.setup.robot_toml import change, require_changeable
-from antennate.hardware.setup.servos import ServoSetup, joints_of
+from antennate.hardware.setup.servos import Assembly, JointState, ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
@@ -114,11 +111,11 @@ def _ports(person: TerminalPerson, config: SetupConfig, options: SetupOptions, p
     if options.bus:
         with opener_of(options.bus, "--bus")(config.robot.baud):
             pass
-    listing = ports.ports_like(options.among) if options.among else ports.all_ports
+    listing = ports_like(options.among) if options.among else all_ports
     clock, known = HostClock(), {"bus": options.bus, "esp32": options.esp32}
     for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):
         if not known[name]:
-            known[name] = ports.find_port(
+            known[name] = find_port(
                 person,
                 what,
                 listing,

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator
 from textwrap import fill
 from typing import Any, TextIO
 
-from antennate.hardware.driving.signals import STOPS
+from antennate.hardware.driving.stopping import STOPS
 from antennate.messages import one_line
 
 _ASCII = {"·": ".", "×": "x", "–": "-", "−": "-", "±": "+-", "²": "^2", "→": "->", "…": "..."}

@@ -25,9 +25,9 @@ from antennate.cli.terminal import progress, stop_signals, write
 from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
-from antennate.hardware.driving.priority import LEVEL, urgent
-from antennate.hardware.ports.keys import read_key
-from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.config import RobotFile
+from antennate.hardware.host import LEVEL, urgent
+from antennate.hardware.ports.finder import read_key
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
 from antennate.telemetry.twin_log import TwinLog

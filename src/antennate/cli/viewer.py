@@ -22,11 +22,10 @@ from typing import Any
 from antennate.cli.terminal import StatusLine, write
 from antennate.control.readings import short_names
 from antennate.errors import AntennateError, LogError
-from antennate.hardware.driving.lateness import late_sentence
-from antennate.hardware.driving.priority import Priority
-from antennate.hardware.driving.signals import STOPS
-from antennate.hardware.safety.causes import State
-from antennate.hardware.safety.cures import what_to_do
+from antennate.hardware.driving.report import late_sentence
+from antennate.hardware.driving.stopping import STOPS
+from antennate.hardware.host import Priority
+from antennate.hardware.safety.causes import State, what_to_do
 from antennate.messages import one_line
 from antennate.studies.measures import Measure, Table
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages

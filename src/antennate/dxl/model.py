@@ -188,6 +188,16 @@ class ServoModel:
         return 1e3 / float(unit.removesuffix(" mA")) if unit else math.inf
 
 
+def position_at(angle: Number, zero: Number, direction: Number) -> Number:
+    """Position, not rounded [ticks], of a joint at an angle [rad]; its zero [ticks], 1 or -1."""
+    return zero + direction * angle / POSITION_UNIT
+
+
+def angle_at(position: Number, zero: Number, direction: Number) -> Number:
+    """Angle [rad] of a joint at a position [ticks]; its zero [ticks], 1 or -1."""
+    return (position - zero) * direction * POSITION_UNIT
+
+
 def position_gain(p_gain: Number, divisor: Number) -> Number:
     """Share of the full drive per radian of position error [1/rad].
 

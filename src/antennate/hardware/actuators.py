@@ -8,7 +8,7 @@ from typing import Protocol
 
 from antennate.dxl.bus import Tally
 from antennate.errors import AntennateError
-from antennate.hardware.tracebacks import Tracebacks
+from antennate.hardware.safety.controller import Tracebacks
 from antennate.robots.spec import RobotSpec
 from antennate.types import JointCommand
 

@@ -23,7 +23,7 @@ from antennate.control.readings import (
 )
 from antennate.control.registry import BUILT_IN, PRIVILEGED, check_for_robots, make_controller
 from antennate.errors import LogError, raised
-from antennate.hardware.driving.decision import Decision, decision_of, no_command
+from antennate.hardware.safety.controller import Decision, decision_of, no_command
 from antennate.messages import shortened
 from antennate.params.base import Params, number
 from antennate.robots.spec import RobotSpec

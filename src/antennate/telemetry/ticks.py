@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.hardware.driving.decision import Decision
-from antennate.hardware.driving.session import Session
+from antennate.hardware.safety.controller import Decision
+from antennate.hardware.safety.session import Session
 from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.cdr import MessageType

@@ -23,7 +23,7 @@ from typing import Generic, NamedTuple, Self
 import numpy as np
 
 from antennate.errors import LogError, in_one_line
-from antennate.hardware.driving.priority import LEVEL, claim
+from antennate.hardware.host import LEVEL, claim
 from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World

@@ -213,7 +213,7 @@ class TwinRobot:
         """Let modem lines act on the board as on the usual one for the ESP32.
 
         RTS alone holds it in reset; DTR alone presses BOOT, which ends its stream until the next
-        reset. The table is that of `hardware.ports.serial_port`.
+        reset. The table is that of `hardware.ports.serial_line`.
         """
         held = rts and not dtr
         if self._held_in_reset and not held:

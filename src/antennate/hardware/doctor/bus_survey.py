@@ -17,7 +17,7 @@ from antennate.dxl.models import XC430_W240
 from antennate.dxl.packets import OVERHEAD
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.esp32.board import BOARD_BAUD
-from antennate.hardware.esp32.decoder import FrameDecoder
+from antennate.hardware.esp32.wire import FrameDecoder
 from antennate.params.doctor import DoctorParams
 from antennate.robots.spec import RobotSpec
 
@@ -172,7 +172,7 @@ def _elsewhere(
     for baud in _BAUDS:
         if baud != robot.baud:
             with master(opener, baud, now) as bus:
-                others += [(baud, one) for one in _present(bus, ()).values()]
+                others += [(baud, servo) for servo in _present(bus, ()).values()]
     return others
 
 

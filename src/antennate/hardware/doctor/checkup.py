@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from antennate.hardware.doctor import board_checks, bus_checks
-from antennate.hardware.doctor.board_survey import BoardSurvey, survey_board
+from antennate.hardware.config import DoctorConfig
+from antennate.hardware.doctor import board as board_checks
+from antennate.hardware.doctor import bus_checks
+from antennate.hardware.doctor.board import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
-from antennate.hardware.doctor.check import Grade, Opener, Row, worst
-from antennate.hardware.doctor.ports import latency_row, port_row
+from antennate.hardware.doctor.check import Grade, Opener, Row, latency_row, port_row, worst
 from antennate.hardware.esp32.board import BOARD_BAUD
-from antennate.hardware.robot import DoctorConfig
 from antennate.port import PortError
 
 

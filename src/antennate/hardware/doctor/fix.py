@@ -12,12 +12,11 @@ from antennate.dxl.bus import Bus
 from antennate.dxl.inquiry import look, read_some
 from antennate.dxl.model import BAUD_RATES
 from antennate.dxl.models import XC430_W240
-from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.joints import all_settings, settings_of
 from antennate.hardware.safety import torque
-from antennate.hardware.settings import Setting
 from antennate.robots.spec import RobotSpec
 
 _ID, _BAUD = "id", "baud_rate"
@@ -56,31 +55,28 @@ def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
 
 def _moves(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     missing = [servo for servo in robot.ids if servo not in survey.here]
-    extra = [(survey.baud, one) for i, one in survey.here.items() if i not in robot.ids]
-    extra += [(baud, one) for baud, one in survey.elsewhere if one.servo not in missing]
+    extra = [(survey.baud, seen) for i, seen in survey.here.items() if i not in robot.ids]
+    extra += [(baud, seen) for baud, seen in survey.elsewhere if seen.servo not in missing]
     if len(missing) == 1 and len(extra) == 1:
-        baud, one = extra[0]
-        if one.state == "ok" and one.model == robot.models[missing[0]]:
-            return [Change(one.servo, baud, _ID, one.servo, missing[0])]
-    ids = [one.servo for _, one in survey.elsewhere]
+        baud, lone = extra[0]
+        if lone.state == "ok" and lone.model == robot.models[missing[0]]:
+            return [Change(lone.servo, baud, _ID, lone.servo, missing[0])]
+    ids = [seen.servo for _, seen in survey.elsewhere]
     return [
-        Change(one.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
-        for baud, one in survey.elsewhere
-        if one.servo in missing and one.state == "ok" and ids.count(one.servo) == 1
+        Change(seen.servo, baud, _BAUD, BAUD_RATES.index(baud), BAUD_RATES.index(robot.baud))
+        for baud, seen in survey.elsewhere
+        if seen.servo in missing and seen.state == "ok" and ids.count(seen.servo) == 1
     ]
 
 
 def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
-    delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
-    wanted = {**settings.settings(robot), "return_delay_time": delay}
+    rules = all_settings(robot)
     return [
-        Change(servo, survey.baud, name, there[name], setting.cure)
-        for servo, there in survey.registers.items()
+        Change(servo, survey.baud, name, values[name], setting.cure)
+        for servo, values in survey.registers.items()
         if servo in robot.ids
-        for name, rules in wanted.items()
-        if name in there
-        and (setting := rules.get(servo)) is not None
-        and not setting.allows(there[name])
+        for name, setting in settings_of(rules, servo).items()
+        if name in values and not setting.allows(values[name])
     ]
 
 

@@ -4,36 +4,73 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from statistics import median
 from typing import Any
 
 from antennate.control.knowledge import require_own_senses
 from antennate.control.registry import make_controller
-from antennate.dxl.answers import Timing
+from antennate.dxl.answers import Timing, Value
 from antennate.dxl.bus import Bus
 from antennate.dxl.model import hardware_errors
 from antennate.dxl.models import XC430_W240
 from antennate.errors import BadInputError
-from antennate.hardware import settings
-from antennate.hardware.driving.adapter import require_quick
-from antennate.hardware.driving.config import DriveConfig
-from antennate.hardware.driving.session import Session
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.doctor.check import latency_row
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
-from antennate.hardware.host_clock import HostClock
-from antennate.hardware.joints import Joints
-from antennate.hardware.ports.finder import finder
-from antennate.hardware.ports.reconnecting import Reconnecting
+from antennate.hardware.host import HostClock
+from antennate.hardware.joints import Joints, settings, wrong_settings
+from antennate.hardware.ports.finder import Reconnecting, finder
 from antennate.hardware.safety.deadlines import ANSWER
+from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.messages import typed
 from antennate.params.doctor import DoctorParams
 from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
+
+_PINGS = 5
+"""Number of pings that are timed: two late ones do not move their median (assumed)."""
+_SLOW = 0.008
+"""Median time to an answer from which on an adapter is refused [s]: half the 16 ms of an FTDI
+adapter's default (AN232B-04), which a busy computer does not reach (assumed)."""
+_PING_PATIENCE = 0.05
+"""Longest wait for the answer to such a ping [s]: three times those 16 ms (assumed)."""
+
+
+def require_quick(
+    port: Port, ids: Sequence[int], baud: int, clock: Callable[[], float], path: str
+) -> float | None:
+    """Ping the first servo that answers; the median time to its answers [s], None without any.
+
+    `path` is the port's name for the error message.
+
+    Raises:
+        BringUpError: Answers come too late; the message has the command that cures it.
+    """
+    bus = Bus(port, Timing(baud, gap=_PING_PATIENCE, latest=_PING_PATIENCE), clock=clock)
+    times: list[float] = []
+    for servo in ids:
+        begin = clock()
+        while len(times) < _PINGS and isinstance(bus.ping(servo), Value):
+            times.append(clock() - begin)
+            begin = clock()
+        if times:
+            break
+    if not times:
+        return None
+    if (time := median(times)) > _SLOW:
+        cure = latency_row(path, True, DoctorParams()).cure
+        raise BringUpError(
+            f"--bus: expected answers within {1e3 * _SLOW:g} ms, found {1e3 * time:.1f} ms; {cure}"
+        )
+    return time
+
 
 _GREETING = DoctorParams().greeting
 _SILENCE = 1.9
@@ -194,11 +231,11 @@ def require_servos(bus: Bus, robot: RobotSpec) -> None:
             f"--bus: expected servos without a hardware error, found {'; '.join(ill)}; remove the "
             "cause (load, heat, supply), then reboot: switch the supply off and on"
         )
-    rules = settings.settings(robot)
+    rules = settings(robot)
     known = {
         name: bringup.read_register(bus, list(of), XC430_W240[name]) for name, of in rules.items()
     }
-    if wrong := settings.wrong(known, robot):
+    if wrong := wrong_settings(known, robot):
         raise BringUpError(
             f"--bus: expected servos set for this robot, found {'; '.join(wrong)}; "
             f"`{typed('doctor', '--fix')}` puts it right"

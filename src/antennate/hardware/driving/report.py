@@ -1,15 +1,99 @@
-"""How a drive went."""
+"""How a drive went: its walk, its worst state and why, and whether the computer was late."""
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict, deque
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from antennate.hardware.driving.session import Session
-from antennate.hardware.driving.timing import LoopTiming
-from antennate.hardware.driving.walk import Walk
-from antennate.hardware.safety.causes import DATA, Active, Cause, Outputs, State
+from antennate.hardware.safety.causes import DATA, Active, Cause, State
+from antennate.hardware.safety.session import Session
+from antennate.hardware.safety.supervisor import Outputs
+from antennate.hardware.timing import LoopTiming
+from antennate.types import Maneuver
+
+
+class Walk:
+    """Adds up the time of the ticks in which a command was sent.
+
+    Attributes:
+        time: All of it [s].
+    """
+
+    def __init__(self) -> None:
+        self.time = 0.0
+        self._spent: dict[int, float] = defaultdict(float)
+        self._sent = 0
+        self._last: float | None = None
+
+    def watch(self, session: Session) -> None:
+        """Count a tick."""
+        now = session.clock.now()
+        if self._last is not None and session.tally.sent > self._sent:
+            self.time += now - self._last
+            self._spent[session.control.decision.maneuver] += now - self._last
+        self._sent, self._last = session.tally.sent, now
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of that time, by maneuver."""
+        return {m.name: self._spent[m] / self.time for m in Maneuver} if self.time else {}
+
+
+MUCH = 0.02
+"""Share of ticks missed since the walk began above which the computer is named late (assumed)."""
+SOME = 0.005
+"""The same where more answers than ticks times MUCH were missed, too: on a computer that is not
+late up to 0.3 % of ticks are (measured, docs/hardware.md)."""
+_FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
+"""What a late computer may cause by itself."""
+
+
+MANY = 5
+"""Ticks missed within a second above which a live view is given up: half of what stops a robot, as
+servos wait 0.1 s (assumed)."""
+_SECOND = 1.0
+
+
+class Recent:
+    """Ticks that a loop missed within the last second."""
+
+    def __init__(self) -> None:
+        self._counts = deque[tuple[float, int]]()
+
+    def step(self, now: float, missed: int) -> int:
+        """Take how many it has missed by a time [s]; how many of them within the last second."""
+        self._counts.append((now, missed))
+        while self._counts[0][0] < now - _SECOND:
+            self._counts.popleft()
+        return missed - self._counts[0][1]
+
+
+def late_sentence(result: Mapping[str, Any]) -> list[str]:
+    """What a late computer did to a drive: one sentence, or none if it was not late.
+
+    Args:
+        result: The content of `result.json`.
+    """
+    walking, pace = result["walking"], result["pace"]
+    if walking is None or pace is None:
+        return []
+    missed = result["missed_answers"]
+    if walking["missed_share"] <= (SOME if missed > MUCH * pace["ticks"] else MUCH):
+        return []
+    share, worst = 100.0 * walking["missed_share"], 1e3 * pace["worst_lateness_s"]
+    following = [cause.name for cause in _FOLLOW if cause.name in result["why"]]
+    may = (
+        f" {' and '.join(following)} may come from that, not from the servos." if following else ""
+    )
+    return [
+        f"The computer was late: {share:.1f} % of ticks missed since the walk began, at most "
+        f"{worst:.0f} ms late, and {missed} answers of servos missed; close other programs, see "
+        f"Pace in docs/hardware.md.{may}"
+    ]
+
 
 _FILLING = (Cause.STALE, Cause.LOST)
 """What is said of a healthy board, too, until it has sent a few readings."""
@@ -104,7 +188,7 @@ class Report:
     def _explain(self, out: Outputs, why: str) -> None:
         """Keep why the worst state lasted longest."""
         causes, spell = {active.cause for active in out.causes}, self._spell
-        noise = "".join(each.detail for each in out.causes if each.cause is Cause.NOISE)
+        noise = "".join(a.detail for a in out.causes if a.cause is Cause.NOISE)
         if spell is None or out.state is not spell.state:
             spell = _Spell(out.state, why, causes | (spell.causes if spell else set()))
             self._spell = spell
@@ -119,8 +203,9 @@ class Report:
             self._wait(self._waits)
         causes = () if session.outputs is None else session.outputs.causes
         begun = math.inf if self._felt else session.clock.now() - _FILLED
-        found = [each for each in causes if _missing(each)]
-        missing = [x.text for x in found if x.cause not in _FILLING or x.since <= begun]
+        missing = [
+            a.text for a in causes if _missing(a) and (a.cause not in _FILLING or a.since <= begun)
+        ]
         if not self._torque and missing:
             self._wait("; ".join(missing))
 
@@ -146,6 +231,7 @@ class Report:
             "frames": board.decoder.counters.good,
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
+            "overdue_samples": board.overdue,
             "resets": board.clock.resets,
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,

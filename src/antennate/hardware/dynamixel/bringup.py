@@ -44,7 +44,7 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
         BringUpError: Otherwise; the text says each id that is not, and why.
     """
     seen = {i: inquiry.look(bus, i) for i in expected}
-    doubled = [i for i, one in seen.items() if one and one.state in ("collides", "broken")]
+    doubled = [i for i, servo in seen.items() if servo and servo.state in ("collides", "broken")]
     perhaps = f", perhaps it answers as {', '.join(map(str, doubled))}" if doubled else ""
     faults = {i: _fault(seen[i], model, f"silent{perhaps}") for i, model in expected.items()}
     strangers = {status.id for status in bus.scan()} - faults.keys()
@@ -56,7 +56,7 @@ def require(bus: Bus, expected: Mapping[int, int]) -> None:
     if wrong:
         fit = len(faults) - sum(map(len, wrong.values()))
         why = "; ".join(f"{_named(ids, len(expected))}: {fault}" for fault, ids in wrong.items())
-        states = {one.state for one in seen.values() if one and one.state != "ok"}
+        states = {servo.state for servo in seen.values() if servo and servo.state != "ok"}
         raise BringUpError(
             f"expected {len(expected)} servos, found {fit} fit; {why}",
             "; ".join(cure for state, cure in CURE.items() if state in states),
@@ -75,8 +75,8 @@ def require_models(bus: Bus, models: Mapping[int, int]) -> None:
     Raises:
         BringUpError: One did not answer, or with another model.
     """
-    found = read_register(bus, list(models), XC430_W240["model_number"])
-    if wrong := {i: found[i] for i, model in models.items() if found[i] != model}:
+    numbers = read_register(bus, list(models), XC430_W240["model_number"])
+    if wrong := {i: numbers[i] for i, model in models.items() if numbers[i] != model}:
         wanted = {i: models[i] for i in wrong}
         raise BringUpError(f"expected model numbers {wanted} by id, found {wrong}")
 
@@ -87,8 +87,8 @@ def require_modes(bus: Bus, modes: Mapping[int, int]) -> None:
     Raises:
         BringUpError: One did not answer, or is in another mode.
     """
-    found = read_register(bus, list(modes), XC430_W240["operating_mode"])
-    if wrong := {i: found[i] for i, mode in modes.items() if found[i] != mode}:
+    present = read_register(bus, list(modes), XC430_W240["operating_mode"])
+    if wrong := {i: present[i] for i, mode in modes.items() if present[i] != mode}:
         wanted = {i: modes[i] for i in wrong}
         raise BringUpError(f"expected operating modes {wanted} by id, found {wrong}")
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from antennate.errors import reason
 from antennate.hardware.esp32.clock import DeviceClock, SampleState, Timed
-from antennate.hardware.esp32.decoder import FrameDecoder
-from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE, encode_request
-from antennate.hardware.esp32.wire import Hello, Sample, objections
+from antennate.hardware.esp32.frame import FLAG_LATE, SAMPLE_FRAME_SIZE, encode_request
+from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample, objections
 from antennate.port import Port, PortError
-from antennate.types import Floats
+from antennate.types import Clock, Floats
 
 BOARD_BAUD = 115_200
 """Bits per second of the board's port: MicroPython on an ESP32, UART 0."""
@@ -43,6 +42,7 @@ class Board:
             ever used.
         refusals: Why boards or frames were refused: each reason once, newest last, at most 8.
         skipped: Bytes of backlogs that were not looked at.
+        overdue: Usable samples that the board took too late, by its own word (FLAG_LATE).
         trouble: What is wrong with its port, empty if nothing is.
     """
 
@@ -52,7 +52,7 @@ class Board:
         self.hello: Hello | None = None
         self.refusals: list[str] = []
         self._first: Hello | None = None
-        self.skipped = 0
+        self.skipped = self.overdue = 0
         self.trouble = ""
         self._port = port
         self._limit = age_limit
@@ -113,6 +113,7 @@ class Board:
                 self._refuse(frame.reason)
             elif self.clock.take(frame, now) is SampleState.USED and self.clock.newest is not None:
                 used.append(self.clock.newest)
+                self.overdue += bool(frame.flags & FLAG_LATE)
         return used
 
     def _greet(self, hello: Hello) -> None:
@@ -140,8 +141,52 @@ class Board:
         return objections(hello, first.config_hash)
 
 
-def counts_of(timed: Timed | None) -> Floats:
-    """Readings of a sample as they came [counts], shape (1, 2); NaN where there is none."""
-    if timed is None:
-        return np.full((1, 2), math.nan)
-    return np.array([[timed.sample.left, timed.sample.right]], float)
+class BoardReader:
+    """Readings of a board for a loop, on the board's own time.
+
+    So a delay on the way to the host, or a busy host, does not change it. It never goes back.
+
+    Args:
+        board: The board.
+        clock: The host's time, which never steps.
+
+    Attributes:
+        used: Usable samples that the last reading found.
+        refused: Samples it found that may not be used.
+    """
+
+    def __init__(self, board: Board, clock: Clock) -> None:
+        self._board, self._clock = board, clock
+        self.used = self.refused = 0
+        self._stamp: Timed | None = None
+        self._stamp_now: float | None = None
+        self._stamp_t = self._t = 0.0
+
+    def read(self) -> tuple[float, Floats]:
+        """The newest reading: its time [s], and both antennae as they came [counts], shape (1, 2).
+
+        A reading that is missing or too old is NaN.
+        """
+        now, states = self._clock.now(), self._board.clock.states
+        before = sum(states.values())
+        self.used = self._board.poll(now)
+        self.refused = sum(states.values()) - before - self.used
+        timed = self._board.newest(now)
+        self._t = max(self._t, self._time(timed, now))
+        if timed is None:
+            return self._t, np.full((1, 2), math.nan)
+        return self._t, np.array([[timed.sample.left, timed.sample.right]], float)
+
+    def _time(self, timed: Timed | None, now: float) -> float:
+        """The board's time [s]; the host's clock where the board has none or restarts."""
+        last = self._stamp
+        if self._stamp_now is None:
+            self._stamp_now = now
+        since = now - self._stamp_now
+        if timed is None:
+            return self._stamp_t + since
+        if last is None or timed.epoch != last.epoch:
+            self._stamp_t += since
+            self._stamp, self._stamp_now = timed, now
+            return self._stamp_t
+        return self._stamp_t + 1e-6 * (timed.elapsed_us - last.elapsed_us)

@@ -1,15 +1,20 @@
-"""A recorded stream of ESP32 frames as arrays, with the board's own times.
+"""Recordings of the antenna board: readings with known bends, and recorded streams of bytes.
 
-Nobody has to say when the bytes arrived. The board counts microseconds modulo 2**tick_bits; how
-often this counter wrapped between two samples follows from their sequence numbers and the rate that
-the board declared in its HELLO.
+`Recorder` writes rows that can be calibrated: every line is whole when it is written; time is the
+board's own, and goes on if the board restarts.
+
+`read_esp32` reads a stream as arrays. Nobody has to say when its bytes arrived. The board counts
+microseconds modulo 2**tick_bits; how often this counter wrapped between two samples follows from
+their sequence numbers and the rate that the board declared in its HELLO.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,10 +22,149 @@ from antennate import checks
 from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited
-from antennate.hardware.esp32.decoder import Counters, FrameDecoder
+from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
-from antennate.hardware.esp32.wire import Hello, Sample
+from antennate.hardware.esp32.wire import Counters, FrameDecoder, Hello, Sample
+from antennate.messages import typed
+from antennate.params.doctor import DoctorParams
+from antennate.params.record import RecordParams
 from antennate.types import Bools, Floats, Ints
+
+Ask: TypeAlias = Callable[[str], Callable[[], bool]]
+"""Tells a person what to do; the function it returns says whether that has been confirmed."""
+
+SILENCE = DoctorParams().greeting
+"""Time without a reading after which a recording ends; a board greets within it [s]."""
+_PATIENCE = 0.02
+_MICROSECOND = 1e-6
+"""What the board counts; sums of its times are no rounder [s]."""
+
+
+class Recorder:
+    """Rows of one recording.
+
+    Args:
+        board: The board; `now` is monotonic time [s].
+        params: What to record.
+        ask: Asks for a mark or a push.
+        write: Takes each line of the file, without its line break.
+        on_reading: Called with every reading, recorded or not.
+
+    Attributes:
+        rows: Readings written.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        params: RecordParams,
+        now: Callable[[], float],
+        ask: Ask,
+        write: Callable[[str], None],
+        on_reading: Callable[[Timed], None] = lambda reading: None,
+    ) -> None:
+        self.rows = 0
+        self._board, self._params, self._now = board, params, now
+        self._ask, self._write, self._on_reading = ask, write, on_reading
+        self._last: tuple[Timed, float] | None = None
+
+    def run(self) -> None:
+        """Write the header, then all rows.
+
+        Raises:
+            BadInputError: The board is silent.
+            PortError: Its port is gone.
+        """
+        for _ in self._readings():  # it has to be there before anybody is asked for anything
+            break
+        if self._params.marks:
+            self._marks()
+        elif self._params.speed is not None:
+            self._pushes(self._params.speed)
+        else:
+            self._free()
+
+    def _marks(self) -> None:
+        self._write("trial,time,counts,bend")
+        params = self._params
+        for number in range(params.passes):
+            for mark in params.marks if number % 2 == 0 else params.marks[::-1]:
+                where = "" if params.unit == "1" else f" {params.unit}"
+                self._wait(f"pass {number + 1} of {params.passes}: hold at {mark:g}{where}, Enter")
+                for reading, t in self._for(params.hold):  # a trial is there and back
+                    self._row(f"{number // 2},{t:.6f},{self._counts(reading)},{mark!r}")
+
+    def _pushes(self, speed: float) -> None:
+        self._write("trial,speed_m_s,time,counts,bend")
+        params = self._params
+        for trial in range(params.passes):
+            self._wait(f"push {trial + 1} of {params.passes}: Enter as the stage starts")
+            start = math.nan
+            for reading, t in self._for(params.length / speed):
+                start = t if math.isnan(start) else start
+                way = speed * (t - start)
+                self._row(f"{trial},{speed!r},{t:.6f},{self._counts(reading)},{way:.6f}")
+
+    def _free(self) -> None:
+        self._write("time,left,right")
+        for reading, t in self._for(self._params.duration or math.inf):
+            sample = reading.sample
+            self._row(f"{t:.6f},{sample.left},{sample.right}")
+
+    def _row(self, line: str) -> None:
+        self._write(line)
+        self.rows += 1
+
+    def _counts(self, reading: Timed) -> int:
+        sample = reading.sample
+        return sample.left if self._params.side == "left" else sample.right
+
+    def _wait(self, text: str) -> None:
+        """Let readings pass until a person has confirmed."""
+        confirmed = self._ask(text)
+        for _ in self._readings():
+            if confirmed():
+                return
+
+    def _for(self, seconds: float) -> Iterator[tuple[Timed, float]]:
+        """Readings of the next so many seconds of the board."""
+        begin = math.nan
+        for reading, t in self._readings():
+            begin = t if math.isnan(begin) else begin
+            if t - begin > seconds - _MICROSECOND:
+                return
+            yield reading, t
+
+    def _readings(self) -> Iterator[tuple[Timed, float]]:
+        """All readings from now on, each with its time since the first of all [s]."""
+        newest = self._now()
+        while True:
+            for reading in self._board.wait(_PATIENCE, self._now):
+                newest = reading.arrived
+                self._last = (reading, self._time(reading))
+                self._on_reading(reading)
+                yield self._last
+            if self._now() - newest > SILENCE:
+                raise BadInputError(self._silent())
+
+    def _time(self, reading: Timed) -> float:
+        if self._last is None:
+            return 0.0
+        last, t = self._last
+        if reading.epoch != last.epoch:
+            return t + max(reading.arrived - last.arrived, 1e-6)
+        return t + 1e-6 * (reading.elapsed_us - last.elapsed_us)
+
+    def _silent(self) -> str:
+        came = self._board.decoder.counters
+        why = f"{came.received} bytes and {came.good} frames in all"
+        why = self._board.refusals[-1] if self._board.refusals else why
+        return (
+            f"--esp32: expected readings of an antenna board, found none for {SILENCE:g} s "
+            f"({why}); run `{typed('doctor', '--esp32', 'PORT')}`"
+        )
+
 
 _LARGEST = 1 << 30
 """Bytes of a recording that is read: four days at 100 Hz."""
@@ -138,20 +282,20 @@ def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Flo
     number, first = np.unique(seq[0] + np.cumsum(ahead), return_index=True)
     ticks = np.array([samples[i].ticks for i in first])
     modulus, period = 1 << hello.tick_bits, 1e6 / hello.rate
-    kept = np.arange(len(number))
+    places = np.arange(len(number))
     while True:
-        expected = period * np.diff(number[kept])
-        step = np.diff(ticks[kept]) % modulus
+        expected = period * np.diff(number[places])
+        step = np.diff(ticks[places]) % modulus
         step = step + modulus * np.maximum(0, np.rint((expected - step) / modulus)).astype(int)
         bad = (step == 0) | (step - expected > modulus / 2)
         if not bad.any():
             break
-        kept = np.delete(kept, 1 + int(np.argmax(bad)))
-    chosen = [samples[i] for i in first[kept]]
+        places = np.delete(places, 1 + int(np.argmax(bad)))
+    chosen = [samples[i] for i in first[places]]
     counts = np.array([(s.left, s.right) for s in chosen], dtype=np.float64)
     flags = np.array([s.flags for s in chosen], dtype=np.int64)
     t = 1e-6 * np.concatenate([[0], np.cumsum(step)])
-    return t, number[kept], counts, flags, len(number) - len(kept)
+    return t, number[places], counts, flags, len(number) - len(places)
 
 
 def _empty(

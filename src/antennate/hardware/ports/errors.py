@@ -1,13 +1,56 @@
-"""Why a serial port did not open: what was expected, what was found, and the cure."""
+"""Why a serial port did not open: what was expected, who holds it, and the cure."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
-from antennate.hardware.ports.holder import holders
 from antennate.port import PortError
+
+_PROC = Path("/proc")
+_MASTER = "/dev/ptmx"
+
+
+def holders(path: str) -> list[str]:
+    """Other programs that have locked a port or have it open, as `pid 12 (name)`.
+
+    The process that made a pseudo-terminal holds both its ends, and is left out.
+    """
+    names: dict[int, str] = {}
+    for process in (*_lockers(path), *_openers(path)):
+        with contextlib.suppress(OSError):
+            name = re.sub(r"\s+", " ", (_PROC / str(process) / "comm").read_text().strip())
+            names[process] = f"pid {process} ({name})"
+    return [names[process] for process in sorted(names) if process != os.getpid()]
+
+
+def _lockers(path: str) -> Iterator[int]:
+    """Who holds a lock on it, by device and inode of the file."""
+    try:
+        there = Path(path).stat()
+        locks = (_PROC / "locks").read_text().splitlines()
+    except OSError:
+        return
+    device = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
+    for lock in locks:
+        fields = lock.split()
+        if device in fields and fields[fields.index(device) - 1].isdigit():
+            yield int(fields[fields.index(device) - 1])
+
+
+def _openers(path: str) -> Iterator[int]:
+    """Who has it open."""
+    device = os.path.realpath(path)
+    for process in _PROC.glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            opened = {str(link.readlink()) for link in (process / "fd").iterdir()}
+            if device in opened and _MASTER not in opened:
+                yield int(process.name)
+
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _DENIED = (errno.EACCES, errno.EPERM)
@@ -68,5 +111,5 @@ def known_ports() -> str:
     from serial.tools import list_ports
 
     lasting = {os.path.realpath(name): str(name) for name in sorted(_NAMES.glob("*"))}
-    here = sorted(port.device for port in list_ports.comports())
-    return ", ".join(lasting.get(path, path) for path in here) or "none (no adapter is plugged in)"
+    paths = sorted(port.device for port in list_ports.comports())
+    return ", ".join(lasting.get(path, path) for path in paths) or "none (no adapter is plugged in)"

@@ -1,12 +1,13 @@
-"""States of the supervisor, causes that ask for them, and the inputs that they follow from."""
+"""States of the supervisor, causes that ask for them, and what to do about each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from antennate.hardware.safety.diagnosis import Finding
+from antennate.hardware.safety.channel import Finding
 
 
 class State(IntEnum):
@@ -23,53 +24,166 @@ class State(IntEnum):
     OFF = 4
 
 
-class Cause(Enum):
-    """What can be wrong, and the state it asks for."""
+_ARM = "start `drive --arm` again"
+_BUS = "check cables, plugs and supply of the servos (`antennate doctor`)"
+_BOARD = "check cable, supply and network of the antenna board (`antennate doctor`)"
+_WIRE = "check wires and plugs of that antenna (`antennate doctor`)"
+_SUPPLY = "charge or change the battery"
+_JOINT = "take the load off, turn that joint by hand without torque"
+_CODE = "mend the controller; `tracebacks` in result.json says where it failed"
 
-    SPIKY = (State.DEGRADED, "many readings are bad")
-    OUT_OF_CAL = (State.DEGRADED, "readings lie beyond the calibrated range")
-    SATURATED = (State.DEGRADED, "readings are at the rail of a bent flex sensor")
-    DRIFT = (State.DEGRADED, "resting readings have drifted from the calibration")
-    RATE = (State.DEGRADED, "samples do not come at the expected rate")
-    LATE_ANSWERS = (State.DEGRADED, "servos answer late")
-    SUPPLY_UNKNOWN = (State.DEGRADED, "the supply cannot be read")
-    SUPPLY_WARN = (State.DEGRADED, "the supply is nearly empty")
-    STALE = (State.HOLD, "no fresh sample from the antenna board")
-    REBOOT = (State.HOLD, "the antenna board has restarted")
-    LOST = (State.HOLD, "no good reading for too long")
-    STUCK = (State.HOLD, "a channel repeats one reading")
-    NOISE = (State.HOLD, "noise hides what a flex sensor reads")
+
+class Cause(Enum):
+    """What can be wrong: the state it asks for, what it means, and the likely cure."""
+
+    SPIKY = (
+        State.DEGRADED,
+        "many readings are bad",
+        f"{_WIRE}; keep them away from the cables of the servos",
+    )
+    OUT_OF_CAL = (
+        State.DEGRADED,
+        "readings lie beyond the calibrated range",
+        "nothing while an antenna bends far; else calibrate again",
+    )
+    SATURATED = (
+        State.DEGRADED,
+        "readings are at the rail of a bent flex sensor",
+        "free the antenna; if it is free, calibrate again",
+    )
+    DRIFT = (
+        State.DEGRADED,
+        "resting readings have drifted from the calibration",
+        "let the antenna rest; if it stays, calibrate again",
+    )
+    RATE = (State.DEGRADED, "samples do not come at the expected rate", _BOARD)
+    LATE_ANSWERS = (State.DEGRADED, "servos answer late", f"close other programs; {_BUS}")
+    SUPPLY_UNKNOWN = (
+        State.DEGRADED,
+        "the supply cannot be read",
+        f"{_BUS}; the first servo tells the voltage",
+    )
+    SUPPLY_WARN = (State.DEGRADED, "the supply is nearly empty", f"{_SUPPLY} soon")
+    STALE = (
+        State.HOLD,
+        "no fresh sample from the antenna board",
+        f"{_BOARD}; close other programs",
+    )
+    REBOOT = (State.HOLD, "the antenna board has restarted", _BOARD)
+    LOST = (State.HOLD, "no good reading for too long", _WIRE)
+    STUCK = (
+        State.HOLD,
+        "a channel repeats one reading",
+        f"{_WIRE}; switch the antenna board off and on; if it is stuck at its highest reading "
+        "alone, the attenuation of the converter is not set",
+    )
+    NOISE = (
+        State.HOLD,
+        "noise hides what a flex sensor reads",
+        "keep the wires of that antenna away from mains, motors and servo cables; join the grounds "
+        "of board, supply and computer; put 100 nF from the pin to ground; an open wire hums, too "
+        "(`antennate doctor`)",
+    )
     OPEN = (
         State.HOLD,
         "a channel floats: its wire is open, or its flex sensor bent far beyond its calibration",
+        f"{_WIRE}; if it bends farther than when it was calibrated, calibrate again",
     )
-    SHORT_LO = (State.HOLD, "a channel is shorted to ground, or its flex sensor torn off")
-    SHORT_HI = (State.HOLD, "a channel is shorted to the supply")
-    FAILED = (State.HOLD, "the controller raised an exception")
-    UNDECIDED = (State.HOLD, "the controller took no decision in this tick")
-    BAD_ACTION = (State.HOLD, "the controller asked for what does not exist")
-    BAD_COMMAND = (State.HOLD, "a command of the controller was refused")
-    UNKNOWN_CONTACT = (State.HOLD, "contact is not known")
-    NO_RECORD = (State.HOLD, "no log is kept, and one is required")
-    RELEASED = (State.HOLD, "hold a key, such as the space bar, to let it walk")
-    SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk")
-    REPEATED_HOLDS = (State.FAULT, "too many holds in a short time")
-    REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time")
-    REBOOT_LOOP = (State.FAULT, "the antenna board restarts again and again")
-    SILENT_SERVO = (State.FAULT, "servos do not answer")
-    SERVO_ERROR = (State.FAULT, "servos report a hardware error")
-    BUS_ERROR = (State.FAULT, "the servo bus does not work")
-    WATCHDOG = (State.FAULT, "watchdogs of servos have stopped them")
-    DISARMED = (State.FAULT, "servos have lost their torque or their watchdog, as by a restart")
-    NOT_FOLLOWING = (State.FAULT, "joints do not follow their goals")
-    OUT_OF_LIMITS = (State.FAULT, "joints are beyond their limits")
-    IMPOSSIBLE_SPEED = (State.FAULT, "joints seem to move faster than their servos can")
-    WRONG_MODE = (State.FAULT, "servos are in another operating mode than they were given")
-    NOT_READY = (State.FAULT, "something speaks against arming")
-    PAUSE = (State.FAULT, "the loop stood still, or its clock did")
-    SUPPLY_OFF = (State.OFF, "the supply is empty")
-    NOT_ARMED = (State.OFF, "not armed yet")
-    STOPPED = (State.OFF, "stopped by the operator")
+    SHORT_LO = (
+        State.HOLD,
+        "a channel is shorted to ground, or its flex sensor torn off",
+        f"{_WIRE}; is the flex sensor still on them?",
+    )
+    SHORT_HI = (
+        State.HOLD,
+        "a channel is shorted to the supply",
+        f"{_WIRE}; where do they touch the supply?",
+    )
+    FAILED = (State.HOLD, "the controller raised an exception", _CODE)
+    UNDECIDED = (
+        State.HOLD,
+        "the controller took no decision in this tick",
+        "let the controller decide in every tick, in less than a control period",
+    )
+    BAD_ACTION = (
+        State.HOLD,
+        "the controller asked for what does not exist",
+        "let the controller give one of the maneuvers",
+    )
+    BAD_COMMAND = (
+        State.HOLD,
+        "a command of the controller was refused",
+        "let the controller give commands within the limits of the robot",
+    )
+    UNKNOWN_CONTACT = (
+        State.HOLD,
+        "contact is not known",
+        "mend what is named beside it; if nothing is, the controller",
+    )
+    NO_RECORD = (
+        State.HOLD,
+        "no log is kept, and one is required",
+        "free space on the disk; or set `record_required = false`",
+    )
+    RELEASED = (State.HOLD, "hold a key, such as the space bar, to let it walk", "hold a key")
+    SUPPLY_HOLD = (State.HOLD, "the supply is too low to walk", _SUPPLY)
+    REPEATED_HOLDS = (
+        State.FAULT,
+        "too many holds in a short time",
+        f"mend what made it hold, then {_ARM}",
+    )
+    REPEATED_FAILURES = (State.FAULT, "the controller failed too often in a short time", _CODE)
+    REBOOT_LOOP = (State.FAULT, "the antenna board restarts again and again", _BOARD)
+    SILENT_SERVO = (State.FAULT, "servos do not answer", f"close other programs; {_BUS}")
+    SERVO_ERROR = (
+        State.FAULT,
+        "servos report a hardware error",
+        "switch the servos off; free them, let them cool; is the supply right?",
+    )
+    BUS_ERROR = (
+        State.FAULT,
+        "the servo bus does not work",
+        f"check the adapter of the servo bus and its cable; {_BUS}",
+    )
+    WATCHDOG = (
+        State.FAULT,
+        "watchdogs of servos have stopped them",
+        f"close other programs; then {_ARM}",
+    )
+    DISARMED = (
+        State.FAULT,
+        "servos have lost their torque or their watchdog, as by a restart",
+        f"{_BUS}; then {_ARM}",
+    )
+    NOT_FOLLOWING = (
+        State.FAULT,
+        "joints do not follow their goals",
+        f"{_JOINT}; see if its gear or horn is loose; {_BUS}; then {_ARM}",
+    )
+    OUT_OF_LIMITS = (
+        State.FAULT,
+        "joints are beyond their limits",
+        f"{_JOINT}; bring it back within its limits; then {_ARM}",
+    )
+    IMPOSSIBLE_SPEED = (
+        State.FAULT,
+        "joints seem to move faster than their servos can",
+        f"change that servo if it happens again; {_BUS}; then {_ARM}",
+    )
+    WRONG_MODE = (
+        State.FAULT,
+        "servos are in another operating mode than they were given",
+        "`antennate doctor --fix` sets it; does another program use the bus?",
+    )
+    NOT_READY = (State.FAULT, "something speaks against arming", "do what stands in its brackets")
+    PAUSE = (
+        State.FAULT,
+        "the loop stood still, or its clock did",
+        f"close other programs, let nothing suspend the computer; then {_ARM}",
+    )
+    SUPPLY_OFF = (State.OFF, "the supply is empty", _SUPPLY)
+    NOT_ARMED = (State.OFF, "not armed yet", f"{_ARM}, if nothing else is named")
+    STOPPED = (State.OFF, "stopped by the operator", _ARM)
 
     @property
     def severity(self) -> State:
@@ -80,6 +194,11 @@ class Cause(Enum):
     def text(self) -> str:
         """What it means."""
         return self.value[1]
+
+    @property
+    def cure(self) -> str:
+        """What a person can do about it: steps, separated by semicolons."""
+        return self.value[2]
 
 
 OF_FINDING = {f: Cause[f.name] for f in Finding if f is not Finding.OK}
@@ -95,75 +214,6 @@ OF_JOINTS = frozenset(
 """Causes that are looked for while servos have torque, and anew from each arm event on."""
 CURED_BY_ARMING = OF_JOINTS | {Cause.UNKNOWN_CONTACT, Cause.WATCHDOG, Cause.DISARMED}
 """Causes that do not prevent an arm event."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inputs:
-    """Inputs of the supervisor in one tick, after the controller's step.
-
-    None has a default: one that is forgotten is an error in the first tick, not health.
-
-    Attributes:
-        age: Age of the newest valid sample [s]; inf if there is none.
-        valid: Valid samples that arrived since the tick before, without those that were too old.
-        refused: Samples since then that were not valid.
-        findings: Of the left and the right channel.
-        noise: Size and frequency of the noise of a channel that is NOISE, left and right.
-        decided_at: Time at which the controller finished its newest decision [s].
-        maneuver: That decision.
-        contact: The contact that it was decided on, left and right.
-        bad_command: Why its command must not be sent, empty if it may.
-        failure: Text of an exception of the controller in this tick, empty if none.
-        resets: Restarts of the antenna board so far.
-        reset_reason: Why it last restarted, as far as known.
-        board_error: What is wrong with its port, empty if nothing is.
-        missed: Answers missed in a row, by servo id; ids without any may be left out.
-        servo_errors: Hardware errors in words, by servo id.
-        bus_error: What is wrong with the bus as a whole, empty if nothing is.
-        watchdogs: Ids of servos stopped by their watchdog.
-        disarmed: Ids of servos that have lost their torque or their watchdog while armed.
-        supply: Voltage of the supply [V], NaN if unknown.
-        behind: Joints that do not follow their goals, in words by servo id.
-        outside: Joints beyond their limits, likewise.
-        leaps: Joints that have moved faster than they can, likewise.
-        modes: Servos in a wrong operating mode, likewise.
-        drift: How far resting readings have drifted, empty if not far.
-        objections: Reasons not to arm, such as a failed touch check or unknown firmware.
-        unrecorded: Whether a record that is required is not kept.
-        stop: Whether the operator wants the torque off.
-        released: Whether the key that lets the robot walk is not held.
-        arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
-    """
-
-    age: float
-    valid: int
-    refused: int
-    findings: tuple[Finding, Finding]
-    noise: tuple[str, str]
-    decided_at: float
-    maneuver: int
-    contact: tuple[int, int]
-    bad_command: str
-    failure: str
-    resets: int
-    reset_reason: str
-    board_error: str
-    missed: Mapping[int, int]
-    servo_errors: Mapping[int, str]
-    bus_error: str
-    watchdogs: tuple[int, ...]
-    disarmed: tuple[int, ...]
-    supply: float
-    behind: Mapping[int, str]
-    outside: Mapping[int, str]
-    leaps: Mapping[int, str]
-    modes: Mapping[int, str]
-    drift: str
-    objections: tuple[str, ...]
-    unrecorded: bool
-    stop: bool
-    released: bool
-    arm: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,29 +238,34 @@ class Active:
         return f"{self.cause.severity.name} {self.cause.name}: {self.cause.text}{detail}"
 
 
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    """What the tick may do.
+_NAMED = re.compile(r"\b(?:HOLD|FAULT|OFF) ([A-Z_]+): ")
+_FOLLOW = (Cause.NOT_ARMED, Cause.UNKNOWN_CONTACT)
+"""What follows from other causes; its cure counts if none is named."""
 
-    Attributes:
-        move: Whether the command just decided may be sent; if not, the last one sent stays.
-        arming: True in the one tick of an accepted arm event: clear the watchdogs, set all goals to
-            the present positions, then switch the torque on.
-        feed_watchdog: Whether the watchdogs of the servos may be fed: only upon a decision taken in
-            this very tick.
-        clear: Whether data and actuators are well and the torque on. While it is False the
-            controller gets NaN for counts in the next tick, so that its gait stands still.
-        causes: All causes in force, the most severe first. Of equal ones those that explain first:
-            losses of data, those still there before those that only wait for fresh samples; then
-            others; then those of the controller; the oldest of each first.
-        refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
+
+def what_to_do(why: str) -> list[str]:
+    """What a person can do about what kept a robot from walking: one sentence, or none.
+
+    Args:
+        why: Causes as `Active.text` names them, in their order.
     """
+    named = [Cause[name] for name in _NAMED.findall(why)]
+    first = [cause for cause in named if cause not in _FOLLOW]
+    cures = " ".join(_sentences([cause.cure for cause in dict.fromkeys(first or named)]))
+    return [f"What to do: {cures} See docs/causes.md."] if cures else []
 
-    state: State
-    move: bool
-    torque: bool
-    arming: bool
-    feed_watchdog: bool
-    clear: bool
-    causes: tuple[Active, ...]
-    refusal: tuple[Cause, ...]
+
+def _sentences(cures: Sequence[str]) -> list[str]:
+    """Sentences of cures in which no step comes twice; to arm again comes last."""
+    steps = [step for cure in cures for step in cure.split("; ")]
+    known = {step for step in steps if any(other.startswith(f"{step}, ") for other in steps)}
+    texts, last = list[str](), list[str]()
+    for cure in cures:
+        new = [step for step in cure.split("; ") if step not in known]
+        known.update(new)
+        last += [step for step in new if step.startswith("then ")]
+        if new := [step for step in new if not step.startswith("then ")]:
+            texts.append("; ".join(new))
+    if last:
+        texts[-1] = "; ".join([*texts[-1:], *last])
+    return [f"{text[0].upper()}{text[1:]}{'' if text[-1] in '?.' else '.'}" for text in texts]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from antennate.hardware.safety.causes import (
     CURED_BY_ARMING,
@@ -17,16 +18,149 @@ from antennate.hardware.safety.causes import (
     OF_FINDING,
     Active,
     Cause,
-    Inputs,
-    Outputs,
     State,
 )
-from antennate.hardware.safety.rate import RateMeter
+from antennate.hardware.safety.channel import Finding
 from antennate.params.safety import SupervisorParams
 from antennate.types import Contact, Maneuver
 
-_ACTIONS = frozenset(Maneuver)
-_CONTACTS = frozenset({Contact.FREE, Contact.CONTACT})
+
+class RateMeter:
+    """Measures a rate over a sliding window.
+
+    Args:
+        expected: Rate agreed [Hz].
+        error: Relative error allowed.
+        window: Window [s]; also the time for which the rate must be wrong.
+
+    Attributes:
+        rate: Samples per second over the window [Hz], NaN while it fills.
+    """
+
+    def __init__(self, expected: float, error: float, window: float) -> None:
+        self._low = expected * (1.0 - error)
+        self._high = expected * (1.0 + error)
+        self._window = window
+        self._ticks: deque[tuple[float, int]] = deque()
+        self._sum = 0
+        self._start = self._right = self.rate = math.nan
+        self.wrong = False
+
+    def step(self, now: float, samples: int) -> None:
+        """Count the samples that arrived since the tick before, at time now [s]."""
+        if math.isnan(self._start):
+            self._start = self._right = now
+            return
+        self._ticks.append((now, samples))
+        self._sum += samples
+        while self._ticks and self._ticks[0][0] <= now - self._window:
+            self._sum -= self._ticks.popleft()[1]
+        if now - self._start < self._window:
+            self._right = now
+            return
+        self.rate = self._sum / self._window
+        if self._low <= self.rate <= self._high:
+            self._right = now
+        self.wrong = now - self._right >= self._window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inputs:
+    """Inputs of the supervisor in one tick, after the controller's step.
+
+    None has a default: one that is forgotten is an error in the first tick, not health.
+
+    Attributes:
+        age: Age of the newest valid sample [s]; inf if there is none.
+        valid: Valid samples that arrived since the tick before, without those that were too old.
+        refused: Samples since then that were not valid.
+        findings: Of the left and the right channel.
+        noise: Size and frequency of the noise of a channel that is NOISE, left and right.
+        decided_at: Time at which the controller finished its newest decision [s].
+        maneuver: That decision.
+        contact: The contact that it was decided on, left and right.
+        bad_command: Why its command must not be sent, empty if it may.
+        failure: Text of an exception of the controller in this tick, empty if none.
+        resets: Restarts of the antenna board so far.
+        reset_reason: Why it last restarted, as far as known.
+        board_error: What is wrong with its port, empty if nothing is.
+        missed: Answers missed in a row, by servo id; ids without any may be left out.
+        servo_errors: Hardware errors in words, by servo id.
+        bus_error: What is wrong with the bus as a whole, empty if nothing is.
+        watchdogs: Ids of servos stopped by their watchdog.
+        disarmed: Ids of servos that have lost their torque or their watchdog while armed.
+        supply: Voltage of the supply [V], NaN if unknown.
+        behind: Joints that do not follow their goals, in words by servo id.
+        outside: Joints beyond their limits, likewise.
+        leaps: Joints that have moved faster than they can, likewise.
+        modes: Servos in a wrong operating mode, likewise.
+        drift: How far resting readings have drifted, empty if not far.
+        objections: Reasons not to arm, such as a failed touch check or unknown firmware.
+        unrecorded: Whether a record that is required is not kept.
+        stop: Whether the operator wants the torque off.
+        released: Whether the key that lets the robot walk is not held.
+        arm: Whether the operator wants it on; only the change to True in FAULT or OFF counts.
+    """
+
+    age: float
+    valid: int
+    refused: int
+    findings: tuple[Finding, Finding]
+    noise: tuple[str, str]
+    decided_at: float
+    maneuver: int
+    contact: tuple[int, int]
+    bad_command: str
+    failure: str
+    resets: int
+    reset_reason: str
+    board_error: str
+    missed: Mapping[int, int]
+    servo_errors: Mapping[int, str]
+    bus_error: str
+    watchdogs: tuple[int, ...]
+    disarmed: tuple[int, ...]
+    supply: float
+    behind: Mapping[int, str]
+    outside: Mapping[int, str]
+    leaps: Mapping[int, str]
+    modes: Mapping[int, str]
+    drift: str
+    objections: tuple[str, ...]
+    unrecorded: bool
+    stop: bool
+    released: bool
+    arm: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """What the tick may do.
+
+    Attributes:
+        move: Whether the command just decided may be sent; if not, the last one sent stays.
+        arming: True in the one tick of an accepted arm event: clear the watchdogs, set all goals to
+            the present positions, then switch the torque on.
+        feed_watchdog: Whether the watchdogs of the servos may be fed: only upon a decision taken in
+            this very tick.
+        clear: Whether data and actuators are well and the torque on. While it is False the
+            controller gets NaN for counts in the next tick, so that its gait stands still.
+        causes: All causes in force, the most severe first. Of equal ones those that explain first:
+            losses of data, those still there before those that only wait for fresh samples; then
+            others; then those of the controller; the oldest of each first.
+        refusal: Why an arm event of this tick was not accepted, empty if it was or none came.
+    """
+
+    state: State
+    move: bool
+    torque: bool
+    arming: bool
+    feed_watchdog: bool
+    clear: bool
+    causes: tuple[Active, ...]
+    refusal: tuple[Cause, ...]
+
+
 _FAILURES = frozenset({Cause.FAILED, Cause.BAD_ACTION, Cause.BAD_COMMAND})
 _SUPPLY = (Cause.SUPPLY_WARN, Cause.SUPPLY_HOLD, Cause.SUPPLY_OFF)
 
@@ -106,53 +240,61 @@ class Supervisor:
         )
 
     def _world(self, now: float, inputs: Inputs) -> dict[Cause, str]:
-        """Causes in data, servos and supply, each with its detail."""
-        params = self._params
-        found: dict[Cause, str] = {}
+        """Causes in data, time, servos, supply and operator, each with its detail."""
+        causes = self._data(now, inputs)
+        longest = self._params.longest_arming if self._arming else self._params.longest_pause
+        if not now - self._last < longest and self._last > -math.inf:
+            causes[Cause.PAUSE] = f"{now - self._last:.3g} s"
+        elif not now > self._last:
+            causes[Cause.PAUSE] = "time did not advance"
+        self._servos(inputs, causes)
+        self._supply(inputs.supply, causes)
+        if inputs.objections:
+            causes[Cause.NOT_READY] = "; ".join(inputs.objections)
+        for cause, there in (
+            (Cause.NO_RECORD, inputs.unrecorded),
+            (Cause.STOPPED, inputs.stop),
+            (Cause.RELEASED, inputs.released),
+        ):
+            if there:
+                causes[cause] = ""
+        return causes
+
+    def _data(self, now: float, inputs: Inputs) -> dict[Cause, str]:
+        """Causes in the board and its readings."""
+        params, causes = self._params, dict[Cause, str]()
         if not 0.0 <= inputs.age <= params.stale_age:
-            found[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
+            causes[Cause.STALE] = inputs.board_error or f"age {inputs.age:.3g} s"
         for side, finding, noise in zip(
             ("left", "right"), inputs.findings, inputs.noise, strict=True
         ):
             if (cause := OF_FINDING.get(finding)) is not None:
                 text = f"{side} {noise}" if noise else side
-                found[cause] = f"{found[cause]}, {text}" if cause in found else text
-        self._boots(now, inputs, found)
+                causes[cause] = f"{causes[cause]}, {text}" if cause in causes else text
+        if self._resets is not None and inputs.resets != self._resets:
+            causes[Cause.REBOOT] = inputs.reset_reason
+            if self._reboots.add(now):
+                causes[Cause.REBOOT_LOOP] = inputs.reset_reason
+        self._resets = inputs.resets
         self.meter.step(now, inputs.valid)
         if self.meter.wrong:
-            found[Cause.RATE] = f"{self.meter.rate:.0f} Hz"
-        longest = params.longest_arming if self._arming else params.longest_pause
-        if not now - self._last < longest and self._last > -math.inf:
-            found[Cause.PAUSE] = f"{now - self._last:.3g} s"
-        elif not now > self._last:
-            found[Cause.PAUSE] = "time did not advance"
-        self._servos(inputs, found)
-        self._supply(inputs.supply, found)
-        if inputs.objections:
-            found[Cause.NOT_READY] = "; ".join(inputs.objections)
+            causes[Cause.RATE] = f"{self.meter.rate:.0f} Hz"
         if inputs.drift:
-            found[Cause.DRIFT] = inputs.drift
-        found |= {Cause.NO_RECORD: ""} if inputs.unrecorded else {}
-        found |= {Cause.STOPPED: ""} if inputs.stop else {}
-        found |= {Cause.RELEASED: ""} if inputs.released else {}
-        return found
+            causes[Cause.DRIFT] = inputs.drift
+        return causes
 
-    def _boots(self, now: float, inputs: Inputs, found: dict[Cause, str]) -> None:
-        if self._resets is not None and inputs.resets != self._resets:
-            found[Cause.REBOOT] = inputs.reset_reason
-            if self._reboots.add(now):
-                found[Cause.REBOOT_LOOP] = inputs.reset_reason
-        self._resets = inputs.resets
-
-    def _servos(self, inputs: Inputs, found: dict[Cause, str]) -> None:
-        params = self._params
-        silent = [i for i, missed in inputs.missed.items() if missed >= params.silent_answers]
-        late = [i for i, missed in inputs.missed.items() if missed >= params.late_answers]
-        late = [i for i in late if i not in silent]
-        _name(found, Cause.LATE_ANSWERS, late)
-        _name(found, Cause.SILENT_SERVO, silent)
-        _name(found, Cause.WATCHDOG, inputs.watchdogs)
-        _name(found, Cause.DISARMED, inputs.disarmed)
+    def _servos(self, inputs: Inputs, causes: dict[Cause, str]) -> None:
+        params, missed = self._params, inputs.missed.items()
+        silent = {servo for servo, count in missed if count >= params.silent_answers}
+        late = {servo for servo, count in missed if count >= params.late_answers}
+        for cause, ids in (
+            (Cause.LATE_ANSWERS, late - silent),
+            (Cause.SILENT_SERVO, silent),
+            (Cause.WATCHDOG, inputs.watchdogs),
+            (Cause.DISARMED, inputs.disarmed),
+        ):
+            if ids:
+                causes[cause] = f"servo {', '.join(map(str, sorted(ids)))}"
         for cause, words in (
             (Cause.SERVO_ERROR, inputs.servo_errors),
             (Cause.NOT_FOLLOWING, inputs.behind),
@@ -161,11 +303,12 @@ class Supervisor:
             (Cause.WRONG_MODE, inputs.modes),
         ):
             if words:
-                found[cause] = "; ".join(f"servo {i}: {text}" for i, text in sorted(words.items()))
+                causes[cause] = "; ".join(f"servo {i}: {text}" for i, text in sorted(words.items()))
         if inputs.bus_error:
-            found[Cause.BUS_ERROR] = inputs.bus_error
+            causes[Cause.BUS_ERROR] = inputs.bus_error
 
-    def _supply(self, supply: float, found: dict[Cause, str]) -> None:
+    def _supply(self, supply: float, causes: dict[Cause, str]) -> None:
+        """Each level holds until the supply has risen above it by some more."""
         params = self._params
         if math.isfinite(supply):
             levels = (params.supply_warn, params.supply_hold, params.supply_off)
@@ -173,26 +316,25 @@ class Supervisor:
                 bound = level + params.supply_rise if cause in self._low else level
                 (self._low.add if supply < bound else self._low.discard)(cause)
         else:
-            found[Cause.SUPPLY_UNKNOWN] = ""
-        found |= dict.fromkeys(self._low, f"{supply:.1f} V")
+            causes[Cause.SUPPLY_UNKNOWN] = ""
+        causes |= dict.fromkeys(self._low, f"{supply:.1f} V")
 
     def _controller(self, now: float, inputs: Inputs, decided: bool) -> dict[Cause, str]:
-        """Causes in the controller, each with its detail."""
-        found: dict[Cause, str] = {}
+        """The cause in the controller, with its detail, and whether it failed too often."""
+        causes: dict[Cause, str] = {}
         if inputs.failure:
-            found[Cause.FAILED] = inputs.failure
+            causes[Cause.FAILED] = inputs.failure
         elif not decided:
-            found[Cause.UNDECIDED] = ""
-        elif inputs.maneuver not in _ACTIONS:
-            found[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
+            causes[Cause.UNDECIDED] = ""
+        elif inputs.maneuver not in set(Maneuver):
+            causes[Cause.BAD_ACTION] = f"maneuver {inputs.maneuver}"
         elif inputs.bad_command:
-            found[Cause.BAD_COMMAND] = inputs.bad_command
-        elif not _CONTACTS.issuperset(inputs.contact):
-            found[Cause.UNKNOWN_CONTACT] = ""
-        failed = _FAILURES & found.keys()
-        if failed and self._failures.add(now):
-            found[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_command
-        return found
+            causes[Cause.BAD_COMMAND] = inputs.bad_command
+        elif not {Contact.FREE, Contact.CONTACT}.issuperset(inputs.contact):
+            causes[Cause.UNKNOWN_CONTACT] = ""
+        if _FAILURES & causes.keys() and self._failures.add(now):
+            causes[Cause.REPEATED_FAILURES] = inputs.failure or inputs.bad_command
+        return causes
 
     def _recover(self, inputs: Inputs, present: Mapping[Cause, str]) -> None:
         """Losses of data stay until enough fresh valid samples came in a row."""
@@ -256,10 +398,3 @@ def _rank(active: Active) -> tuple[int, bool, bool, bool, float, str]:
         active.since,
         cause.name,
     )
-
-
-def _name(found: dict[Cause, str], cause: Cause, ids: Iterable[int]) -> None:
-    """Note a cause with the servos it is about, if there are any."""
-    listed = ", ".join(str(i) for i in sorted(ids))
-    if listed:
-        found[cause] = f"servo {listed}"

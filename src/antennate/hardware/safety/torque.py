@@ -190,5 +190,5 @@ def _unwritten(register: Register, wrong: Mapping[int, int]) -> BringUpError:
     by_value: dict[int, list[int]] = {}
     for servo, value in wrong.items():
         by_value.setdefault(value, []).append(servo)
-    found = ", ".join(f"{value} in servos {ids}" for value, ids in by_value.items())
-    return BringUpError(f"could not write {register.name}, found {found}")
+    values = ", ".join(f"{value} in servos {ids}" for value, ids in by_value.items())
+    return BringUpError(f"could not write {register.name}, found {values}")

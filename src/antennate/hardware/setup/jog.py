@@ -15,16 +15,17 @@ from antennate.dxl import inquiry
 from antennate.dxl.answers import Answer, Refused, Span, Value
 from antennate.dxl.bus import Bus
 from antennate.dxl.model import (
-    POSITION_UNIT,
     TICKS_A_TURN,
     VELOCITY_UNIT,
     WATCHDOG_UNIT,
     Register,
+    angle_at,
     hardware_errors,
+    position_at,
 )
 from antennate.dxl.models import MODELS_BY_NUMBER
-from antennate.hardware import settings
 from antennate.hardware.dynamixel import bringup
+from antennate.hardware.joints import settings, settings_of
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
 from antennate.hardware.setup.person import SetupError
@@ -67,11 +68,7 @@ class Jog:
         at = robot.joint_names.index(joint.name)
         self.joint, self._bus, self._params = joint, bus, params
         self._table = MODELS_BY_NUMBER[joint.model]
-        self._rules = {
-            name: rules[joint.servo]
-            for name, rules in settings.settings(robot).items()
-            if joint.servo in rules
-        }
+        self._rules = settings_of(settings(robot), joint.servo)
         self._sign, self._limit = robot.directions[at], robot.limits[at]
         self._zero, self._lost = float(robot.zeros[at]), 0
         self._full = 0
@@ -123,7 +120,7 @@ class Jog:
         before = self._newest.goal
         wanted = before + steps * self._params.step
         goal = min(max(wanted, min(-self._limit, before)), max(self._limit, before))
-        ticks = round(self._zero + self._sign * goal / POSITION_UNIT)
+        ticks = round(position_at(goal, self._zero, self._sign))
         reply = torque.ask_goal(self._bus, self.joint.servo, ticks)
         if not isinstance(reply, Value):
             raise SetupError(
@@ -170,7 +167,7 @@ class Jog:
         return left
 
     def _angle(self, ticks: float) -> float:
-        return (ticks - self._zero) * self._sign * POSITION_UNIT
+        return angle_at(ticks, self._zero, self._sign)
 
     def _register(self, name: str) -> Register:
         return self._table[name]

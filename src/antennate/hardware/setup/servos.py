@@ -1,26 +1,27 @@
-"""One servo at a time becomes a joint: its id, speed, mode, limits and return delay.
+"""Servos become joints, one at a time: id, speed, mode, limits and return delay.
 
 The servo may be factory-new (id 1 at 57600 bit/s) or have any other id and speed. What it has to
-hold is the rule that drive and doctor know (`hardware.settings`). Its id and speed are changed
+hold is the rule that drive and doctor know (`hardware.joints`). Its id and speed are changed
 last: one that was interrupted before is found as a new one again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from antennate.dxl.bus import Bus
 from antennate.dxl.inquiry import FOUND, Present, look, read_some
 from antennate.dxl.model import BAUD_RATES
 from antennate.dxl.models import XC430_W240, model_name
-from antennate.hardware import settings
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
-from antennate.hardware.settings import Setting
-from antennate.hardware.setup.person import SetupError
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.joints import all_settings, settings_of
+from antennate.hardware.setup.person import Person, SetupError, agrees, confirm
+from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 
 FACTORY_BAUD = 57_600
@@ -84,8 +85,7 @@ class ServoSetup:
         self._opener, self._scan, self._now = opener, scan, now
         self._master = partial(master, opener, now=now)
         self._baud = robot.baud
-        delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
-        self._rules = {**settings.settings(robot), "return_delay_time": delay}
+        self._rules = all_settings(robot)
 
     def present(self) -> dict[str, str]:
         """What each joint's servo lacks, of those that answer at the robot's speed; "" is nothing.
@@ -123,7 +123,10 @@ class ServoSetup:
         changes = self._plan(baud, servo.servo, joint)
         for change in changes:
             apply(self._opener, change, self._now)
-        self._verify(joint)
+        with self._master(self._baud) as bus:
+            lacks = self._lacks(bus, joint)
+        if lacks:
+            raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
         return changes
 
     def alone(self) -> tuple[int, Present]:
@@ -132,31 +135,32 @@ class ServoSetup:
         Raises:
             SetupError: There is none, or more than one.
         """
-        found: list[tuple[int, Present]] = []
+        present: list[tuple[int, Present]] = []
         usual = (FACTORY_BAUD, self._baud)
         others = [b for b in BAUD_RATES if b not in usual and b <= _FASTEST]
         for speeds in (tuple(dict.fromkeys(usual)), others):
             for baud in speeds:
                 with self._master(baud) as bus:
-                    found += [(baud, one) for one in self._here(bus)]
-            if found:
+                    present += [(baud, servo) for servo in self._answering(bus)]
+            if present:
                 break
-        if not found:
+        if not present:
             raise SetupError(
                 "expected one servo, found none at any speed; check its cable and its supply"
             )
-        if len(found) > 1:
+        if len(present) > 1:
+            names = ", ".join(f"id {servo.servo} at {baud}" for baud, servo in present)
             raise SetupError(
-                f"expected one servo alone, found {len(found)}: {_named(found)}; unplug the others"
+                f"expected one servo alone, found {len(present)}: {names}; unplug the others"
             )
-        return found[0]
+        return present[0]
 
-    def _here(self, bus: Bus) -> list[Present]:
+    def _answering(self, bus: Bus) -> list[Present]:
         """Servos that answer at the speed of a bus."""
         ids = sorted({status.id for status in bus.scan(self._scan)})
         if not ids and bus.tally.bad_crc:
             return [Present(0, None, None, "broken")]
-        return [one for servo in ids if (one := look(bus, servo)) is not None]
+        return [present for servo in ids if (present := look(bus, servo)) is not None]
 
     def _owner(self, baud: int, servo: int, done: Collection[str], joint: Joint) -> Joint | None:
         """The joint, done already, whose servo this is."""
@@ -173,7 +177,7 @@ class ServoSetup:
             there = self._read(bus, servo)
         changes = [
             Change(servo, baud, name, there[name], rule.cure)
-            for name, rule in self._wanted(joint).items()
+            for name, rule in settings_of(self._rules, joint.servo).items()
             if not rule.allows(there[name])
         ]
         if servo != joint.servo:
@@ -182,13 +186,6 @@ class ServoSetup:
             old, new = BAUD_RATES.index(baud), BAUD_RATES.index(self._baud)
             changes.append(Change(joint.servo, baud, "baud_rate", old, new))
         return changes
-
-    def _verify(self, joint: Joint) -> None:
-        """The servo is where it has to be, with all that it has to hold."""
-        with self._master(self._baud) as bus:
-            lacks = self._lacks(bus, joint)
-        if lacks:
-            raise SetupError(f"expected the servo of {joint} to be set up, found {lacks}")
 
     def _lacks(self, bus: Bus, joint: Joint) -> str:
         """What is wrong with the servo of a joint, empty if nothing is."""
@@ -202,16 +199,13 @@ class ServoSetup:
         there = self._read(bus, joint.servo)
         return "; ".join(
             f"{name.replace('_', ' ')} {there[name]} (expected {rule})"
-            for name, rule in self._wanted(joint).items()
+            for name, rule in settings_of(self._rules, joint.servo).items()
             if not rule.allows(there[name])
         )
 
-    def _wanted(self, joint: Joint) -> Mapping[str, Setting]:
-        return {n: rules[joint.servo] for n, rules in self._rules.items() if joint.servo in rules}
-
     def _read(self, bus: Bus, servo: int) -> dict[str, int]:
         """The registers of a servo that have to hold something."""
-        found: dict[str, int] = {}
+        values: dict[str, int] = {}
         for name in self._rules:
             value = read_some(bus, [servo], XC430_W240[name]).get(servo)
             if value is None:
@@ -219,9 +213,120 @@ class ServoSetup:
                     f"expected {name.replace('_', ' ')} of servo {servo}, found no answer; check "
                     "its cable"
                 )
-            found[name] = value
-        return found
+            values[name] = value
+        return values
 
 
-def _named(found: Iterable[tuple[int, Present]]) -> str:
-    return ", ".join(f"id {one.servo} at {baud}" for baud, one in found)
+Keep = Callable[[tuple[str, ...]], None]
+"""Keeps the names of the joints that are done."""
+
+
+class JointState(NamedTuple):
+    """How far a joint is.
+
+    Attributes:
+        joint: The joint.
+        state: "set up"; "wrong", its servo answers and is not as it has to be; "to do".
+        note: How that is known, or what is wrong.
+    """
+
+    joint: Joint
+    state: Literal["set up", "wrong", "to do"]
+    note: str = ""
+
+
+class Assembly:
+    """Servos of a robot, set up one by one.
+
+    Args:
+        servos: What sets them up.
+        done: Names of the joints that were done before.
+        keep: Called with all that is done after each.
+
+    Attributes:
+        done: Names of the joints that are done, in the order of the robot.
+    """
+
+    def __init__(self, servos: ServoSetup, done: Iterable[str], keep: Keep) -> None:
+        known = set(done)
+        self._servos, self._keep = servos, keep
+        self.done = [joint.name for joint in servos.joints if joint.name in known]
+
+    def look(self) -> list[JointState]:
+        """All joints; those whose servo answers as it has to are done.
+
+        Raises:
+            PortError: The port is gone or cannot be opened.
+        """
+        present = self._servos.present()
+        fit = {name for name, lacks in present.items() if not lacks}
+        if fit - set(self.done):
+            self._add(fit)
+        return [self._state(joint, present.get(joint.name)) for joint in self._servos.joints]
+
+    def run(self, person: Person, states: Iterable[JointState], only: Collection[str] = ()) -> None:
+        """Ask for the servo of each joint that is not set up, and set it up.
+
+        Args:
+            person: Who is asked.
+            states: All joints.
+            only: Names of the joints to set up, done or not; all that are not done if empty.
+
+        Raises:
+            Quit: The person wants to end.
+            BadInputError: No answer can come.
+        """
+        left = [
+            state.joint
+            for state in states
+            if (state.joint.name in only if only else state.state != "set up")
+        ]
+        for number, joint in enumerate(left, 1):
+            self._one(person, joint, f"{number} of {len(left)}")
+
+    def _one(self, person: Person, joint: Joint, where: str) -> None:
+        """One joint, until it is done or left out."""
+        while confirm(person, f"{where}: connect the servo of {joint} alone"):
+            try:
+                changes = self._set_up(person, joint)
+            except (SetupError, BringUpError, PortError) as error:
+                person.say(str(error))
+                continue
+            for change in changes:
+                person.say(f"  {change}")
+            person.say(f"  {joint.name} is set up, read back" if changes else "  set up before")
+            self._add({joint.name})
+            return
+
+    def _set_up(self, person: Person, joint: Joint) -> list[Change]:
+        """Set up what is connected; the servo of another joint, a spare, only if the person agrees.
+
+        The other joint is to do again then, until its servo is seen.
+        """
+        try:
+            return self._servos.set_up(joint, self.done)
+        except OwnedError as error:
+            person.say(str(error))
+            other = error.owner.name
+            if not agrees(person, f"is it a spare, to become the servo of {joint.name} instead?"):
+                raise SetupError(f"nothing was changed; connect the servo of {joint}") from None
+            person.say(f"  {other} is not set up, until a servo answers as that of {other}")
+            self.done.remove(other)
+            self._keep(tuple(self.done))
+            return self._servos.set_up(joint, self.done)
+
+    def _add(self, names: set[str]) -> None:
+        known = {*self.done, *names}
+        self.done = [joint.name for joint in self._servos.joints if joint.name in known]
+        self._keep(tuple(self.done))
+
+    def _state(self, joint: Joint, lacks: str | None) -> JointState:
+        if lacks:
+            return JointState(joint, "wrong", lacks)
+        if lacks is not None:
+            return JointState(joint, "set up", "answers")
+        return (
+            JointState(joint, "set up", "as noted before")
+            if joint.name in self.done
+            else JointState(joint, "to do")
+        )

@@ -138,7 +138,7 @@ class Zeroing:
             person.say(f"{POSE}; then Enter [q ends]")
             self._wait_for_enter(person)
             try:
-                return self._taken()
+                return self._mean()
             except SetupError as error:
                 person.say(f"{error}; once more")
 
@@ -152,7 +152,7 @@ class Zeroing:
             if answer is not None:
                 person.say(f"expected Enter or q, found {answer[:20]!r}")
 
-    def _taken(self) -> list[int]:
+    def _mean(self) -> list[int]:
         """The mean of the positions over a while."""
         count = max(2, round(self._params.hold / _PERIOD))
         readings = np.array([now for _, now in zip(range(count), self._positions, strict=False)])
@@ -197,20 +197,20 @@ class Zeroing:
             BadInputError: No answer can come.
             SetupError: A servo does not answer any more.
         """
-        found = list(self._robot.directions)
+        signs = list(self._robot.directions)
         for at, name in enumerate(self._names):
             before = next(iter(self._positions))  # the person may answer at once
-            where = f"{at + 1} of {len(found)}: {name}"
+            where = f"{at + 1} of {len(signs)}: {name}"
             person.say(f"{where}: {self._sense(at)} by 10 to 40 deg [{_CHOICE}]")
             sign = self._direction(person, at, before)
             if sign is None:
                 break
-            found[at] = sign or found[at]
-        return found
+            signs[at] = sign or signs[at]
+        return signs
 
     def _direction(self, person: Person, at: int, before: Ints) -> int | None:
         """The direction of one joint, 0 to keep it, None to keep the rest as well."""
-        name, told = self._names[at], at
+        name, named = self._names[at], at
         for now in self._positions:
             if (answer := person.answer()) is not None:
                 if answer in _QUIT:
@@ -226,8 +226,8 @@ class Zeroing:
                 self.measured.add(name)
                 return sign
             other = int(abs(moved).argmax())
-            if abs(moved[other]) >= 2.0 * self._params.turn and other != told:
-                told = other
+            if abs(moved[other]) >= 2.0 * self._params.turn and other != named:
+                named = other
                 person.say(self._exchanged(at, other))
         return None
 

@@ -1,15 +1,81 @@
-"""Finds a serial line again by what it is, whatever it is called now."""
+"""A serial line as a Port, found again by what it is, whatever it is called now.
+
+Nobody else may open it meanwhile. Opening must not reset the antenna board. On the usual board for
+the ESP32 two crossed transistors turn the modem lines into a reset (EN) and a boot button (IO0); so
+say Espressif's schematics (https://docs.espressif.com/projects/esp-dev-kits, "Auto program"):
+
+| DTR | RTS | the chip |
+|---|---|---|
+| off | off | runs |
+| on | on | runs |
+| off | on | EN low: held in reset |
+| on | off | IO0 low: BOOT pressed, which ends our firmware's stream |
+
+Linux switches both on in one step when a line is opened, and both off when it is closed. pyserial
+then sets DTR first and RTS after it. Wanting both off would therefore pass through "RTS alone" and
+reset the board; wanting both on changes nothing more. Both on it is, said before the line is open.
+"""
 
 from __future__ import annotations
 
+import termios
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import serial
 from serial.tools import list_ports
 
-from antennate.hardware.ports.serial_port import SerialPort
-from antennate.port import PortError
+from antennate.hardware.ports.errors import explain
+from antennate.port import Port, PortError, port_errors
+
+_FAILURES = (OSError, TypeError, ValueError, termios.error)
+"""What pyserial raises; it lets some through as they are."""
+
+
+class SerialPort(Port):
+    """A serial line, by its device file and bits per second; `flag` named it, for errors.
+
+    Raises:
+        PortError: If it cannot be opened, or another program holds it; with the cure.
+    """
+
+    def __init__(self, path: str, baud: int, flag: str = "") -> None:
+        self._path = path
+        try:
+            line = serial.Serial(baudrate=baud, timeout=0, write_timeout=0.1, exclusive=True)
+            line.dtr = line.rts = True
+            line.port = path
+            line.open()
+            self._line = line
+        except _FAILURES as error:
+            raise explain(flag, path, baud, error) from error
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        with self._mapped("write to"):
+            sent = self._line.write(data)
+        if sent != len(data):
+            raise PortError(f"{self._path}: expected to send {len(data)} bytes, sent {sent}")
+
+    def read(self, most: int, timeout: float) -> bytes:
+        """What has come, empty if nothing comes within `timeout` [s]."""
+        with self._mapped("read from"):
+            self._line.timeout = max(timeout, 0.0)
+            first = self._line.read(1)
+            if not first or most == 1:
+                return first
+            self._line.timeout = 0
+            return first + self._line.read(most - 1)
+
+    def close(self) -> None:
+        """Let it go."""
+        with self._mapped("close"):
+            self._line.close()
+
+    def _mapped(self, what: str) -> AbstractContextManager[None]:
+        return port_errors(f"{what} {self._path}", *_FAILURES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +125,11 @@ def identity(path: str) -> Identity | None:
 
     A serial number that another adapter has too, such as the 0001 of many boards, is no number.
     """
-    there = adapters()
-    found = there.get(str(Path(path).resolve()))
-    if found is None or sum(_alike(found, other) for other in there.values()) == 1:
-        return found
-    return replace(found, serial_number="")
+    known = adapters()
+    own = known.get(str(Path(path).resolve()))
+    if own is None or sum(_alike(own, other) for other in known.values()) == 1:
+        return own
+    return replace(own, serial_number="")
 
 
 def find(known: Identity, path: str) -> str:
@@ -80,8 +146,8 @@ def find(known: Identity, path: str) -> str:
         return same[0]
     what = f"USB adapter {known.vid:04x}:{known.pid:04x}"
     what += f" with serial number {known.serial_number}" if known.serial_number else ""
-    found = f"{len(same)} of them" if same else "none"
-    raise PortError(f"{path}: expected its {what} in socket {known.location}, found {found}")
+    count = f"{len(same)} of them" if same else "none"
+    raise PortError(f"{path}: expected its {what} in socket {known.location}, found {count}")
 
 
 def _alike(known: Identity, other: Identity) -> bool:

@@ -1,4 +1,4 @@
-"""Diagnosis of one channel: it takes readings and gives the counts to use and a finding.
+"""One channel: the only judge of whether a reading may be used, and what is wrong where not.
 
 Nothing here reads a clock. A reading that jumps, or lies far outside the calibrated range, is bad.
 The last good one replaces it for a few readings, so a spike changes nothing. A jump is accepted
@@ -8,27 +8,91 @@ The flex sensor is the upper half of a divider, so one torn off its wire reads 0
 ground, and both are SHORT_LO. OPEN is a pin of the converter that is connected to nothing: its
 readings wander over the whole range. NOISE is narrower than that, or a hum. A hum stays for a time
 in which it is not seen: near half the rate of the readings it beats with them and seems to stop.
+
+A hum is a sine far faster than an antenna bends. Any sine y satisfies y[n] + y[n-2] = c y[n-1]
+with c = 2 cos(2 pi f / rate), so c is fitted to ten readings, and what it leaves says how much of
+them is one sine (Prony's method). Sampling hides the true frequency: f, rate - f and so on give the
+same readings, which is what the words say.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 from statistics import median
 
+import numpy as np
+
 from antennate.antenna.calibration import REACH
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import HIGH_RAIL, LOW_RAIL
 from antennate.errors import CalibrationError
-from antennate.hardware.safety.noise import Noise, noise_of
 from antennate.params.control import CurveParams
 from antennate.params.safety import SupervisorParams
 
+_REST = 0.01
+"""Share of the energy that a hum leaves; white noise leaves less once in 30,000 (computed)."""
+_SLOWEST = 0.25
+"""Slowest hum [samples^-1]: 25 Hz at 100 Hz. Antennae ring at 2.4 Hz and bend fully in 30 ms."""
+_SAME = 0.025
+"""Frequencies nearer than this to half the rate are written as one [samples^-1]; ten readings, some
+from before the hum, tell no finer."""
 WINDOW = 10
-"""Readings from which a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
+"""Readings from which a hum or a broken wire is told: 100 ms at 100 Hz, as long as it may take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Noise of some readings.
+
+    Attributes:
+        size: Half of what lies between the lowest and the highest [counts].
+        frequency: Of a hum [samples^-1], 0.25 to 0.5; NaN if it is none.
+    """
+
+    size: float
+    frequency: float = math.nan
+
+    @property
+    def hums(self) -> bool:
+        """Whether it is one sine."""
+        return math.isfinite(self.frequency)
+
+    def text(self, rate: float) -> str:
+        """Size and frequency in words, at so many samples a second [Hz]."""
+        size = f"±{self.size:.0f} counts"
+        if not self.hums:
+            return f"{size} of no one frequency"
+        slow, fast = self.frequency * rate, (1.0 - self.frequency) * rate
+        if fast - slow < 2.0 * _SAME * rate:
+            return f"{size} at {0.5 * rate:.0f} Hz or an alias of it"
+        return f"{size} at {slow:.0f} or {fast:.0f} Hz or an alias of them"
+
+
+def noise_of(readings: Sequence[float]) -> Noise:
+    """Noise of ten readings in a row [counts], which are finite."""
+    y = np.array(readings)
+    size = 0.5 * float(np.ptp(y))
+    outer, middle = y[2:] + y[:-2], y[1:-1]
+    outer, middle = outer - outer.mean(), middle - middle.mean()
+    energy = float(middle @ middle)
+    if energy == 0.0:
+        return Noise(size)
+    c = float(outer @ middle) / energy
+    rest = outer - c * middle
+    y = y - y.mean()
+    whole = float(y[2:] @ y[2:] + y[:-2] @ y[:-2]) + c * c * energy
+    frequency = math.acos(min(max(0.5 * c, -1.0), 1.0)) / (2.0 * math.pi)
+    half = len(y) // 2
+    steady = min(float(np.ptp(y[:half])), float(np.ptp(y[half:]))) > size
+    hums = steady and float(rest @ rest) < _REST * whole and frequency > _SLOWEST
+    return Noise(size, frequency if hums else math.nan)
+
+
 OPEN_BAD = 6
 """Bad readings in the window that mean an open wire: a floating input fails one window in 10^4, and
 20 % of spikes pass 99 in 100 (assumed)."""
@@ -52,7 +116,6 @@ _FLOATING = FULL_SCALE / 3
 noise over the whole range in 3000 differs less (computed)."""
 _MEMORY = 1.0
 """Time for which wide readings are still a hum where some that were skipped break its sine [s]."""
-_HUM_TIME = SupervisorParams().hum_time
 JUMP = 1 / 3
 """Change between readings that is doubted [spans]: a flex sensor bends fully in three or more
 (assumed)."""
@@ -155,9 +218,6 @@ class Reading:
     taken: float = math.nan
 
 
-_NOTHING = Reading(math.nan, Finding.LOST)
-
-
 class ChannelDiagnosis:
     """Diagnoses the readings of one antenna by its calibrated range.
 
@@ -174,7 +234,7 @@ class ChannelDiagnosis:
         CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
     """
 
-    def __init__(self, band: Band, hum_time: float = _HUM_TIME) -> None:
+    def __init__(self, band: Band, hum_time: float = SupervisorParams().hum_time) -> None:
         if not LOW_RAIL < band.low < band.high < HIGH_RAIL:
             raise CalibrationError(
                 f"a calibrated range must lie within {LOW_RAIL:g} and {HIGH_RAIL:g} "
@@ -190,7 +250,7 @@ class ChannelDiagnosis:
 
     def reset(self) -> None:
         """Forget all readings, but neither the counters nor a hum."""
-        self.reading = _NOTHING
+        self.reading = Reading(math.nan, Finding.LOST)
         self._t = -math.inf
         self._raw: deque[float] = deque(maxlen=WINDOW)
         self._times: deque[float] = deque(maxlen=WINDOW)
@@ -220,10 +280,15 @@ class ChannelDiagnosis:
         self._times.append(t)
         self._count_near(counts)
         self._believe(counts)
-        finding = self._find()
-        value = self._used(finding) if finding.usable else math.nan
+        finding, good, band = self._find(), self._good, self._band
+        if finding is Finding.SATURATED:  # how far a flex sensor at the rail is bent is not known
+            good = min(max(good, band.low), band.high)
         self.counted[finding] += 1
-        self.reading = Reading(value, finding, counts if self._plausible(counts) else math.nan)
+        self.reading = Reading(
+            good if finding.usable else math.nan,
+            finding,
+            counts if band.believes(counts) else math.nan,
+        )
         return self.reading
 
     @property
@@ -242,23 +307,14 @@ class ChannelDiagnosis:
             self._least = self._most = counts
             self._near_equal = 1
 
-    def _used(self, finding: Finding) -> float:
-        """The reading to use; how far a flex sensor at the rail is bent is not known."""
-        if finding is Finding.SATURATED:
-            return min(max(self._good, self._band.low), self._band.high)
-        return self._good
-
-    def _plausible(self, counts: float) -> bool:
-        return self._band.believes(counts)
-
-    def _near(self, one: float, other: float) -> bool:
-        return abs(one - other) <= JUMP * self._band.span
+    def _near(self, counts: float, other: float) -> bool:
+        return abs(counts - other) <= JUMP * self._band.span
 
     def _believe(self, counts: float) -> None:
         """Accept a reading as the good one, or count it as bad."""
-        good = self._plausible(counts)
+        band, doubted = self._band, self._doubted
+        good = band.believes(counts)
         if good and not self._near(counts, self._good):
-            doubted = self._doubted
             follows = doubted and self._near(counts, doubted[-1])
             self._doubted = [*doubted, counts] if follows else [counts]
             good = len(self._doubted) >= AGREE
@@ -268,12 +324,9 @@ class ChannelDiagnosis:
             self._good = counts
             self._doubted = []
         self._bad_run = 0 if good else self._bad_run + 1
-        self._count(good, counts)
-
-    def _count(self, good: bool, counts: float) -> None:
-        outside = not self._band.low - MARGIN <= counts <= self._band.high + MARGIN
-        self._outside.append(good and outside)
-        self.outside += good and outside
+        outside = good and not band.low - MARGIN <= counts <= band.high + MARGIN
+        self._outside.append(outside)
+        self.outside += outside
         self.bad += not good
         self._share.append(not good)
         self._bad.append(not good and not math.isnan(counts))
@@ -303,7 +356,7 @@ class ChannelDiagnosis:
             return Finding.STUCK
         if not full:
             return None
-        if self._at_both_rails():
+        if min(self._at_rail(low=True), self._at_rail(low=False)) >= 2:  # no flex sensor can
             return Finding.OPEN
         return self._noise_or_open(spoiled=sum(self._bad) >= OPEN_BAD)
 
@@ -315,7 +368,11 @@ class ChannelDiagnosis:
             return Finding.OPEN if spoiled else None
         noise = noise_of(raw)
         quiet = self._t - self._hummed
-        self._remember(noise, quiet)
+        if noise.hums:
+            self._hummed = self._t
+        if quiet >= self._hum_time or (noise.hums and noise.size > self.noise.size):
+            self.noise = noise  # of a hum in force the largest
+            self._usual = median(after - before for before, after in pairwise(self._times))
         if noise.hums or (quiet < _MEMORY and sum(self._bad) >= SATURATED):
             return Finding.NOISE
         older, newer = raw[: WINDOW // 2], raw[WINDOW // 2 :]
@@ -325,25 +382,13 @@ class ChannelDiagnosis:
             return Finding.OPEN
         return Finding.NOISE if max(older) - min(older) >= least else None
 
-    def _remember(self, noise: Noise, quiet: float) -> None:
-        """Keep the largest hum while one is in force; a hum was seen last so long before [s]."""
-        if noise.hums:
-            self._hummed = self._t
-        if quiet >= self._hum_time or (noise.hums and noise.size > self.noise.size):
-            self.noise = noise  # though some readings were skipped, the median is the period
-            self._usual = median(after - before for before, after in pairwise(self._times))
-
-    def _at_both_rails(self) -> bool:
-        """Whether the window has two readings or more at either rail, which no flex sensor can."""
-        return min(self._at_rail(low=True), self._at_rail(low=False)) >= 2
-
     def _pinned(self, low: bool) -> bool:
         """Whether the whole window is at one rail; that of a bent sensor there has noise."""
         bent_low = self._band.polarity < 0
         if low:
-            bound = 0.0 if bent_low and self._plausible(LOW_RAIL) else LOW_RAIL
+            bound = 0.0 if bent_low and self._band.believes(LOW_RAIL) else LOW_RAIL
             return all(counts <= bound for counts in self._raw)
-        bent = not bent_low and self._plausible(HIGH_RAIL)
+        bent = not bent_low and self._band.believes(HIGH_RAIL)
         bound = FULL_SCALE if bent else HIGH_RAIL
         return all(counts >= bound for counts in self._raw)
 

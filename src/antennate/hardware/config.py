@@ -1,20 +1,30 @@
-"""What every command must know of a robot before it talks to it."""
+"""What robot.toml may hold, and what each command that talks to a robot takes of it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
+
+from pydantic import field_validator, model_validator
 
 from antennate.antenna.calibration import Calibration
+from antennate.control.readers import TELEOP, UNREAD, unread_by_all
+from antennate.control.registry import BUILT_IN, check_for_robots
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
+from antennate.hardware.safety import deadlines
 from antennate.messages import shown
 from antennate.params.base import Params, number, paths_of
 from antennate.params.control import ConditioningParams, ControlParams
+from antennate.params.dead_man import DeadManParams
 from antennate.params.doctor import DoctorParams
+from antennate.params.endurance import DriftParams
 from antennate.params.network import NetworkParams
-from antennate.params.safety import SupervisorParams
-from antennate.robots.readers import SIMULATION_ALONE
+from antennate.params.record import RecordParams
+from antennate.params.safety import SupervisorParams, TouchCheckParams
+from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
+from antennate.robots.readers import SIMULATION_ALONE, UNDRIVEN, unused
 from antennate.robots.spec import RobotSpec
 
 
@@ -149,3 +159,165 @@ class DoctorConfig(RobotConfig):
             if file is not None and getattr(self.doctor, name) is None
         }
         return done.model_copy(update={"doctor": self.doctor.model_copy(update=known)})
+
+
+class DriveConfig(RobotConfig):
+    """The robot, its controller, and how long it runs."""
+
+    unread: ClassVar[tuple[str, ...]] = UNDRIVEN
+
+    controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
+    """Open, timed, paper, closed, closed-1, schedule, zigzag, random, or MODULE:NAME or
+    FILE.py:NAME of your own."""
+    dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
+    """Time before torque."""
+    duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
+    """Time from torque on to off."""
+    record_required: bool = number(
+        False, "1", "assumed: a robot that walks matters more than its log"
+    )
+    """Whether the robot holds while no log of it is kept."""
+    touch_check: bool = number(
+        True, "1", "assumed: swapped channels turn the robot towards what it touches"
+    )
+    """The touch check in the dry run, in which both antennae are bent by hand."""
+    touch: TouchCheckParams = TouchCheckParams()
+    hold_to_run: bool = number(False, "1", "assumed: a script has no keys")
+    """Walk only while a key of the terminal is held."""
+    dead_man: DeadManParams = DeadManParams()
+    drift: DriftParams = DriftParams()
+    fault_time: float = number(
+        10.0, "s", "assumed: long enough to take hold of the robot", ge=0, le=600
+    )
+    """Time that it stands with torque after a fault."""
+    bus_return: float = number(30.0, "s", "assumed: long enough to put a plug back", ge=0, le=600)
+    """Time that a lost servo bus is waited for, to take the torque off."""
+    stand: float = number(
+        0.3, "s", "assumed: a step at half a hertz comes to rest", ge=0, le=deadlines.STAND
+    )
+    """Time that the robot holds its command before the torque goes off."""
+    swapped: float = number(
+        1.5, "s", "assumed: half the wait for a greeting, and no servo speaks unasked", gt=0, le=60
+    )
+    """Silence of the board, while the bus speaks unasked, that shows the two ports swapped."""
+
+    @field_validator("controller")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return check_for_robots(name)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> DriveConfig:
+        deadlines.require_order(self.limits, self.control.period)
+        return self
+
+    @property
+    def reader(self) -> str:
+        """What reads the numbers of the control."""
+        return self.controller
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What this robot does not have, and what its controller does not read."""
+        return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot)
+
+
+_UNREAD = (*SIMULATION_ALONE, "robot.release")
+
+
+class SetupConfig(Params):
+    """The robot, and how it is set up."""
+
+    shared: ClassVar[bool] = True
+    unread: ClassVar[tuple[str, ...]] = (
+        *_UNREAD,
+        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch")),
+        *(f"setup.{name}" for name in ("hold", "still", "turn", "horn_teeth")),
+    )
+    robot: RobotSpec = RobotSpec()
+    setup: SetupParams = SetupParams()
+
+
+class ZeroConfig(SetupConfig):
+    """The robot, and how its zeros are measured."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        *_UNREAD,
+        *(f"setup.{name}" for name in ("done", "scan", "port_time")),
+    )
+
+
+class JogConfig(Params):
+    """The robot, and how a joint of it is moved by keys."""
+
+    shared: ClassVar[bool] = True
+    unread: ClassVar[tuple[str, ...]] = _UNREAD
+    robot: RobotSpec = RobotSpec()
+    jog: JogParams = JogParams()
+
+
+class RecordConfig(RecordParams):
+    """What is recorded, and how the board is reached."""
+
+    network: NetworkParams = NetworkParams()
+
+
+class TeleopConfig(DriveConfig):
+    """The configuration of `drive`, and the numbers of teleoperation; `controller` is not used."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        *UNDRIVEN,
+        "controller",
+        *paths_of(DeadManParams, "dead_man"),
+        *(f"control.{path}" for path in UNREAD[TELEOP]),
+    )
+    teleop: TeleopParams = TeleopParams()
+
+    @property
+    def reader(self) -> str:
+        """What reads the numbers of the control."""
+        return TELEOP
+
+
+_Config = TypeVar("_Config", bound=RobotConfig)
+
+
+class RobotFile(DriveConfig):
+    """What robot.toml may hold: what `drive` takes, and tables for other commands."""
+
+    doctor: DoctorParams = DoctorParams()
+    record: RecordParams = RecordParams()
+    ports: PortsParams = PortsParams()
+    setup: SetupParams = SetupParams()
+    jog: JogParams = JogParams()
+    teleop: TeleopParams = TeleopParams()
+
+    def for_drive(self) -> DriveConfig:
+        """What `drive` takes: all but the tables of others."""
+        return self._part(DriveConfig)
+
+    def for_teleop(self) -> TeleopConfig:
+        """What `teleop` takes: what `drive` takes, and its own table."""
+        return self._part(TeleopConfig)
+
+    def for_doctor(self) -> DoctorConfig:
+        """What `antennate doctor` takes: the robot, and its own table."""
+        return self._part(DoctorConfig)
+
+    def for_record(self) -> RecordConfig:
+        """What `antennate record` takes: its own table, and the network."""
+        return RecordConfig(**dict(self.record), network=self.network)
+
+    def for_setup(self) -> SetupConfig:
+        """What `antennate setup` takes: the robot, and its own table."""
+        return SetupConfig(robot=self.robot, setup=self.setup)
+
+    def for_zero(self) -> ZeroConfig:
+        """What `antennate setup zero` takes: the same."""
+        return ZeroConfig(robot=self.robot, setup=self.setup)
+
+    def for_jog(self) -> JogConfig:
+        """What `antennate setup jog` takes: the robot, and its own table."""
+        return JogConfig(robot=self.robot, jog=self.jog)
+
+    def _part(self, model: type[_Config]) -> _Config:
+        return model(**{name: getattr(self, name) for name in model.model_fields})

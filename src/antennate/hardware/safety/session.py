@@ -3,8 +3,8 @@
 Only what the supervisor allows is sent to the actuators. Every packet feeds their watchdogs. So
 with torque on, packets are sent only in a tick with a decision: the controller's, or to stand still
 (for the actuators, before torque goes off, or for one tick at half pace); the supervisor is asked
-about each. Goals move at a limited
-speed, so that neither the first command nor a broken controller makes a joint jump.
+about each. Goals move at a limited speed, so that neither the first command nor a broken controller
+makes a joint jump.
 
 Torque comes on with the joints where they are. They approach the first command slowly, all
 together, and the controller's time stands still meanwhile. If all joints can reach it in one tick
@@ -23,15 +23,14 @@ import numpy as np
 
 from antennate.errors import reason
 from antennate.hardware.actuators import ActuatorError, Actuators
-from antennate.hardware.driving.hardware_robot import HardwareRobot
-from antennate.hardware.driving.supervised_controller import SupervisedController
-from antennate.hardware.driving.timing import LoopTiming
-from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.board import Board, BoardReader
 from antennate.hardware.joints import CommandError
 from antennate.hardware.safety import deadlines
-from antennate.hardware.safety.causes import Cause, Inputs, Outputs, State
+from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.controller import SupervisedController
 from antennate.hardware.safety.signal_quality import SignalQuality
-from antennate.hardware.safety.supervisor import Supervisor
+from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
+from antennate.hardware.timing import LoopTiming
 from antennate.params.safety import SupervisorParams
 from antennate.port import PortError
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand
@@ -91,12 +90,11 @@ class Session:
         self._limits = limits or SupervisorParams()
         deadlines.require_order(self._limits, period)
         self.supervisor = Supervisor(self._limits)
-        self.robot = HardwareRobot(board, actuators, clock)
+        self.reader = BoardReader(board, clock)
         self.orders, self.tally = Orders(), Tally()
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
-        self._refused = 0
         self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
         self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
@@ -108,32 +106,24 @@ class Session:
 
     def read(self) -> AntennaFrame:
         """The newest reading; NaN if it is not good or while the supervisor stops the gait."""
-        now = self.clock.now()
+        now, out, control = self.clock.now(), self.outputs, self.control
         if self.timing is None:
             self.timing = LoopTiming(now, self.period)
         self.timing.begin(now)
-        frame, control = self._feel(), self.control
-        clear = self.outputs is not None and self.outputs.clear
-        counts = self.quality.counts if clear else [math.nan, math.nan]
+        t = self._feel()
+        counts = self.quality.counts if out is not None and out.clear else [math.nan, math.nan]
         self._mark("read")
-        control.standing, control.rate = self.actuators.resting or self.approaching, self._rate()
-        self.frame = AntennaFrame(t=control.time(frame.t), counts=np.array([counts]))
+        empty = out is not None and any(a.cause is Cause.SUPPLY_WARN for a in out.causes)
+        control.standing = self.actuators.resting or self.approaching
+        control.rate = self._limits.slow_rate if empty else 1.0
+        self.frame = AntennaFrame(t=np.array([control.time(t)]), counts=np.array([counts]))
         return self.frame
 
-    def _feel(self) -> AntennaFrame:
-        """The newest reading as the board gave it, judged."""
-        before = sum(self.board.clock.states.values())
-        frame = self.robot.read()
-        self._refused = sum(self.board.clock.states.values()) - before - self.robot.used
-        contact = self.control.decision.contact
-        self.quality.step(float(frame.t[0]), frame.counts[0].tolist(), contact)
-        return frame
-
-    def _rate(self) -> float:
-        """How fast the controller's time goes, 1 as the clock: slower while the supply is low."""
-        causes = () if self.outputs is None else self.outputs.causes
-        empty = any(active.cause is Cause.SUPPLY_WARN for active in causes)
-        return self._limits.slow_rate if empty else 1.0
+    def _feel(self) -> float:
+        """Judge the newest reading of the board: its time [s]."""
+        t, counts = self.reader.read()
+        self.quality.step(t, counts[0].tolist(), self.control.decision.contact)
+        return t
 
     def write(self, command: JointCommand) -> None:
         """Let the supervisor decide on this tick, carry that out, then read the actuators."""
@@ -149,12 +139,9 @@ class Session:
             self.timing.mark(stage, self.clock.now())
 
     def _decide(self, command: JointCommand) -> None:
-        now = self.clock.now()
-        self.outputs = self.supervisor.step(now, self._inputs(now))
-        self._act(self.outputs, command)
-
-    def _act(self, out: Outputs, command: JointCommand) -> None:
-        actuators = self.actuators
+        """Ask the supervisor, do what it allows, look at the actuators."""
+        now, actuators = self.clock.now(), self.actuators
+        out = self.outputs = self.supervisor.step(now, self._inputs(now))
         try:
             if out.arming:
                 self.touched = True
@@ -212,8 +199,8 @@ class Session:
         clock, state, control = self.board.clock, self.actuators.state, self.control
         return Inputs(
             age=clock.age(now),
-            valid=self.robot.used,
-            refused=self._refused,
+            valid=self.reader.used,
+            refused=self.reader.refused,
             findings=self.quality.findings,
             noise=self.quality.noise,
             decided_at=control.result.decided_at,

@@ -1,25 +1,136 @@
-"""What a survey of an antenna board means: the board itself, its wire, and each antenna."""
+"""The antenna board at rest: its greeting and its readings, and what they mean."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from antennate.antenna.plateau import plateau_of
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
-from antennate.hardware.doctor.board_survey import BoardSurvey
-from antennate.hardware.doctor.check import Finding
+from antennate.hardware.config import DoctorConfig
+from antennate.hardware.doctor.bus_survey import master
+from antennate.hardware.doctor.check import Finding, Opener
 from antennate.hardware.esp32 import frame
-from antennate.hardware.esp32.wire import Hello, Reset, objections, require_sensor
-from antennate.hardware.robot import DoctorConfig
-from antennate.hardware.safety import diagnosis
-from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis
-from antennate.hardware.safety.noise import usual_noise
+from antennate.hardware.esp32.board import BOARD_BAUD, Board
+from antennate.hardware.esp32.clock import Timed
+from antennate.hardware.esp32.wire import Counters, Hello, Reset, objections, require_sensor
+from antennate.hardware.safety import channel as diagnosis
+from antennate.hardware.safety.channel import WINDOW, Band, ChannelDiagnosis, Noise, noise_of
 from antennate.messages import typed
 from antennate.params.control import CurveParams
+from antennate.params.doctor import DoctorParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats
+
+_PATIENCE = 0.02
+"""Longest wait for bytes before the time is looked at again [s]."""
+
+
+@dataclass(slots=True)
+class BoardSurvey:
+    """What came from the board's port.
+
+    Attributes:
+        refusals: Why frames were refused.
+        text: Printable text that came instead of frames.
+        received: Bytes received.
+        readings: Usable samples after the greeting.
+        lost: Samples between them that never came.
+        dropped: Samples that the board itself could not send meanwhile.
+        broken: Pieces with a wrong CRC or code after the greeting.
+        boots: Times it started anew meanwhile.
+        servos: Whether servos answer on the port.
+        radio: Whether the board sends by radio.
+    """
+
+    hello: Hello | None = None
+    refusals: list[str] = field(default_factory=list[str])
+    text: str = ""
+    received: int = 0
+    readings: list[Timed] = field(default_factory=list[Timed])
+    lost: int = 0
+    dropped: int = 0
+    broken: int = 0
+    boots: int = 0
+    servos: bool = False
+    radio: bool = False
+
+    @property
+    def counts(self) -> Floats:
+        """Readings of both antennae [counts], shape (n, 2)."""
+        pairs = [(r.sample.left, r.sample.right) for r in self.readings]
+        return np.array(pairs, float).reshape(-1, 2)
+
+    @property
+    def rate(self) -> float | None:
+        """Samples per second as they arrived [Hz], None of fewer than two."""
+        span = self.readings[-1].arrived - self.readings[0].arrived if self.readings else 0.0
+        return (len(self.readings) - 1) / span if span > 0 else None
+
+    def result(self) -> dict[str, Any]:
+        """Its part of result.json."""
+        counts, hello = self.counts, self.hello
+        known = len(counts) > 0
+        return {
+            "device_id": None if hello is None else hello.device_id,
+            "firmware": None if hello is None else list(hello.firmware),
+            "reset": None if hello is None else hello.reset.name,
+            "rate_hz": self.rate,
+            "readings": len(counts),
+            "lost": self.lost,
+            "broken": self.broken,
+            "median_counts": np.median(counts, axis=0).tolist() if known else None,
+            "noise_counts": counts.std(axis=0).tolist() if known else None,
+        }
+
+
+def survey_board(
+    opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
+) -> BoardSurvey:
+    """Wait for a greeting and read for a while; without one, see whether servos are there.
+
+    Raises:
+        PortError: The port is gone or cannot be opened.
+    """
+    survey = BoardSurvey()
+    with opener(BOARD_BAUD) as port:
+        port.drain()
+        board = Board(port)
+        end = now() + params.greeting
+        while (board.hello is None or board.clock.newest is None) and now() < end:
+            board.wait(_PATIENCE, now)
+        if board.hello is not None:
+            _read(board, survey, params.listen, now)
+        survey.hello, survey.refusals = board.hello, board.refusals
+        survey.text, survey.received = board.decoder.take_text(), board.decoder.counters.received
+    if survey.hello is None and not survey.refusals:
+        with master(opener, robot.baud, now) as bus:
+            survey.servos = bool(bus.scan())
+    return survey
+
+
+def _read(board: Board, survey: BoardSurvey, seconds: float, now: Callable[[], float]) -> None:
+    counters, clock = board.decoder.counters, board.clock
+    broken, boots, lost = _broken(counters), clock.resets, clock.sequence.lost
+    end = now() + seconds
+    while now() < end:
+        survey.readings += board.wait(_PATIENCE, now)
+    survey.boots = clock.resets - boots
+    survey.lost = clock.sequence.lost - (0 if survey.boots else lost)
+    survey.broken = _broken(counters) - broken
+    if survey.readings and not survey.boots:
+        first, last = survey.readings[0].sample, survey.readings[-1].sample
+        survey.dropped = (last.drops - first.drops) % (1 << 16)
+
+
+def _broken(counters: Counters) -> int:
+    return counters.crc_errors + counters.cobs_errors + counters.oversize + counters.noise
+
 
 _LONGEST_TEXT = 60
 _COPY = "copy the three files of firmware/ to the board again"
@@ -52,7 +163,8 @@ def findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding
     if hello is None:
         return
     least = f"{_version(frame.FIRMWARE)} or newer, protocol {frame.PROTOCOL}"
-    yield _firmware(hello), "firmware", least
+    version = f"{_version(hello.firmware)}, protocol {frame.PROTOCOL}"
+    yield Finding(version, "bad" if objections(hello) else "ok", _COPY), "firmware", least
     yield _boot(board, hello), "boot", "once, not by its watchdog"
     rate, error = config.limits.rate, config.limits.rate_error
     low, high = rate * (1 - error), rate * (1 + error)
@@ -89,11 +201,6 @@ def _greeting(board: BoardSurvey) -> Finding:
         return Finding(f"{board.received} bytes, no frame", "bad", cure)
     cure = "check its cable and power, press its reset button, copy firmware/ to it"
     return Finding("nothing", "bad", cure)
-
-
-def _firmware(hello: Hello) -> Finding:
-    version = f"{_version(hello.firmware)}, protocol {frame.PROTOCOL}"
-    return Finding(version, "bad" if objections(hello) else "ok", _COPY)
 
 
 def _version(numbers: tuple[int, ...]) -> str:
@@ -146,14 +253,15 @@ def _antenna(
     low, high = _limits(_curve(config, name))
     if shown is diagnosis.Finding.OUT_OF_CAL and low <= middle <= high:
         shown = diagnosis.Finding.OK  # noise reaches beyond, which has a row of its own
-    told = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
+    text = f"{shown.value}, {noise}" if shown is diagnosis.Finding.NOISE else shown.value
     signal = Finding(
-        f"{told} ({middle:.0f} counts)",
+        f"{text} ({middle:.0f} counts)",
         "ok" if shown is diagnosis.Finding.OK else "warn" if shown in _DEGRADED else "bad",
         _CURES.get(shown, "check plug, cable and divider of this antenna"),
     )
     plateau = plateau_of(np.array(counts))
-    if plateau is not None and not _at_ground(shown):
+    shorted = shown in (diagnosis.Finding.SHORT_LO, diagnosis.Finding.SHORT_HI)
+    if plateau is not None and not shorted:
         signal = Finding(plateau.text("the readings"), "bad", _CURES[diagnosis.Finding.STUCK])
     yield signal, f"{name} antenna", "ok"
     if shown.usable:
@@ -163,15 +271,23 @@ def _antenna(
 def _usual(seen: list[diagnosis.Finding]) -> diagnosis.Finding:
     """What a tenth of the readings say of a channel that is not usable, else most of them."""
     counted = Counter(seen[diagnosis.AGREE :] or seen)
-    worse = [found for found in counted if not found.usable]
-    found = max(worse, key=lambda one: counted[one], default=seen[-1])
-    often = worse and counted[found] > _OFTEN * len(seen)
-    return found if often else counted.most_common(1)[0][0]
+    worse = [state for state in counted if not state.usable]
+    commonest = max(worse, key=lambda state: counted[state], default=seen[-1])
+    often = worse and counted[commonest] > _OFTEN * len(seen)
+    return commonest if often else counted.most_common(1)[0][0]
 
 
-def _at_ground(shown: diagnosis.Finding) -> bool:
-    """Whether the readings stand at a rail for another reason than saturation."""
-    return shown in (diagnosis.Finding.SHORT_LO, diagnosis.Finding.SHORT_HI)
+def _usual_noise(readings: Sequence[float]) -> Noise:
+    """Noise of many readings at rest: of a hum if most windows have one, else of them all."""
+    starts = range(0, len(readings) - WINDOW + 1, WINDOW)
+    parts = [noise_of(readings[start : start + WINDOW]) for start in starts]
+    humming = [part for part in parts if part.hums]
+    if parts and 2 * len(humming) > len(parts):
+        return Noise(
+            max(part.size for part in humming),
+            float(np.median([part.frequency for part in humming])),
+        )
+    return Noise(0.5 * float(np.ptp(readings)) if readings else 0.0)
 
 
 def _noise(
@@ -181,21 +297,21 @@ def _noise(
     good = config.doctor
     before, right = good.calibrated_noise, good.calibrated_noise_right
     before = right if name == "right" and right is not None else before
-    noise, usual = float(np.std(counts)), usual_noise(counts)
+    noise, usual = float(np.std(counts)), _usual_noise(counts)
     usually = max(before or 0.0, 1.0)
     louder = noise > good.noise_ratio * usually
-    found, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
+    text, expected = f"{noise:.1f} counts", f"at most {good.noise:g} counts"
     cure = "leave the antenna alone; then check its plug, cable and ground"
     bad = noise > good.noise
     if bad and usual.hums and board.rate is not None:
-        found += f": a hum of {usual.text(board.rate)}"
+        text += f": a hum of {usual.text(board.rate)}"
         cure = _CURES[diagnosis.Finding.NOISE]
     if before is not None:
         expected += f", {before:.1f} when it was calibrated"
         if louder:
-            bad, found = True, f"{found}, {noise / usually:.0f} times that"
+            bad, text = True, f"{text}, {noise / usually:.0f} times that"
             cure = _RADIO if board.radio else cure
-    return Finding(found, "warn" if bad else "ok", cure), f"{name} noise", expected
+    return Finding(text, "warn" if bad else "ok", cure), f"{name} noise", expected
 
 
 def _curve(config: DoctorConfig, name: str) -> CurveParams:

@@ -1,4 +1,4 @@
-"""The scheduling that a control loop needs beside busy programs, where it is allowed.
+"""The host of the loop: its monotonic clock, and real-time scheduling where that is allowed.
 
 Linux runs a process of the real-time class SCHED_FIFO whenever it has something to do, before all
 ordinary ones (sched(7)). That needs a privilege. Without it the loop runs as an ordinary process,
@@ -10,9 +10,28 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import time
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
+
+
+class HostClock:
+    """Seconds since it was made."""
+
+    def __init__(self) -> None:
+        self._begin = time.monotonic()
+
+    def now(self) -> float:
+        """Time [s]."""
+        return time.monotonic() - self._begin
+
+    def sleep_until(self, t: float) -> None:
+        """Return at time t [s], at once if it has passed."""
+        left = t - self.now()
+        if left > 0:
+            time.sleep(left)
+
 
 LEVEL = 20
 """Real-time level of the loop: above ordinary programs, below the threads of interrupts at 50
