@@ -12,7 +12,7 @@ from esp32_board import Board
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.esp32.wire import Hello, Sample
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 KEY = bytes(range(32))
 HOST = ("192.168.4.7", 50000)

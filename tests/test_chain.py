@@ -25,8 +25,8 @@ from antennate.experiments.sweep import scan
 from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.passage import passage
 from antennate.experiments.wall.run import run
+from antennate.params.bench import SweepParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.sweep import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import chain as fast
 from antennate.sim.bench import Ball, Bar, Bench, Slider, compile_bench

@@ -14,8 +14,8 @@ from antennate.hardware.safety.diagnosis import Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams, RuleParams
-from antennate.params.endurance import DriftParams
-from antennate.robots.sensor import SensorParams
+from antennate.params.safety import DriftParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Contact, Floats
 
 SPAN = BAND.high - BAND.low

@@ -29,7 +29,7 @@ from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.film import ending, films
 from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.params.sweep import SweepParams
+from antennate.params.bench import SweepParams
 from antennate.sim import gl, layers
 from antennate.sim.camera import Camera
 from antennate.telemetry import film

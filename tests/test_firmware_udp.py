@@ -24,7 +24,7 @@ from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.ports.udp_port import UdpPort
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 Run = Callable[[Radio, int], None]
 

@@ -22,7 +22,7 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.operator import Operator
 from antennate.hardware.driving.session import Session
 from antennate.messages import typed
-from antennate.params.dead_man import DeadManParams
+from antennate.params.hardware import DeadManParams
 from antennate.twin.config import TwinConfig
 
 REPEATS = {"Linux console": (0.25, 1 / 10.9), "X server": (0.66, 1 / 25)}

@@ -17,7 +17,8 @@ from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import check, run
-from antennate.params.control import ControlParams, GaitParams
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.knowledge import (

@@ -11,8 +11,8 @@ import pytest
 
 from antennate.control.gait import targets
 from antennate.errors import ConfigError
-from antennate.params.control import GaitParams
-from antennate.params.reading import from_values
+from antennate.params.base import from_values
+from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import robot_part
 

@@ -24,7 +24,7 @@ from antennate.hardware.esp32.wire import Hello, Sample
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.udp_port import UdpPort
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Port, PortError
 from antennate.twin.udp import UdpEndpoint
 

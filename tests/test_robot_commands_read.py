@@ -34,9 +34,8 @@ from antennate.hardware.robot import DoctorConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.setup.servos import ServoSetup, joints_of
-from antennate.params.base import Params
-from antennate.params.network import NetworkParams
-from antennate.params.reading import read_file
+from antennate.params.base import Params, read_file
+from antennate.params.hardware import NetworkParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.feed import Feed

@@ -18,7 +18,7 @@ from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOptions, parse_robot
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 from antennate.studies.formats import to_toml
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"

@@ -13,7 +13,7 @@ import pytest
 from antennate import simulate
 from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.mjcf import MjcfScene

@@ -27,7 +27,7 @@ from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.run import GaitStudyConfig, run
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import run as cross
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import gl

@@ -20,7 +20,7 @@ from antennate.hardware.driving.session import Session
 from antennate.hardware.esp32.decoder import FrameDecoder
 from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
-from antennate.params.twin import BatteryParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.converter import Converter

@@ -19,7 +19,7 @@ from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.verifier import Verifier
 from antennate.hardware.safety.causes import State
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.twin.config import TwinConfig
 
 KEY = bytes(range(32))

@@ -16,7 +16,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-
+SIDES = ("l", "r")
+"""Left and right: the order of every array with an axis over the two sides."""
+LEFT, RIGHT = 0, 1
+SIDE_SIGN = (1.0, -1.0)
+"""Sign of the lateral (y) coordinate on each side; y points to the robot's left."""
 _EMPTY = np.zeros((0, 0))
 
 

@@ -16,15 +16,18 @@ from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibra
 from antennate.antenna.curves import (
     BOUNDS,
     MODELS,
+    MOST_GROUPS,
+    PLATEAU_SHARE,
     Samples,
     curve,
     ends,
     fit_sigmoid,
+    gain_of,
+    left_out,
+    plateau_of,
     polarity,
     predict,
 )
-from antennate.antenna.plateau import SHARE, plateau_of
-from antennate.antenna.rivals import MOST_GROUPS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import usable
 from antennate.errors import CalibrationError
@@ -55,7 +58,7 @@ def check(samples: Samples) -> None:
             f"found {len(counts)}; record longer"
         )
     railed = ~usable(counts)
-    if railed.mean() > SHARE:
+    if railed.mean() > PLATEAU_SHARE:
         first = int(np.argmax(railed))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings between the rails, found "
@@ -63,7 +66,7 @@ def check(samples: Samples) -> None:
             "choose another divider resistor"
         )
     plateau = plateau_of(counts, level)
-    if plateau is not None and plateau.share > SHARE:
+    if plateau is not None and plateau.share > PLATEAU_SHARE:
         first = int(np.argmax(counts))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings that change with the bend, found "

@@ -19,8 +19,8 @@ from antennate.hardware.ports.finder import is_udp
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import typed
-from antennate.params.reading import Config, read_file
-from antennate.params.setup import PortsParams
+from antennate.params.base import Config, read_file
+from antennate.params.hardware import PortsParams
 
 USUAL = Path("robot.toml")
 """The robot's file if --config names no other."""

@@ -27,9 +27,8 @@ from antennate.cli.options import (
 )
 from antennate.errors import ConfigError
 from antennate.messages import shown
-from antennate.params.base import Params, changes
+from antennate.params.base import Config, Params, changes, put_over, read_file
 from antennate.params.faults import describe, group_of
-from antennate.params.reading import Config, put_over, read_file
 
 
 class HelpRequest(Exception):

@@ -15,7 +15,7 @@ from statistics import fmean, pstdev
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.antenna.plateau import plateau_of
+from antennate.antenna.curves import plateau_of
 from antennate.cli.addresses import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
@@ -29,7 +29,7 @@ from antennate.hardware.esp32.recorder import Recorder
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import typed
-from antennate.params.record import RecordParams
+from antennate.params.bench import RecordParams
 
 DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you

@@ -14,9 +14,8 @@ from antennate.cli.results import ResultOptions, folder_for, tell
 from antennate.dxl.model import EXTENDED_MODE
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import Params
-from antennate.robots.parts import bill
+from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
 from antennate.robots.spec import RobotSpec
-from antennate.robots.supply import Rail, Supply, servos_of, supply
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View

@@ -17,8 +17,7 @@ from antennate.cli.progress import stop_signals
 from antennate.cli.results import log_of
 from antennate.cli.view_options import FoxgloveOptions, foxglove_of
 from antennate.errors import AntennateError, ConfigError
-from antennate.params.base import Params
-from antennate.params.reading import from_values
+from antennate.params.base import Params, from_values
 from antennate.sim.scenes.registry import SHIPPED
 from antennate.sim.trial import TrialConfig, draw_trial, scene_of
 from antennate.sim.world import World

@@ -25,9 +25,18 @@ from antennate.control.map_rule import MapRule
 from antennate.control.repetition import RepetitionDetector
 from antennate.control.search import SearchRule
 from antennate.params.control import ControlParams
-from antennate.robots.sides import LEFT, RIGHT
 from antennate.robots.spec import RobotSpec, require_antennae
-from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
+from antennate.types import (
+    LEFT,
+    RIGHT,
+    AntennaFrame,
+    Bools,
+    Contact,
+    Floats,
+    Ints,
+    JointCommand,
+    Maneuver,
+)
 
 
 class Rule(Protocol):

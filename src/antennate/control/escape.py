@@ -18,8 +18,7 @@ import numpy as np
 
 from antennate.control.knowledge import KNOWABLE, Knowledge, aligned, right_by, stuck_by
 from antennate.params.control import EscapeParams
-from antennate.robots.sides import LEFT, RIGHT
-from antennate.types import Bools, Floats, Ints, Maneuver
+from antennate.types import LEFT, RIGHT, Bools, Floats, Ints, Maneuver
 
 
 class Escape:

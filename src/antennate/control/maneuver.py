@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from antennate.params.control import RuleParams
-from antennate.robots.sides import LEFT, RIGHT
-from antennate.types import Bools, Contact, Floats, Ints, Maneuver
+from antennate.types import LEFT, RIGHT, Bools, Contact, Floats, Ints, Maneuver
 
 
 def decide(params: RuleParams, contact: Ints, level: Floats) -> Ints:

@@ -27,8 +27,7 @@ import numpy as np
 from antennate.control.knowledge import Kind, Knowledge, right_by, stuck_by
 from antennate.control.repetition import RepetitionDetector
 from antennate.params.control import ControlParams, SearchParams
-from antennate.robots.sides import LEFT, RIGHT
-from antennate.types import Bools, Floats, Ints, Maneuver
+from antennate.types import LEFT, RIGHT, Bools, Floats, Ints, Maneuver
 
 _FORWARD, _REVERSE = int(Maneuver.FORWARD), int(Maneuver.REVERSE)
 """As plain integers: comparing an array with an enum costs four times as much."""

@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from antennate.antenna.calibration import Calibration
+from antennate.control.readers import SIMULATION_ALONE
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.messages import shown
 from antennate.params.base import Params, number, paths_of
 from antennate.params.control import ConditioningParams, ControlParams
-from antennate.params.doctor import DoctorParams
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import DoctorParams, NetworkParams
 from antennate.params.safety import SupervisorParams
-from antennate.robots.readers import SIMULATION_ALONE
 from antennate.robots.spec import RobotSpec
 
 

@@ -9,9 +9,14 @@ from antennate.hardware.driving.teleop import TeleopConfig
 from antennate.hardware.esp32.recorder import RecordConfig
 from antennate.hardware.robot import DoctorConfig, RobotConfig
 from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
-from antennate.params.doctor import DoctorParams
-from antennate.params.record import RecordParams
-from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
+from antennate.params.bench import RecordParams
+from antennate.params.hardware import (
+    DoctorParams,
+    JogParams,
+    PortsParams,
+    SetupParams,
+    TeleopParams,
+)
 
 _Config = TypeVar("_Config", bound=RobotConfig)
 

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
+from antennate.robots.parts import Supply, servos_of, supply
 from antennate.robots.servos import ServoParams
-from antennate.robots.sides import SIDES
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
-from antennate.robots.supply import Supply, servos_of, supply
+from antennate.types import SIDES
 
 Place = tuple[float, float]
 

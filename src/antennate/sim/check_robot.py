@@ -9,7 +9,7 @@ import numpy as np
 
 from antennate.control.expect import expect
 from antennate.control.gait import targets
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco

@@ -8,7 +8,7 @@ import numpy as np
 
 from antennate.control.expect import expect
 from antennate.errors import AntennateError, raised
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco

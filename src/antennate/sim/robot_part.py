@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from antennate.robots.servos import ServoParams
-from antennate.robots.sides import SIDE_SIGN, SIDES
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.sim import antenna_part as antenna
 from antennate.sim import layers
 from antennate.sim.engine import mujoco
+from antennate.types import SIDE_SIGN, SIDES
 
 _YAW, _PITCH = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 

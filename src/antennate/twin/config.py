@@ -7,9 +7,8 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from antennate.params.base import Params, number, paths_of
-from antennate.params.control import GaitParams
-from antennate.params.gaits import LiftParams
-from antennate.params.twin import BatteryParams
+from antennate.params.gaits import GaitParams, LiftParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot

@@ -17,7 +17,7 @@ from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import SimulationError
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
-from antennate.params.twin import BatteryParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World

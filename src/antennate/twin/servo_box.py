@@ -12,8 +12,7 @@ from antennate.dxl.models import MODELS, servo_model
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import ConfigError
-from antennate.params.base import Params, number
-from antennate.params.reading import from_values, read_file
+from antennate.params.base import Params, from_values, number, read_file
 from antennate.twin.orders import Plugging, Pushes
 
 MIDDLE = 2048

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from antennate.dxl.driven import DrivenServo
 from antennate.dxl.model import BAUD_RATES
 from antennate.dxl.servo import Servo
-from antennate.params.twin import BatteryParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
 

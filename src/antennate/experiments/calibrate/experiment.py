@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antennate.antenna.curves import Plateau
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED
-from antennate.antenna.plateau import Plateau
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import told

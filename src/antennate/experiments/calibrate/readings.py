@@ -17,7 +17,7 @@ from antennate.antenna.curves import Samples
 from antennate.antenna.sensor import FULL_SCALE, divider, transfer_curve
 from antennate.errors import CalibrationError
 from antennate.params.base import meaning
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Bools, Floats, Ints
 
 READING_UNITS = {"counts": 1.0, "ohm": 1.0, "kohm": 1e3, "V": 1.0, "mV": 1e-3}

@@ -38,7 +38,7 @@ from antennate.experiments.calibrate.readings import (
     usual,
 )
 from antennate.files import read_limited
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Floats, Ints
 
 _MOST_SPEEDS = 12

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.antenna.taper import distance_decades
+from antennate.antenna.springs import distance_decades
 from antennate.experiments.reproduce.verdict import Bar, Finding, above, agrees, all_of, claim
 from antennate.studies.measures import shown
 

@@ -9,7 +9,7 @@ from typing import Any
 from antennate.experiments.servo import run as servo
 from antennate.experiments.servo.config import ServoConfig
 from antennate.experiments.servo.stalls import SEEN
-from antennate.robots.servo_model import NAMES
+from antennate.robots.servos import MODEL_NUMBERS
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 
@@ -49,7 +49,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         return compared, each, Table.of("Parameters", columns, PARAMETERS)
     for model in result["models"][-2:]:
         columns[model["name"]] = model
-        ends = {name: model["interval_95"].get(name) for name in NAMES}
+        ends = {name: model["interval_95"].get(name) for name in MODEL_NUMBERS}
         columns[f"{model['name']}, 95 %"] = ends
     note = f"Intervals are over {result['interval_over']}."
     return compared, each, Table.of("Parameters", columns, PARAMETERS, note)

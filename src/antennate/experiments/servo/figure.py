@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.servo.run import SHOWN, ServoOutcome
 from antennate.experiments.servo.stalls import stalled
-from antennate.robots.servo_model import STEP
+from antennate.robots.servos import STEP
 from antennate.types import Floats
 
 _MOST = 8

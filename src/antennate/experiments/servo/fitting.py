@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.jackknife import jackknife95
-from antennate.robots.servo_model import NAMES, STEP, Course, replay
+from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, replay
 from antennate.types import Bools, Floats, Ints
 
 EVERY = 5
@@ -23,7 +23,7 @@ MOST_STRETCHES = 30
 """Stretches of neighbouring pieces that are left out in turn where recordings are few."""
 _ROBUST = 0.05
 """Errors beyond this count in proportion, not by their square [rad]."""
-_LOG = np.array([name not in ("friction", "load_friction") for name in NAMES])
+_LOG = np.array([name not in ("friction", "load_friction") for name in MODEL_NUMBERS])
 _LOW = np.where(_LOG, np.log([10.0, 0.01, 0.5, 1e-6, 1.0, 1.0]), 0.0)
 _HIGH = np.where(_LOG, np.log([3000.0, 20.0, 200.0, 0.2, 1.0, 1.0]), (0, 0, 0, 0, 2.0, 0.95))
 _NUDGE = np.where(_LOG, 1e-3, (0, 0, 0, 0, 2e-4, 2e-3))
@@ -124,7 +124,7 @@ def _step(x: Floats, slope: Floats, bend: Floats, damping: Floats) -> Floats:
     moves = ~stays
     slope = np.where(moves, slope, 0.0)
     scale = np.einsum("bii->bi", bend)
-    eye = np.eye(len(NAMES))
+    eye = np.eye(len(MODEL_NUMBERS))
     bend = np.where(moves[:, :, None] & moves[:, None], bend, eye * scale[:, None])
     damped = bend + damping[:, None, None] * (eye * scale[:, None])
     return np.asarray(np.linalg.solve(damped, slope[..., None])[..., 0])
@@ -137,7 +137,7 @@ def _plain(x: Floats, start: Floats, free: Bools) -> Floats:
 
 def _normal(data: Data, x: Floats, free: Bools, weight: Floats) -> tuple[Floats, Floats, Floats]:
     """Cost (B,), its slope (B, 6) and its curvature after Gauss and Newton (B, 6, 6)."""
-    size = len(NAMES)
+    size = len(MODEL_NUMBERS)
     tried = x[:, None] + np.vstack([np.zeros(size), np.diag(_NUDGE)])
     values = np.where(_LOG, np.exp(np.where(_LOG, tried, 0.0)), tried).reshape(-1, size)
     found = replay(values, data.course, EVERY)

@@ -8,7 +8,7 @@ import numpy as np
 
 from antennate.experiments.servo.config import ServoConfig
 from antennate.experiments.servo.recording import Recording
-from antennate.robots.servo_model import NAMES, values_of
+from antennate.robots.servos import MODEL_NUMBERS, values_of
 from antennate.types import Bools, Floats
 
 _MANUAL = 128.0
@@ -35,7 +35,7 @@ class Model:
     @property
     def mask(self) -> Bools:
         """Which parameters are fitted, shape (6,)."""
-        return np.array([name in self.free for name in NAMES])
+        return np.array([name in self.free for name in MODEL_NUMBERS])
 
 
 Held = tuple[str, Bools]
@@ -84,7 +84,7 @@ def _start(config: ServoConfig, told: float | None, free: tuple[str, ...]) -> Fl
     known = {} if told is None else {"gain_divisor": told}
     none = {name: 0.0 for name in _FRICTION if name not in free}
     values = sheet | _START | known | none
-    return np.array([values[name] for name in NAMES])
+    return np.array([values[name] for name in MODEL_NUMBERS])
 
 
 def splits(recordings: list[Recording], parts: Bools) -> list[Held]:

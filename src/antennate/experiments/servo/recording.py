@@ -18,8 +18,7 @@ from antennate.experiments.servo.checks import FEWEST, GRAVITY, check_course
 from antennate.experiments.servo.fitting import Data
 from antennate.files import decoded, read_limited
 from antennate.messages import shown
-from antennate.robots.servo_model import STEP, Course
-from antennate.robots.servos import ServoParams
+from antennate.robots.servos import STEP, Course, ServoParams
 from antennate.types import Bools, Floats
 
 _LARGEST_FILE = 100_000_000

@@ -16,8 +16,8 @@ from antennate.experiments.servo.fitting import Data
 from antennate.experiments.servo.models import Held, Model, models, splits, told_divisor, with_told
 from antennate.experiments.servo.recording import Recording, data_of, read
 from antennate.experiments.servo.stalls import RecordingRow
-from antennate.robots import servo_model
-from antennate.robots.servo_model import NAMES
+from antennate.robots import servos
+from antennate.robots.servos import MODEL_NUMBERS
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.types import Bools, Floats
 
@@ -79,7 +79,7 @@ class ServoOutcome(Outcome):
                 {
                     "name": model.name,
                     "free": list(model.free),
-                    **dict(zip(NAMES, self.fitted[i].tolist(), strict=True)),
+                    **dict(zip(MODEL_NUMBERS, self.fitted[i].tolist(), strict=True)),
                     "error_deg": float(np.degrees(self.errors[i])),
                     "held_out_deg": dict(
                         zip(
@@ -90,7 +90,7 @@ class ServoOutcome(Outcome):
                     ),
                     "interval_95": {
                         name: self.interval[i, :, k].tolist()
-                        for k, name in enumerate(NAMES)
+                        for k, name in enumerate(MODEL_NUMBERS)
                         if name in model.free and np.isfinite(self.interval[i, :, k]).all()
                     },
                 }
@@ -105,7 +105,7 @@ class ServoOutcome(Outcome):
 
     def traces(self) -> Floats:
         """Positions that each model gives [rad], shape (T / 10, M, F)."""
-        return servo_model.replay(self.fitted, self.data.course, SHOWN)
+        return servos.replay(self.fitted, self.data.course, SHOWN)
 
 
 def _recording(each: Recording) -> dict[str, Any]:
@@ -152,7 +152,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         known = [recordings[i] for i in np.flatnonzero(part.any(axis=1))]
         told = told_divisor(known)
         fits.append(_fitted(data, [with_told(row, told) for row in rows], part))
-    interval = np.full((len(rows), 2, len(NAMES)), np.nan)
+    interval = np.full((len(rows), 2, len(MODEL_NUMBERS)), np.nan)
     if config.fit:
         on_step(len(seen), total)
         last = slice(-_JUDGED, None)
@@ -164,7 +164,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     ]
     every = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
-    last = servo_model.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
+    last = servos.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
     return ServoOutcome(
         *(config, recordings, data, rows, fits[0], every, held, held_errors, interval),
         by_recording=stalls.rows(recordings, data, last),

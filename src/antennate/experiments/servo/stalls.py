@@ -15,7 +15,7 @@ from antennate.dxl.model import FULL_DRIVE
 from antennate.experiments.servo.checks import GRAVITY
 from antennate.experiments.servo.fitting import EVERY, Data
 from antennate.experiments.servo.recording import Recording
-from antennate.robots.servo_model import STEP
+from antennate.robots.servos import STEP
 from antennate.types import Bools, Floats
 
 _FULL = 0.99

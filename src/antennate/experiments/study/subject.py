@@ -16,9 +16,8 @@ from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.rows import own_row
 from antennate.lookup import Registry
 from antennate.messages import shown
-from antennate.params.base import ALLOWED, Params
+from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
-from antennate.params.reading import put_over, with_bases
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from antennate.antenna.plateau import plateau_of
+from antennate.antenna.curves import plateau_of
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.doctor.board_survey import BoardSurvey

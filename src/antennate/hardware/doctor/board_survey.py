@@ -14,7 +14,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.decoder import Counters
 from antennate.hardware.esp32.wire import Hello
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 

@@ -11,8 +11,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.errors import OpenError
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.ports.holder import holders
-from antennate.params.doctor import DoctorParams
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import DoctorParams, NetworkParams
 
 _TIMERS = Path("/sys/bus/usb-serial/devices")
 _TERMINALS = Path("/dev/pts")

@@ -9,7 +9,7 @@ from antennate.dxl.answers import Timing, Value
 from antennate.dxl.bus import Bus
 from antennate.hardware.doctor.ports import latency_row
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.port import Port
 
 _PINGS = 5

@@ -7,15 +7,13 @@ from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
-from antennate.control.readers import unread_by_all
+from antennate.control.readers import UNDRIVEN, unread_by_all, unused
 from antennate.control.registry import BUILT_IN, check_for_robots
 from antennate.hardware.robot import RobotConfig
 from antennate.hardware.safety import deadlines
 from antennate.params.base import number
-from antennate.params.dead_man import DeadManParams
-from antennate.params.endurance import DriftParams
-from antennate.params.safety import TouchCheckParams
-from antennate.robots.readers import UNDRIVEN, unused
+from antennate.params.hardware import DeadManParams
+from antennate.params.safety import DriftParams, TouchCheckParams
 
 
 class DriveConfig(RobotConfig):

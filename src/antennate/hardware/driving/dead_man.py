@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from antennate.params.dead_man import DeadManParams
+from antennate.params.hardware import DeadManParams
 
 
 class DeadMan:

@@ -14,13 +14,11 @@ from typing import ClassVar
 import numpy as np
 
 from antennate.control.controllers import RuleController
-from antennate.control.readers import TELEOP, UNREAD
+from antennate.control.readers import TELEOP, UNDRIVEN, UNREAD
 from antennate.hardware.driving.config import DriveConfig
 from antennate.params.base import paths_of
 from antennate.params.control import ControlParams
-from antennate.params.dead_man import DeadManParams
-from antennate.params.setup import TeleopParams
-from antennate.robots.readers import UNDRIVEN
+from antennate.params.hardware import DeadManParams, TeleopParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 

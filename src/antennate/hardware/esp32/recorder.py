@@ -13,9 +13,8 @@ from antennate.errors import BadInputError
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.clock import Timed
 from antennate.messages import typed
-from antennate.params.doctor import DoctorParams
-from antennate.params.network import NetworkParams
-from antennate.params.record import RecordParams
+from antennate.params.bench import RecordParams
+from antennate.params.hardware import DoctorParams, NetworkParams
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 """Tells a person what to do; the function it returns says whether that has been confirmed."""

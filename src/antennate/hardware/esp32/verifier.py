@@ -10,7 +10,7 @@ import struct
 from dataclasses import dataclass
 
 from antennate.hardware.esp32 import datagram, frame
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 _COUNTS, _TAG = datagram.COUNTS_SIZE, datagram.TAG_SIZE
 _GREETING_SIZE = frame.HELLO_FRAME_SIZE + _COUNTS + _TAG

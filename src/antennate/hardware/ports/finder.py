@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import extra
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Line
 
 

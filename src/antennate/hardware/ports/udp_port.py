@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from antennate.errors import reason
 from antennate.hardware.esp32.verifier import Bucket, Verifier
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Port, PortError
 
 _LONGEST = 256

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from antennate.hardware.safety.diagnosis import Band
-from antennate.params.endurance import DriftParams
+from antennate.params.safety import DriftParams
 
 _LONGEST = 0.1
 """Longest time that one reading stands for [s]."""

@@ -13,8 +13,7 @@ from antennate.hardware.safety.diagnosis import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.drift import Drift
 from antennate.hardware.safety.touch_check import Ask, TouchCheck
 from antennate.params.control import ConditioningParams, CurveParams
-from antennate.params.endurance import DriftParams
-from antennate.params.safety import SupervisorParams, TouchCheckParams
+from antennate.params.safety import DriftParams, SupervisorParams, TouchCheckParams
 from antennate.types import Contact
 
 _SIDES = ("left", "right")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from antennate.control.readers import SIMULATION_ALONE
 from antennate.params.base import Params
-from antennate.params.setup import JogParams, SetupParams
-from antennate.robots.readers import SIMULATION_ALONE
+from antennate.params.hardware import JogParams, SetupParams
 from antennate.robots.spec import RobotSpec
 
 _UNREAD = (*SIMULATION_ALONE, "robot.release")

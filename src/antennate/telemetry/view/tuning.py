@@ -7,9 +7,8 @@ from typing import Any
 
 from antennate.control.readers import unread
 from antennate.control.retunable import Retunable
-from antennate.params.base import Params
+from antennate.params.base import Params, from_values
 from antennate.params.control import ControlParams
-from antennate.params.reading import from_values
 from antennate.types import Controller
 
 _PLACES = ("rule.threshold", "conditioning.averaging_time", "rule.hold_time")
