@@ -11,8 +11,8 @@ import pytest
 
 from antennate.cli import main
 from antennate.control.knowledge import Knowledge
+from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
-from antennate.control.retunable import Retunable
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig

@@ -26,7 +26,7 @@ from antennate.hardware.ports.keys import read_key
 from antennate.hardware.ports.udp_port import UdpPort
 from antennate.params.hardware import NetworkParams
 from antennate.port import Port, PortError
-from antennate.twin.udp import UdpEndpoint
+from antennate.twin.board import UdpEndpoint
 
 KEY = bytes(range(32))
 

@@ -22,8 +22,8 @@ from antennate.hardware.esp32.wire import Sample
 from antennate.hardware.safety.causes import State
 from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
+from antennate.twin.board import Converter
 from antennate.twin.config import TwinConfig, watched
-from antennate.twin.converter import Converter
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 

@@ -21,8 +21,8 @@ from antennate.params.bench import Solver
 from antennate.params.faults import Unread
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.antenna_part import STOPS
 from antennate.sim.bench import CARRIAGE_MASS, SLIDE_DAMPING, SLIDE_STIFFNESS, Ball, Bar
+from antennate.sim.parts import STOPS
 from antennate.sim.world import CONTACT_IMPEDANCE
 from antennate.types import Bools, Floats
 

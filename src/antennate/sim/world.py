@@ -15,16 +15,23 @@ import numpy as np
 from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim import layers, robot_part
-from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
-from antennate.sim.contacts import Contacts
 from antennate.sim.engine import mujoco
-from antennate.sim.engine_warnings import drop_if_asked
-from antennate.sim.gears import Gears
-from antennate.sim.outline import outline
-from antennate.sim.places import ROBOT_AND_OBSTACLE, Places
+from antennate.sim.engine_setup import drop_if_asked
+from antennate.sim.parts import FLOOR_BIT, OBSTACLE_BIT, axle_height, build_robot
+from antennate.sim.places import (
+    ANGLE_LIMIT,
+    DISTANCE_LIMIT,
+    HEIGHT_LIMIT,
+    ROBOT_AND_OBSTACLE,
+    SPEED_LIMIT,
+    Contacts,
+    Gears,
+    Places,
+    ServoDrives,
+    broken,
+)
 from antennate.sim.scenes.scene import SceneInstance, add_floor
-from antennate.sim.servo_drives import ServoDrives
+from antennate.sim.shapes import outline
 from antennate.types import Bools, Floats, Ints
 
 drop_if_asked()
@@ -67,8 +74,8 @@ def compile_world(
     else:
         scene.build(spec)
         _meet_robot(spec)
-    frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
-    spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
+    frame = spec.worldbody.add_frame(pos=[0, 0, axle_height(robot)])
+    spec.attach(build_robot(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     set_contacts(spec, physics)
     try:
@@ -89,8 +96,8 @@ def _meet_robot(spec: mujoco.MjSpec) -> None:
     for geom in spec.geoms:
         if geom.contype == geom.conaffinity == 1:
             is_floor = int(geom.type) == _PLANE
-            geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
-            geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
+            geom.contype = FLOOR_BIT if is_floor else OBSTACLE_BIT
+            geom.conaffinity = 0 if is_floor else OBSTACLE_BIT | FLOOR_BIT
 
 
 class World:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from antennate import checks
-from antennate.control.checked import CheckedController
 from antennate.control.knowledge import require_own_senses
-from antennate.control.loop import run_loop
+from antennate.control.loop import CheckedController, run_loop
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import ConfigError, ControllerError
 from antennate.params.base import from_values

@@ -22,9 +22,9 @@ from antennate.sim.trial import (
     scene_of,
 )
 from antennate.sim.world import World
+from antennate.twin.board import TouchStimulus
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servos import factory_new
-from antennate.twin.touch import TouchStimulus
 
 
 class TwinControlParams(Params):

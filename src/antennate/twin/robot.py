@@ -21,10 +21,9 @@ from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
-from antennate.twin.converter import Converter
+from antennate.twin.board import Converter, TouchStimulus
 from antennate.twin.orders import Plugging, Pushes
 from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
-from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
 
 GREETING_PERIOD = 1.0

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from antennate import checks
-from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.hardware.esp32.decoder import Counters, FrameDecoder
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
 from antennate.hardware.esp32.wire import Hello, Sample
+from antennate.notebook import from_columns
 from antennate.types import Bools, Floats, Ints
 
 _LARGEST = 1 << 30

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from antennate.control.loop import Retunable
 from antennate.control.readers import unread
-from antennate.control.retunable import Retunable
 from antennate.params.base import Params, from_values
 from antennate.params.control import ControlParams
 from antennate.types import Controller
