@@ -4,9 +4,9 @@
 # Warp reads the types of arguments as expressions.
 from __future__ import annotations
 
-from antennate.sim.warp.worlds import require_warp
+from importlib import import_module
 
-wp, _ = require_warp()
+wp = import_module("warp")  # `import warp` is this folder to type checkers
 
 
 @wp.kernel
