@@ -26,7 +26,7 @@ from antennate.cli.options import (
     require_text,
 )
 from antennate.errors import ConfigError
-from antennate.messages import shown
+from antennate.messages import command_words, shown
 from antennate.params.base import Config, Params, changes, put_over, read_file
 from antennate.params.faults import describe, group_of
 
@@ -92,7 +92,9 @@ def parse(
         if word in ("-h", "--help"):
             raise HelpRequest(short_page(page))
         if (name := word.partition("=")[0].replace("_", "-")) in unread:
-            raise ConfigError(f"{name}: expected a parameter that {command} reads, found this one")
+            raise ConfigError(
+                f"{name}: expected a parameter that {command_words(command)} reads, found this one"
+            )
         if word == "--help-all":
             raise HelpRequest(long_page(page))
     values = read_words(argv, [*others, *parameters])

@@ -1,4 +1,4 @@
-"""Figure of `antennate force`: force over flex, and how much of it one curve explains."""
+"""Figure of `bench force`: force over flex, and how much of it one curve explains."""
 
 from __future__ import annotations
 

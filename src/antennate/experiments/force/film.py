@@ -1,4 +1,4 @@
-"""Films of `antennate force`: the middle traverse of each profile past the post, in slow motion."""
+"""Films of `bench force`: the middle traverse of each profile past the post, in slow motion."""
 
 from __future__ import annotations
 

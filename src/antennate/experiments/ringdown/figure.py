@@ -1,4 +1,4 @@
-"""Figure of `antennate ringdown`: the swing, animals beside it, and a cone as a chain."""
+"""Figure of `antenna ringdown`: the swing, animals beside it, and a cone as a chain."""
 
 from __future__ import annotations
 

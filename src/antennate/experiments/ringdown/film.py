@@ -1,4 +1,4 @@
-"""Film of `antennate ringdown`: the antenna after it is let go, in slow motion."""
+"""Film of `antenna ringdown`: the antenna after it is let go, in slow motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of `antennate sensor`: curve and loop, a held bend, and the choice of the divider."""
+"""Figure of `antenna sensor`: curve and loop, a held bend, and the choice of the divider."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of `antennate springs`: torque over angle, and stiffness over coils of sets to wind."""
+"""Figure of `antenna springs`: torque over angle, and stiffness over coils of sets to wind."""
 
 from __future__ import annotations
 

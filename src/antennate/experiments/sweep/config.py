@@ -1,4 +1,4 @@
-"""Everything that decides the outcome of `antennate sweep`."""
+"""Everything that decides the outcome of `bench sweep`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from antennate.sim.chain import require_read
 
 
 class SweepConfig(Params):
-    """Everything that decides the outcome of `antennate sweep`."""
+    """Everything that decides the outcome of `bench sweep`."""
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_angle",

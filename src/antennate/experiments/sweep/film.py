@@ -1,4 +1,4 @@
-"""Films of `antennate sweep`: each profile in the middle cell of the map, its base at rest."""
+"""Films of `bench sweep`: each profile in the middle cell of the map, its base at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of `antennate taper`: stiffness along the animal and along the robot."""
+"""Figure of `antenna taper`: stiffness along the animal and along the robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that decides the outcome of `antennate touch`."""
+"""Everything that decides the outcome of `bench touch`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def site(antenna: AntennaSpec, overlap: float, length: float, phase: float) -> S
 
 
 class TouchConfig(Params):
-    """Everything that decides the outcome of `antennate touch`."""
+    """Everything that decides the outcome of `bench touch`."""
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_spacing",

@@ -1,4 +1,4 @@
-"""Films of `antennate touch`: one traverse of each profile along one wall, run once more."""
+"""Films of `bench touch`: one traverse of each profile along one wall, run once more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of `antennate wall`: outcomes of each profile, sticks, and how tips advance."""
+"""Figures of `bench wall`: outcomes of each profile, sticks, and how tips advance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Films of `antennate wall`: one trial of each profile, run once more."""
+"""Films of `bench wall`: one trial of each profile, run once more."""
 
 from __future__ import annotations
 
