@@ -21,7 +21,7 @@ from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.trial import MEMBERS, Judge, make_world, place_at_start, require_room
 from antennate.sim.world import World, compile_world
-from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver, joint_angles
 
 __all__ = ["check_controller", "check_robot", "check_scene"]
 
@@ -242,7 +242,7 @@ def check_robot(robot: RobotSpec) -> None:
         f"{mass} kg",
     )
     start = targets(GaitParams(amplitude=0.0), robot, np.zeros(1), np.zeros(1), lifting=False)
-    rest = np.concatenate([getattr(start, name).ravel() for name in robot.command_shapes()])
+    rest = joint_angles(start, robot.command_shapes())[0]
     world.place(0.0, 0.0, 0.0, start.yaw[0], start.leg[0])
     _hold(world, rest, _REST)
     _expect(world.head[2] > 0.0, "it to stand", f"its head {world.head[2]} m high")

@@ -83,7 +83,9 @@ def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
 def level_and_fraction(params: CurveParams | Curves, counts: Floats) -> tuple[Floats, Floats]:
     """`bending_level`, and flex as a fraction of the calibrated range: 0 straight, 1 fully bent."""
     x = _share(params, counts)
-    return _level(params, x), _fraction(params, x)
+    if isinstance(params, Curves):
+        return _level(params, x), np.where(params.polarity > 0, x, 1.0 - x)
+    return _level(params, x), x if params.polarity > 0 else 1.0 - x
 
 
 def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
@@ -93,12 +95,6 @@ def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
 
 def _level(params: CurveParams | Curves, x: Floats) -> Floats:
     return sigmoid(params.polarity * params.slope * (x - params.midpoint))
-
-
-def _fraction(params: CurveParams | Curves, x: Floats) -> Floats:
-    if isinstance(params, Curves):
-        return np.where(params.polarity > 0, x, 1.0 - x)
-    return x if params.polarity > 0 else 1.0 - x
 
 
 class RunningMean:

@@ -211,7 +211,9 @@ class Search:
         new = np.isnan(self._begun)
         self._begun = np.where(new, t, self._begun)
         self._felt = np.where(walking & ~pressed & ~new, self._felt, t)
-        self._lean += np.where(known & (self.maneuver == _REVERSE), lean, 0.0)
+        backing = known & (self.maneuver == _REVERSE)
+        if np.count_nonzero(backing):
+            self._lean += np.where(backing, lean, 0.0)
         over = known & ~walking & (t >= self._until)
         if np.count_nonzero(over):
             self._go_on(over, t)
@@ -231,9 +233,10 @@ class Search:
 
     def _pause(self, known: Bools, t: Floats) -> None:
         """Move the times of rows that hold by the time for which they have held."""
-        held = np.where(known | np.isnan(self._last), 0.0, t - self._last)
-        self._begun += held
-        self._until += held
+        if np.count_nonzero(known) < len(known):
+            held = np.where(known | np.isnan(self._last), 0.0, t - self._last)
+            self._begun += held
+            self._until += held
         self._last = t.copy()
 
     def _go_on(self, over: Bools, t: Floats) -> None:

@@ -18,7 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT
 from antennate.sim.world import World
-from antennate.types import AntennaFrame, Floats, Ints, JointCommand
+from antennate.types import AntennaFrame, Floats, Ints, JointCommand, joint_angles
 
 _STATE = int(
     mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
@@ -278,8 +278,7 @@ class SimRobot:
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
-        parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
-        drive = np.concatenate(parts, axis=1)
+        drive = joint_angles(command, self._parts, self._batch)
         drive[:, : self._yaws] += self._bias
         finite = bool(np.isfinite(drive).all())
         for i, row in self._rows.items():
@@ -310,7 +309,9 @@ class SimRobot:
             for i, row in rows if self._ticks % 2 else reversed(rows):
                 if row.commanded and i not in self._failures:
                     if not row.tick % row.chance.slip_ticks:
-                        self._slip(row)
+                        friction = row.chance.leg_friction(row.tick)
+                        if friction is not None:
+                            row.world.set_leg_friction(friction)
                     row.tick += 1
                     try:
                         row.world.advance(self._substeps)
@@ -318,12 +319,6 @@ class SimRobot:
                         self._fail(i, error)
                     else:
                         self._moved.add(i)
-
-    def _slip(self, row: _Row) -> None:
-        """Draw new friction of all legs."""
-        friction = row.chance.leg_friction(row.tick)
-        if friction is not None:
-            row.world.set_leg_friction(friction)
 
     def _look(self) -> None:
         """Take the states of all rows, and find those whose last advance failed."""

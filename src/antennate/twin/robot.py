@@ -108,7 +108,6 @@ class TwinRobot:
         self.battery = Battery(battery or BatteryParams())
         self.servos = list(servos or servos_of(robot))
         self.bus = ServoBus(self.servos, robot.baud)
-        self._zero: Floats = np.array(robot.zeros, float)
         self._pushes = Pushes(pushes, robot.joint_names, self._ticks_at)
         self.plugging = Plugging(self.servos, self._pushes)
         self._visit, self._touched = Visit(), False
@@ -250,7 +249,7 @@ class TwinRobot:
 
     def _ticks_at(self, place: int, angle: float) -> float:
         """Where a shaft is at an angle of its joint [ticks]."""
-        return float(self._zero[place] + self._sign[place] * angle / POSITION_UNIT)
+        return float(self._joints.positions(np.full(len(self.servos), angle))[place])
 
     def _push(self) -> None:
         """Turn shafts that are pushed; before the physics begins the joints follow at once."""
@@ -259,8 +258,7 @@ class TwinRobot:
             self.servos[place].push(ticks)
         if moved and self._standing:
             ticks = np.array([servo.motion.shaft.position for servo in self.servos])
-            angles = (ticks - self._zero) * self._sign * POSITION_UNIT
-            self._body.world(0).place_drives(angles)
+            self._body.world(0).place_drives(self._joints.angles(ticks))
 
     def _carry_back(self) -> None:
         """To where the trial began, as a person does between two drives."""

@@ -21,7 +21,7 @@ from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.warp.worlds import Limits, RobotWorlds
 from antennate.sim.world import World
-from antennate.types import AntennaFrame, Floats, JointCommand
+from antennate.types import AntennaFrame, Floats, JointCommand, joint_angles
 
 _PARKING = -60.0
 """Cylinders that a tunnel has too few of stand behind this x, away from everything [m]."""
@@ -289,8 +289,7 @@ class WarpRobot:
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
-        parts = [getattr(command, name).reshape(self._batch, -1) for name in self._parts]
-        drive = np.concatenate(parts, axis=1)
+        drive = joint_angles(command, self._parts, self._batch)
         for i, row in self._rows.items():
             if i not in self._failures:
                 drive[i, : self._yaws] += row.chance.joint_bias

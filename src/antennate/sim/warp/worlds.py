@@ -245,16 +245,17 @@ def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
 def _values(model: mujoco.MjModel) -> dict[str, Any]:
     """All numbers of a model by name, but those that Warp does not read: for rays and muscles."""
     owners = (("", model), ("opt.", model.opt))
-    named = ((head + n, getattr(owner, n)) for head, owner in owners for n in _names(owner))
+    named = (
+        (head + n, getattr(owner, n))
+        for head, owner in owners
+        for n in dir(owner)
+        if not n.startswith("_")
+    )
     return {
         n: value
         for n, value in named
         if isinstance(value, int | float | np.ndarray) and not n.startswith(_UNREAD)
     }
-
-
-def _names(owner: Any) -> list[str]:
-    return [name for name in dir(owner) if not name.startswith("_")]
 
 
 def same(one: Any, other: Any) -> bool:
