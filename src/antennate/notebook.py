@@ -36,9 +36,9 @@ def from_rows(rows: Iterable[Any]) -> Any:
     Raises:
         MissingPackageError: pandas is not installed.
     """
-    held = [row if isinstance(row, Mapping) else asdict(row) for row in rows]
-    names = held[0] if held else ()
-    return from_columns({name: [row[name] for row in held] for name in names})
+    mappings = [row if isinstance(row, Mapping) else asdict(row) for row in rows]
+    names = mappings[0] if mappings else ()
+    return from_columns({name: [row[name] for row in mappings] for name in names})
 
 
 if TYPE_CHECKING:

@@ -119,11 +119,11 @@ class _Runs:
         batch, period = len(rows), self._control.period
         offsets = 0.37 * np.array(rows, float)
         try:
-            made = make_controller(self._factory, self._control, self._robot, batch)
-            checked = CheckedController(made, self._robot, batch)
+            controller = make_controller(self._factory, self._control, self._robot, batch)
+            checked = CheckedController(controller, self._robot, batch)
             checked.reset(np.arange(batch), offsets)
             commands: list[JointCommand] = []
-            kept: list[list[Floats]] = []
+            copies_of: list[list[Floats]] = []
             names = ("maneuver", "contact", "level")
             decisions: dict[str, list[Floats]] = {name: [] for name in names}
             for tick, reading in enumerate(counts[first:], first):
@@ -131,14 +131,14 @@ class _Runs:
                     checked.reset(np.array([reset]), offsets[[reset]])
                 t = offsets + period * tick
                 commands.append(_step(checked, t, reading))
-                kept.append([getattr(commands[-1], part).copy() for part in self._parts])
+                copies_of.append([getattr(commands[-1], part).copy() for part in self._parts])
                 for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
                 for name, values in decisions.items():
-                    values.append(np.array(getattr(made, name), float))
+                    values.append(np.array(getattr(controller, name), float))
         except AntennateError as error:
             raise AssertionError(f"{error} (with {batch} rows)") from error
-        for tick, (command, copies) in enumerate(zip(commands, kept, strict=True)):
+        for tick, (command, copies) in enumerate(zip(commands, copies_of, strict=True)):
             if spoil:
                 break
             for part, copy in zip(self._parts, copies, strict=True):
@@ -147,10 +147,10 @@ class _Runs:
                     "a command that stays as it was returned",
                     f"another {part} in that of tick {tick} later",
                 )
-        arrays = {part: np.array([c[i] for c in kept]) for i, part in enumerate(self._parts)}
-        found = _Trace(arrays, {name: np.array(values) for name, values in decisions.items()})
-        _check_values(found)
-        return found
+        arrays = {part: np.array([c[i] for c in copies_of]) for i, part in enumerate(self._parts)}
+        trace = _Trace(arrays, {name: np.array(values) for name, values in decisions.items()})
+        _check_values(trace)
+        return trace
 
 
 def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointCommand:
@@ -163,8 +163,8 @@ def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointComman
     return command
 
 
-def _check_values(found: _Trace) -> None:
-    contact, level = found.decisions["contact"], found.decisions["level"]
+def _check_values(trace: _Trace) -> None:
+    contact, level = trace.decisions["contact"], trace.decisions["level"]
     known = np.isin(contact, [int(state) for state in Contact])
     _expect(bool(known.all()), "contacts of 0 to 2", f"{contact[~known][:1]}")
     wrong = (level < 0.0) | (level > 1.0)
@@ -189,15 +189,15 @@ def _check_blind(run: _Runs, together: _Trace) -> None:
         for bad in (math.nan, math.inf):
             counts = run.counts.copy()
             counts[blind, 2, side] = bad
-            found = run.trace(counts, rows)
+            trace = run.trace(counts, rows)
             others = [row for row in rows if row != 2]
             what = f"the other rows to go on when one reads {bad}"
-            found.expect_same(what, together, others, others)
-            held = found.decisions["maneuver"][blind, 2] == int(Maneuver.HOLD)
-            unknown = found.decisions["contact"][blind, 2, side] == int(Contact.UNKNOWN)
+            trace.expect_same(what, together, others, others)
+            held = trace.decisions["maneuver"][blind, 2] == int(Maneuver.HOLD)
+            unknown = trace.decisions["contact"][blind, 2, side] == int(Contact.UNKNOWN)
             _expect(held.all(), f"HOLD while an antenna reads {bad}", "another maneuver")
             _expect(unknown.all(), f"UNKNOWN for a reading of {bad}", "another contact")
-            for part, values in found.commands.items():
+            for part, values in trace.commands.items():
                 still = (values[blind, 2] == values[_BLIND_FROM - 1, 2]).all()
                 _expect(still, "joint targets that stand still in HOLD", f"{part} moves")
 

@@ -74,8 +74,8 @@ def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
     def error(p: Floats) -> Floats:
         return curve(z, float(np.exp(p[0])), float(p[1])) - level
 
-    found = least_squares(error, start, bounds=np.transpose(BOUNDS)).x
-    return float(np.exp(found[0])), sign * float(found[1])
+    fitted = least_squares(error, start, bounds=np.transpose(BOUNDS)).x
+    return float(np.exp(fitted[0])), sign * float(fitted[1])
 
 
 def _sorted(by: Floats, other: Floats) -> tuple[Floats, Floats]:
@@ -166,11 +166,11 @@ def left_out(
     low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
     x, level, sign = (samples.counts - low) / (high - low), samples.level, polarity(samples)
     for group in range(min(MOST_GROUPS, len(numbers))):
-        held = numbers[group::MOST_GROUPS]
-        rest = rows[~np.isin(number[rows], held)]
+        group_numbers = numbers[group::MOST_GROUPS]
+        rest = rows[~np.isin(number[rows], group_numbers)]
         if len(rest) < FEWEST:
             continue
-        parts = [rows[number[rows] == one] for one in held]
+        parts = [rows[number[rows] == one] for one in group_numbers]
         at = np.concatenate(parts)
         cuts = np.cumsum([len(part) for part in parts])[:-1]
         for model in MODELS:

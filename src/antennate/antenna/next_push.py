@@ -224,16 +224,16 @@ RECORDED = "as recorded"
 """Name of the first check of a rival."""
 
 
-def assess(samples: Samples, found: Calibration, t: Floats | None = None) -> Assessment:
+def assess(samples: Samples, calibration: Calibration, t: Floats | None = None) -> Assessment:
     """Ask what a calibration is worth beyond its own pushes.
 
     Args:
         samples: The readings that it was fitted to, those of a trial in the order of time.
-        found: The calibration.
+        calibration: The calibration.
         t: Times of the readings [s], shape (n,); None if they are not known.
     """
     pushes = Pushes.of(samples)
-    full_scale = (found.counts_low, found.counts_high) == (0.0, float(FULL_SCALE))
+    full_scale = (calibration.counts_low, calibration.counts_high) == (0.0, float(FULL_SCALE))
     whole = np.ones(len(samples.counts), dtype=bool)
 
     def check(of: Samples, used: Bools) -> dict[str, list[Floats]]:
@@ -246,19 +246,21 @@ def assess(samples: Samples, found: Calibration, t: Floats | None = None) -> Ass
         if (pushes.way > 0).any() and (pushes.way < 0).any():
             for name, sign in (("loading alone", 1), ("unloading alone", -1)):
                 checks[name] = check(samples, pushes.way == sign)
-    kept = {name: errors for name, errors in checks.items() if len(errors["sigmoid"]) > 1}
+    repeated = {name: errors for name, errors in checks.items() if len(errors["sigmoid"]) > 1}
     rivals = {
-        rival: {name: gain_of(errors, rival) for name, errors in kept.items()}
+        rival: {name: gain_of(errors, rival) for name, errors in repeated.items()}
         for rival in MODELS[1:]
     }
     named = tuple(r for r, gains in rivals.items() if gains and all(g.wins for g in gains.values()))
     return Assessment(
         pushes.count,
-        hysteresis(samples, pushes, found),
+        hysteresis(samples, pushes, calibration),
         _new_push(checks[RECORDED]["sigmoid"]),
         rivals,
         named,
-        None if t is None else relaxation(samples, t, found.counts_high - found.counts_low),
+        None
+        if t is None
+        else relaxation(samples, t, calibration.counts_high - calibration.counts_low),
     )
 
 
@@ -294,8 +296,8 @@ def branches(samples: Samples, pushes: Pushes) -> tuple[Floats, Floats, Floats]:
     grid = np.linspace(samples.level.min(), samples.level.max(), _GRID)
     pairs = []
     for number in np.unique(pushes.number):
-        here = pushes.number == number
-        both = [_branch(samples, here & (pushes.way == sign), grid) for sign in (1, -1)]
+        rows = pushes.number == number
+        both = [_branch(samples, rows & (pushes.way == sign), grid) for sign in (1, -1)]
         if np.isfinite(both[0] + both[1]).any():
             pairs.append(both)
     loaded, released = np.array(pairs).reshape(-1, 2, _GRID).swapaxes(0, 1)
@@ -310,27 +312,27 @@ def _branch(samples: Samples, rows: Bools, grid: Floats) -> Floats:
     edges = np.linspace(grid[0], grid[-1], _SLICES + 1)
     place = np.clip(np.digitize(level, edges) - 1, 0, _SLICES - 1)
     size = np.bincount(place, minlength=_SLICES)
-    kept = size > 0
-    middle = np.bincount(place, level, _SLICES)[kept] / size[kept]
-    mean = np.bincount(place, counts, _SLICES)[kept] / size[kept]
+    filled = size > 0
+    middle = np.bincount(place, level, _SLICES)[filled] / size[filled]
+    mean = np.bincount(place, counts, _SLICES)[filled] / size[filled]
     return np.interp(grid, middle, mean, left=np.nan, right=np.nan)
 
 
-def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteresis | None:
+def hysteresis(samples: Samples, pushes: Pushes, calibration: Calibration) -> Hysteresis | None:
     """The gap between loading and unloading; None if no push has both."""
     grid, loaded, released = branches(samples, pushes)
     usual = np.isfinite(loaded - released).sum(axis=0) >= max(1, len(loaded) / 2)
     if not usual.any():
         return None
     up, down = loaded[:, usual], released[:, usual]
-    span = found.counts_high - found.counts_low
+    span = calibration.counts_high - calibration.counts_low
     gap = np.nanmean(up - down, axis=0) / span
-    levels = np.nanmean(found.level(up) - found.level(down), axis=0)
+    levels = np.nanmean(calibration.level(up) - calibration.level(down), axis=0)
     worst = int(np.argmax(abs(gap)))
-    each = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
-    mean, interval = float(np.mean(each)), None
-    if len(each) > 1:
-        half = student95(len(each) - 1) * float(np.std(each, ddof=1)) / len(each) ** 0.5
+    gaps = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
+    mean, interval = float(np.mean(gaps)), None
+    if len(gaps) > 1:
+        half = student95(len(gaps) - 1) * float(np.std(gaps, ddof=1)) / len(gaps) ** 0.5
         interval = (mean - half, mean + half)
     return Hysteresis(
         float(gap[worst]),
@@ -338,7 +340,7 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
         mean,
         interval,
         float(levels[np.argmax(abs(levels))]),
-        len(each),
+        len(gaps),
         (sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)),
     )
 

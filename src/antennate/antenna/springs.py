@@ -88,13 +88,13 @@ def _positive(name: str, value: Any, unit: str) -> float | Floats:
     """A finite number above 0, or an array of such."""
     if not isinstance(value, list | tuple) and np.ndim(value) == 0:
         return checks.real(name, value, unit, above=0.0)
-    found = checks.array(name, value, (), unit)
-    if (found <= 0.0).any():
+    numbers = checks.array(name, value, (), unit)
+    if (numbers <= 0.0).any():
         raise ConfigError(
             f"{name}: expected finite numbers above 0{f' [{unit}]' if unit else ''}, found "
-            f"{found[found <= 0.0][0]:g}"
+            f"{numbers[numbers <= 0.0][0]:g}"
         )
-    return found
+    return numbers
 
 
 def _stiffness(modulus: Any, wire: Any, coil: Any, coils: Any) -> Any:
@@ -210,14 +210,14 @@ def _reversals(course: Floats, least: float) -> int:
     """Turning points (n,) that the course leaves by more than `least`."""
     slope = np.sign(np.diff(course))
     turns = course[1:-1][slope[1:] * slope[:-1] <= 0.0].tolist()
-    found, way, end = 0, 0, float(course[0])
+    reversals, way, end = 0, 0, float(course[0])
     for value in [*turns, float(course[-1])]:
         if way * (value - end) > 0.0:
             end = value
         elif abs(value - end) > least:
-            found += way != 0
+            reversals += way != 0
             way, end = (1 if value > end else -1), value
-    return found
+    return reversals
 
 
 @dataclass(frozen=True, slots=True)

@@ -234,9 +234,9 @@ class Search:
     def _pause(self, known: Bools, t: Floats) -> None:
         """Move the times of rows that hold by the time for which they have held."""
         if np.count_nonzero(known) < len(known):
-            held = np.where(known | np.isnan(self._last), 0.0, t - self._last)
-            self._begun += held
-            self._until += held
+            pause = np.where(known | np.isnan(self._last), 0.0, t - self._last)
+            self._begun += pause
+            self._until += pause
         self._last = t.copy()
 
     def _go_on(self, over: Bools, t: Floats) -> None:

@@ -65,17 +65,17 @@ def unused(robot: RobotSpec) -> dict[str, str]:
     used = {f"robot.servos.{name}" for name in robot.servo_names}
     every = paths_of(ServosParams, "robot.servos")
     servos = (path for path in every if path.rpartition(".")[0] not in used)
-    found = dict.fromkeys(servos, "no joint of the robot has this servo")
+    reasons = dict.fromkeys(servos, "no joint of the robot has this servo")
     if robot.legs.kind == "rolling":
         lifting = ("robot.legs.limit", "robot.legs.reach")
-        found |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
+        reasons |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
     if robot.pitch.kind == "actuated":
-        found["robot.pitch.stiffness"] = "only pitch joints of the kind locked have it"
+        reasons["robot.pitch.stiffness"] = "only pitch joints of the kind locked have it"
     if not robot.antenna_count:
         bases = (f"robot.antennae.{name}" for name in BaseParams.model_fields if name != "kind")
         paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))
-        found |= dict.fromkeys(paths, "the robot has no antennae")
-    return found
+        reasons |= dict.fromkeys(paths, "the robot has no antennae")
+    return reasons
 
 
 TELEOP = "keys of teleop"
@@ -159,8 +159,8 @@ def unread_by_all(
     """Parameters that none of these controllers reads, as `control.rule.strong`, and why."""
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
     paths = set.intersection(*(unread(name, control, knows) for name in names))
-    found = {f"control.{path}": who for path in sorted(paths)}
-    return found | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
+    reasons = {f"control.{path}": who for path in sorted(paths)}
+    return reasons | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
 
 
 def unread_lift(robot: RobotSpec, gait: str) -> dict[str, str]:

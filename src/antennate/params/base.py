@@ -99,20 +99,20 @@ def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any]]:
         group: Any = config
         for part in groups:
             group = getattr(group, part)
-        if (found := getattr(group, name)) != type(group).model_fields[name].default:
-            yield path, found
+        if (value := getattr(group, name)) != type(group).model_fields[name].default:
+            yield path, value
 
 
 def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
     """Every parameter of a group that stands at a dotted path."""
-    found: list[str] = []
+    paths: list[str] = []
     for name, field in model.model_fields.items():
         kind, deeper = field.annotation, f"{path}.{name}".lstrip(".")
         if isinstance(kind, type) and issubclass(kind, Params):
-            found += paths_of(kind, deeper)
+            paths += paths_of(kind, deeper)
         else:
-            found.append(deeper)
-    return tuple(found)
+            paths.append(deeper)
+    return tuple(paths)
 
 
 def require_default(config: Params, why: str, *paths: str) -> None:
@@ -206,7 +206,7 @@ def _docstrings(model: type) -> dict[str, str]:
     They are read from the source when they are asked for: pydantic's `use_attribute_docstrings`
     reads it whenever a class is made, which took a fifth of the time of a refused command.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for kind in reversed(model.__mro__):
         if not issubclass(kind, BaseModel) or kind.__module__.startswith("pydantic"):
             continue
@@ -217,10 +217,10 @@ def _docstrings(model: type) -> dict[str, str]:
         for field, text in pairwise(body.body if isinstance(body, ast.ClassDef) else ()):
             match field, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(ast.Constant(str(words))):
-                    found[name] = inspect.cleandoc(words)
+                    texts[name] = inspect.cleandoc(words)
                 case _:
                     pass
-    return found
+    return texts
 
 
 LARGEST_FILE = 1_000_000

@@ -153,15 +153,15 @@ def bill(robot: RobotSpec) -> list[Part]:
 
 
 def _servos(robot: RobotSpec) -> list[Part]:
-    found: Counter[tuple[ServoModel, str]] = Counter()
+    counts: Counter[tuple[ServoModel, str]] = Counter()
     names = [name for name, _, count in robot.groups for _ in range(count)]
     for servo, name in zip(servos_of(robot), names, strict=True):
-        found[servo.servo, name] += 1
+        counts[servo.servo, name] += 1
     cables = len(robot.ids) + 1
     return [
         *(
             Part(count, f"DYNAMIXEL {model.name}", name, _rating(model.rating))
-            for (model, name), count in found.items()
+            for (model, name), count in counts.items()
         ),
         Part(cables, "cable with three wires, JST EHR-03 at both ends", "servo bus", f"{PLUG:g} A"),
     ]

@@ -215,7 +215,7 @@ def replay(values: Floats, course: Course, every: int = 1) -> Floats:
     braking = stall / fastest
     faded = np.exp(-STEP * braking / inertia)  # share of a speed that braking leaves after a step
     braked = (1.0 - faded) / braking  # speed that a torque adds in a step
-    found = np.empty((-(-len(course.goal) // every), *gain.shape))
+    positions = np.empty((-(-len(course.goal) // every), *gain.shape))
     begins = course.begins
     ever = np.flatnonzero(begins.any(axis=1)).tolist()
     q = w = np.zeros(gain.shape)
@@ -224,7 +224,7 @@ def replay(values: Floats, course: Course, every: int = 1) -> Floats:
             q = np.where(begins[i], course.position[i], q)
             w = np.where(begins[i], course.speed[i], w)
         if i % every == 0:
-            found[i // every] = q
+            positions[i // every] = q
         on = course.torque[i]
         driven = stall * course.supply[i] * np.clip(gain * (goal - q), -1.0, 1.0) * on
         q = q + 0.5 * STEP * w
@@ -234,4 +234,4 @@ def replay(values: Floats, course: Course, every: int = 1) -> Floats:
         # what friction leaves; it stops a shaft, and does not turn it back
         w = np.copysign(np.maximum(abs(free) - added * grip, 0.0), free)
         q = q + 0.5 * STEP * w
-    return found
+    return positions

@@ -216,11 +216,11 @@ class RobotSpec(Params):
     @property
     def ids(self) -> tuple[int, ...]:
         """Servo ids of all joints."""
-        found: list[int] = []
+        ids: list[int] = []
         for _, group, count in self.groups:
-            first = len(found) + 1
-            found += group.ids or range(first, first + count)
-        return tuple(found)
+            first = len(ids) + 1
+            ids += group.ids or range(first, first + count)
+        return tuple(ids)
 
     @property
     def directions(self) -> tuple[int, ...]:

@@ -106,9 +106,9 @@ def keep_wish() -> None:
     nothing is drawn. If it says nothing, the engine loads GLFW, which starts a process. Processes
     of workers inherit the setting.
     """
-    said = os.environ.get(_NAME, "")
-    if said != _OFF:
-        _wish[0] = said
+    setting = os.environ.get(_NAME, "")
+    if setting != _OFF:
+        _wish[0] = setting
     os.environ[_NAME] = _OFF
 
 
@@ -125,17 +125,17 @@ def backend() -> str:
         raise MissingPackageError(
             f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"
         )
-    said = os.environ.get(_NAME, "")
-    wanted = (_wish[0] if said == _OFF else said).strip().lower()
+    setting = os.environ.get(_NAME, "")
+    wanted = (_wish[0] if setting == _OFF else setting).strip().lower()
     if wanted and wanted not in BACKENDS:
         raise BadInputError(f"{_NAME}: expected {' or '.join(BACKENDS)}, found {shown(wanted)}")
     names = [wanted] if wanted in BACKENDS else list(BACKENDS)
-    found = {}
+    troubles = {}
     for name in names:
-        found[name] = _trouble(name)
-        if not found[name]:
+        troubles[name] = _trouble(name)
+        if not troubles[name]:
             return name
-    reasons = ", ".join(f"{name} ({why})" for name, why in found.items())
+    reasons = ", ".join(f"{name} ({why})" for name, why in troubles.items())
     cures = " or ".join(f"`apt-get install {BACKENDS[name]}`" for name in names)
     raise BadInputError(
         f"video: expected EGL or OSMesa to draw without a display, found none that works: "

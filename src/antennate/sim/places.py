@@ -177,8 +177,8 @@ class Contacts(NamedTuple):
     @classmethod
     def of(cls, data: mujoco.MjData) -> Contacts:
         """Those of a state."""
-        found: Any = data.contact
-        parts = found.geom, found.efc_address, found.pos, found.frame, data.efc_force
+        contact: Any = data.contact
+        parts = contact.geom, contact.efc_address, contact.pos, contact.frame, data.efc_force
         return cls(*(part.copy() for part in parts))
 
     @classmethod
@@ -249,4 +249,4 @@ def broken(head: Floats, bounded: Floats, speeds: Floats) -> str:
         (speed < SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
         (0.0 < height < HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),
     )
-    return next((found for sound, found in checks if not sound), "")
+    return next((trouble for sound, trouble in checks if not sound), "")

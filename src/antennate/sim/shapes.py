@@ -39,8 +39,8 @@ def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.f
         model: The compiled model; geoms that it paints itself keep their colours.
         sides: Colours of the left and the right antenna.
     """
-    found = model.geom_rgba.copy()
-    bare = (found == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
+    painted = model.geom_rgba.copy()
+    bare = (painted == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
     kind = model.geom_contype
     for bit, colour in (
         (FLOOR_BIT, FLOOR),
@@ -49,10 +49,10 @@ def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.f
         (LEG_BIT, _LEG),
         (ANTENNA_BIT, sides[0]),
     ):
-        found[bare & (kind == bit)] = colour
+        painted[bare & (kind == bit)] = colour
     right = [ANTENNA_PREFIXES[1] in model.geom(i).name for i in range(model.ngeom)]
-    found[bare & (kind == ANTENNA_BIT) & np.array(right)] = sides[1]
-    return found
+    painted[bare & (kind == ANTENNA_BIT) & np.array(right)] = sides[1]
+    return painted
 
 
 _SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
@@ -226,15 +226,15 @@ def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows] | Non
         t, geoms, count, rows = _SNAPSHOT.unpack_from(content)
         if geoms != len(shapes.sides):
             return None
-        found, at = list[NDArray[Any]](), _SNAPSHOT.size
+        arrays, at = list[NDArray[Any]](), _SNAPSHOT.size
         for kind, *shape in (
             *((float, geoms, 3), (float, geoms, 9)),
             *((np.int32, count, 2), (np.int32, count), (float, count, 3), (float, count, 9)),
             (float, rows),
         ):
-            found.append(np.ndarray(shape, kind, content, at))
-            at += found[-1].nbytes
-        places, turned, *parts = found
+            arrays.append(np.ndarray(shape, kind, content, at))
+            at += arrays[-1].nbytes
+        places, turned, *parts = arrays
         contacts = Contacts._make(parts)
         poses = np.empty((len(shapes.geom), 12), np.float32)
         poses[:, :3], poses[:, 3:] = places[shapes.geom], turned[shapes.geom]
@@ -302,10 +302,10 @@ class VisibleModel:
 
     def poses(self, data: mujoco.MjData) -> Poses:
         """Where the shapes are."""
-        found = np.empty((len(self._shown), 12), np.float32)
-        found[:, :3] = data.geom_xpos[self._shown]
-        found[:, 3:] = data.geom_xmat[self._shown]
-        return found
+        poses = np.empty((len(self._shown), 12), np.float32)
+        poses[:, :3] = data.geom_xpos[self._shown]
+        poses[:, 3:] = data.geom_xmat[self._shown]
+        return poses
 
     def move(self, data: mujoco.MjData, body: int, x: float, y: float) -> bool:
         """Put a body that can be dragged to x, y [m], at rest; False if it is none.

@@ -91,17 +91,17 @@ class States:
 
     def look(self) -> list[int]:
         """Copy all states; rows that may be unsound, or whose time has not gone on since."""
-        before, found = self._all[:, 0].copy(), list[int]()
+        before, suspects = self._all[:, 0].copy(), list[int]()
         for row, (_, model, data, copy, warnings, no_warning) in self._rows.items():
             mujoco.mj_getState(model, data, copy, _STATE)
             if warnings.tobytes() != no_warning:
-                found.append(row)
+                suspects.append(row)
         with np.errstate(invalid="ignore", over="ignore"):
             shares = self._all * self._scale
             sound = np.einsum("ij,ij->i", shares, shares) < 1.0  # none is beyond their norm
         sound &= self._all.take(self._heights) > 0.0
         sound &= self._all[:, 0] > before
-        return found if sound.all() else [*found, *np.flatnonzero(~sound).tolist()]
+        return suspects if sound.all() else [*suspects, *np.flatnonzero(~sound).tolist()]
 
     @property
     def times(self) -> Floats:

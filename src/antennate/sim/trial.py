@@ -289,14 +289,14 @@ def _answer(
     scene: SceneInstance, name: str, head: Floats, wanted: str, fits: Callable[[Any], bool]
 ) -> Any:
     try:
-        found = getattr(scene, name)(head.copy())
+        answer = getattr(scene, name)(head.copy())
     except Exception as error:
         raise SceneError(f"scene: {name} raised {raised(error)}") from error
-    if not fits(found):
+    if not fits(answer):
         raise SceneError(
-            f"scene: expected {name} to return {wanted}, found {shortened(repr(found))}"
+            f"scene: expected {name} to return {wanted}, found {shortened(repr(answer))}"
         )
-    return found
+    return answer
 
 
 def _is_finite(value: Any) -> bool:

@@ -146,9 +146,9 @@ class World:
     def state(self) -> Floats:
         """All that the physics goes on from, for `restore`."""
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
-        found = np.empty(mujoco.mj_stateSize(self.model, kind))
-        mujoco.mj_getState(self.model, self.data, found, kind)
-        return found
+        state = np.empty(mujoco.mj_stateSize(self.model, kind))
+        mujoco.mj_getState(self.model, self.data, state, kind)
+        return state
 
     def place_all(self, position: Floats) -> None:
         """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
@@ -205,8 +205,8 @@ class World:
         Returns:
             These, shape (n, 3, drives), and all coordinates [m, rad], shape (n, nq).
         """
-        found = np.frombuffer(b"".join(snapshots)).reshape(len(snapshots), -1)
-        angles, speeds, torques = np.split(found, np.cumsum([self.model.nq, self.model.nv]), axis=1)
+        rows = np.frombuffer(b"".join(snapshots)).reshape(len(snapshots), -1)
+        angles, speeds, torques = np.split(rows, np.cumsum([self.model.nq, self.model.nv]), axis=1)
         places = self.places
         parts = angles[:, places.driven], speeds[:, places.turning], torques[:, places.drives]
         return np.stack(parts, axis=1), angles
@@ -299,14 +299,14 @@ class World:
             Number, part of the robot, place [m], shape (contacts, 3), and normal force [N],
             shape (contacts,), of each contact.
         """
-        found = contacts or Contacts.of(self.data)
-        which, force = found.between(self.places.kinds, ROBOT_AND_OBSTACLE)
+        contacts_then = contacts or Contacts.of(self.data)
+        which, force = contacts_then.between(self.places.kinds, ROBOT_AND_OBSTACLE)
         if not len(which):
             return which, [], np.zeros((0, 3)), force
-        first, second = found.geoms[which].T
-        ours = np.where(self.places.own[first], first, second)
-        names = [self.places.parts[geom] for geom in ours.tolist()]
-        return which, names, found.place[which], force
+        first, second = contacts_then.geoms[which].T
+        robot_geoms = np.where(self.places.own[first], first, second)
+        names = [self.places.parts[geom] for geom in robot_geoms.tolist()]
+        return which, names, contacts_then.place[which], force
 
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""

@@ -45,12 +45,12 @@ def factory_new(robot: RobotSpec) -> list[DrivenServo]:
 
 
 def _servo(servo: int, kind: ServoParams, mode: int, baud: int) -> DrivenServo:
-    made = DrivenServo(kind.servo, servo, drive=kind)
-    made.set("operating_mode", mode)
-    made.set("return_delay_time", 0)
-    made.set("baud_rate", BAUD_RATES.index(baud))
-    made.set("present_input_voltage", round(10 * kind.voltage))
-    return made
+    driven = DrivenServo(kind.servo, servo, drive=kind)
+    driven.set("operating_mode", mode)
+    driven.set("return_delay_time", 0)
+    driven.set("baud_rate", BAUD_RATES.index(baud))
+    driven.set("present_input_voltage", round(10 * kind.voltage))
+    return driven
 
 
 class Battery:
@@ -157,12 +157,12 @@ class ServoList(Params):
     """The servos."""
 
 
-def _known(found: Any, known: Mapping[Any, Any], what: str) -> Any:
-    if found not in known:
+def _known(value: Any, known: Mapping[Any, Any], what: str) -> Any:
+    if value not in known:
         raise ConfigError(
-            f"--servos: expected as {what} one of {', '.join(map(str, known))}, found {found}"
+            f"--servos: expected as {what} one of {', '.join(map(str, known))}, found {value}"
         )
-    return known[found]
+    return known[value]
 
 
 def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:

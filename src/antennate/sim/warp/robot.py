@@ -350,8 +350,8 @@ class WarpRobot:
         heads = positions[:, places.root : places.root + 3]
         unsound = np.flatnonzero(~sound(heads, bounded, speeds)).tolist()
         for i in moving.keys() & {*unsound, *dropped}:
-            found = dropped.get(i) or broken(heads[i], bounded[i], speeds[i])
-            self._fail(i, SimulationError(moving[i].ticks * self._substeps, found))
+            trouble = dropped.get(i) or broken(heads[i], bounded[i], speeds[i])
+            self._fail(i, SimulationError(moving[i].ticks * self._substeps, trouble))
 
     def _fail(self, i: int, error: SimulationError) -> None:
         self._failures[i] = error
