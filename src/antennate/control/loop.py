@@ -7,7 +7,8 @@ anybody's code, and new numbers for a controller that runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import numpy as np
@@ -86,6 +87,17 @@ _KINDS = (
 """What the numbers of a decision are, and the kinds of NumPy that hold them."""
 
 
+@contextmanager
+def _errors_of(what: str) -> Iterator[None]:
+    """Raise a ControllerError for whatever a method of a controller raises, but Ctrl-C."""
+    try:
+        yield
+    except BaseException as error:
+        if is_ctrl_c(error):
+            raise
+        raise ControllerError(f"{what} raised {raised(error)}") from error
+
+
 class CheckedController:
     """A controller, and what is wrong with its last step.
 
@@ -116,12 +128,8 @@ class CheckedController:
         Raises:
             ControllerError: The controller raised an exception.
         """
-        try:
+        with _errors_of("reset"):
             self._controller.reset(rows, phase)
-        except BaseException as error:
-            if is_ctrl_c(error):
-                raise
-            raise ControllerError(f"reset raised {raised(error)}") from error
 
     def know(self, knowledge: Knowledge) -> None:
         """Give it what a simulation knows, if it can use any.
@@ -130,12 +138,8 @@ class CheckedController:
             ControllerError: The controller raised an exception.
         """
         if isinstance(self._controller, Knowing):
-            try:
+            with _errors_of("know"):
                 self._controller.know(knowledge)
-            except BaseException as error:
-                if is_ctrl_c(error):
-                    raise
-                raise ControllerError(f"know raised {raised(error)}") from error
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period of all rows.

@@ -22,6 +22,12 @@ from antennate.sim.parts import ANTENNA_BIT, BODY_BIT, FLOOR_BIT, LEG_BIT, OBSTA
 from antennate.sim.places import Contacts
 from antennate.types import Bools, Floats, Ints
 
+SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+CAPSULE = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
+ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
+MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 Colour = tuple[float, float, float, float]
 
 _UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
@@ -55,11 +61,6 @@ def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.f
     return painted
 
 
-_SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
-_CAPSULE = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
-_ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
-_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _TURN = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
 _RING = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 _BALL = np.concatenate(
@@ -69,7 +70,7 @@ _BALL = np.concatenate(
     ]
 )
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_ROUND = (_CAPSULE, _CYLINDER)
+_ROUND = (CAPSULE, CYLINDER)
 _UPRIGHT = 0.9999
 
 
@@ -80,9 +81,9 @@ def outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
     """
     place, turn = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
     kind, disc = model.geom_type[geom], place[:2] + model.geom_size[geom, 0] * _RING
-    if kind == _SPHERE or (kind in _ROUND and abs(turn[2, 2]) > _UPRIGHT):
+    if kind == SPHERE or (kind in _ROUND and abs(turn[2, 2]) > _UPRIGHT):
         return disc
-    if kind == _CAPSULE:  # the discs of its ends
+    if kind == CAPSULE:  # the discs of its ends
         half = model.geom_size[geom, 1] * turn[:2, 2]
         return _hull(np.concatenate([disc + half, disc - half]))
     points = place + _points(model, geom) @ turn.T
@@ -93,12 +94,12 @@ def _points(model: mujoco.MjModel, geom: int) -> Floats:
     """Points in the geom's own frame whose hull is the geom [m], shape (n, 3)."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     radius, half = size[0], np.array([0.0, 0.0, size[1]])
-    if kind == _ELLIPSOID:
+    if kind == ELLIPSOID:
         return size * _BALL
-    if kind == _CYLINDER:
+    if kind == CYLINDER:
         disc = np.column_stack([radius * _RING, np.zeros(len(_RING))])
         return np.concatenate([disc + half, disc - half])
-    if kind == _MESH:
+    if kind == MESH:
         mesh = model.geom_dataid[geom]
         first = model.mesh_vertadr[mesh]
         return model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
@@ -127,12 +128,6 @@ def _hull(points: Floats) -> Floats:
     return np.array(chain or ordered)
 
 
-SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
-CAPSULE = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
-ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
-CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
-MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _DRAWN = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH)
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _SLIDE, _FREE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_FREE)
