@@ -27,7 +27,7 @@ from antennate.types import Bools, Floats
 ServoName = Literal["xc430_w240", "xl330_m288", "xl430_w250"]
 
 
-_NUMBERS: dict[str, tuple[str, dict[str, float]]] = {
+_NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
     "gain_divisor": ("1", {"gt": 0}),
     "stall_torque": ("N·m", {"gt": 0}),
     "no_load_speed": ("rad/s", {"gt": 0}),
