@@ -79,5 +79,5 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     parts="profiles",
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

@@ -82,6 +82,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     filmed=True,
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )

@@ -183,6 +183,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )

@@ -90,5 +90,5 @@ EXPERIMENT = Experiment.of_folder(
     check=require_solver,
     parts="sweeps",
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

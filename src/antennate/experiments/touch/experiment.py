@@ -119,5 +119,5 @@ EXPERIMENT = Experiment.of_folder(
     filmed=True,
     parts="traverses",
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

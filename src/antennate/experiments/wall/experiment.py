@@ -77,5 +77,5 @@ EXPERIMENT = Experiment.of_folder(
     check=require_solver,
     failed=_none_valid,
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )
