@@ -174,20 +174,23 @@ class Experiment(Generic[Config, Found]):
     ) -> Experiment[Config, Found]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
-        `module` is the `__name__` of a module in the folder. Figures are those that
-        `figures(outcome)` of the module `figure` beside it returns; it is imported when they are
-        drawn, as that takes long. If it is `filmed`, its films are those of `films(config, trial)`
-        of the module `film`, likewise.
+        `module` is the `__name__` of a module in the folder. Without `figures` they are those that
+        `figures(outcome)` of the module `figure` beside it returns, and if it is `filmed`, films
+        are those of `films(config, trial)` of the module `film`; both are imported when they are
+        needed.
         """
         folder = module.rpartition(".")[0]
         if filmed:
             more["films"] = lambda c, trial: importlib.import_module(f"{folder}.film").films(
                 c, trial
             )
+        if "figures" not in more:
+            more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
+                outcome
+            )
         return cls(
             folder.rpartition(".")[2],
             importlib.import_module(folder).__doc__ or "",
             *(config, run, tables, sentence),
-            figures=lambda outcome: importlib.import_module(f"{folder}.figure").figures(outcome),
             **more,
         )
