@@ -33,7 +33,7 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.trial import draw_scene, draw_trial
-from antennate.sim.warp.arenas import PaddedTunnels
+from antennate.sim.warp.robot import PaddedTunnels
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand
 

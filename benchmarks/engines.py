@@ -70,7 +70,7 @@ def engines() -> dict[str, str]:
     """The Python of each engine, by the engine's distribution and version."""
     pythons = {}
     for python in (sys.executable, str(installed())):
-        code = "from antennate.distributions import engines; print(*engines().popitem())"
+        code = "from antennate.sim.engine_setup import engines; print(*engines().popitem())"
         done = subprocess.run([python, "-c", code], capture_output=True, text=True, check=True)
         pythons[done.stdout.strip()] = python
     return pythons

@@ -26,10 +26,8 @@ from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.warp import room_for
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_scene
-from antennate.sim.warp.arenas import PaddedTunnels
-from antennate.sim.warp.packages import require_warp
-from antennate.sim.warp.robot import WarpRobot
-from antennate.sim.warp.worlds import Limits
+from antennate.sim.warp.robot import PaddedTunnels, WarpRobot
+from antennate.sim.warp.worlds import Limits, require_warp
 
 CONTROLLER = "closed"
 WARM_UP = 5

@@ -25,7 +25,7 @@ from antennate.experiments.gait.pace import measure
 from antennate.experiments.tunnel import run as experiment
 from antennate.experiments.tunnel.monitor import TrialResult
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import trial

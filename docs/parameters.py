@@ -20,7 +20,7 @@ Every physical number of the project: its default, its unit, what it means and w
 A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the
 paper does not say).
 """
-ROBOTS = ("spec", "joints", "servos", "antenna", "sensor")
+ROBOTS = ("spec", "joints", "servos", "antenna")
 """Modules of `antennate.robots` that describe robots."""
 HARDWARE = (
     robot_file.RobotFile,

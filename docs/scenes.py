@@ -12,7 +12,7 @@ from antennate import figures as style
 from antennate.params.scene import TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.corridors import CorridorsScene
-from antennate.sim.scenes.hard import HARD
+from antennate.sim.scenes.registry import HARD
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.scenes.tunnel import Tunnel
 

@@ -6,8 +6,7 @@ uv run antennate drive --controller examples/own_controller.py:OwnController
 
 import numpy as np
 
-from antennate.control.conditioning import RunningMean, bending_level
-from antennate.control.contact import ContactState
+from antennate.control.conditioning import ContactState, RunningMean, bending_level
 from antennate.control.gait import Gait
 from antennate.types import Contact, Maneuver
 

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 
 from antennate.lookup import ADDED
-from antennate.sim.engine_warnings import dropped
+from antennate.sim.engine_setup import dropped
 
 settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
 settings.load_profile("any machine")

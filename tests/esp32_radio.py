@@ -11,7 +11,7 @@ from esp32_board import Board
 
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
 from antennate.hardware.ports.network import Verifier
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 KEY = bytes(range(32))
 HOST = ("192.168.4.7", 50000)

@@ -23,7 +23,8 @@ import test_touch_check
 from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
-from antennate.control import conditioning, contact, maneuver
+from antennate.control import conditioning, controllers
+from antennate.experiments.reproduce.antenna_claims import contact
 from antennate.hardware.esp32 import board, clock, frame
 from antennate.hardware.esp32 import wire as decoder
 from antennate.hardware.esp32.clock import DeviceClock, SampleState
@@ -263,12 +264,12 @@ FILMS = [
     ),
     Guard(
         "NaN is UNKNOWN",
-        around(contact, "classify", lambda old, p, b, was: old(p, np.nan_to_num(b), was)),
+        around(conditioning, "contact_of", lambda old, p, b, was: old(p, np.nan_to_num(b), was)),
         test_contact.test_nan_is_unknown_and_is_not_remembered_as_contact,
     ),
     Guard(
         "UNKNOWN ends a held maneuver",
-        put(maneuver, "Maneuver", SimpleNamespace(HOLD=99, FORWARD=Maneuver.FORWARD)),
+        put(controllers, "Maneuver", SimpleNamespace(HOLD=99, FORWARD=Maneuver.FORWARD)),
         test_maneuver.test_unknown_stops_a_held_maneuver_at_once_and_ends_with_its_cause,
     ),
 ]

@@ -16,7 +16,7 @@ from antennate.dxl.parser import Parser
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
 from antennate.robots.servos import ServoParams, XL330Params
-from antennate.sim.servo_drives import ServoDrives
+from antennate.sim.places import ServoDrives
 
 NONE, RESULT_FAIL, INSTRUCTION, CRC, RANGE, LENGTH, LIMIT, ACCESS = range(8)
 """Numbers of the errors of a status packet, from the manual."""

@@ -12,7 +12,7 @@ from antennate import AntennaReader, AntennaSpec, attach_antenna, equilibrium
 from antennate.antenna.sensor import counts
 from antennate.antenna.statics import Chain
 from antennate.errors import ConfigError
-from antennate.sim.antenna_part import mounting_quaternion
+from antennate.sim.parts import mounting_quaternion
 
 POST = '<geom name="post" type="capsule" fromto="{x} {y} -0.1 {x} {y} 0.1" size="0.005"/>'
 WORLD = """

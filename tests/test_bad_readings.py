@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from antennate.control.conditioning import bending_level
 from antennate.control.registry import make_controller
 from antennate.params.control import ConditioningParams, ControlParams, RuleParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import AntennaFrame, Contact, Maneuver
 
 

@@ -9,7 +9,7 @@ import pytest
 from antennate.cli import main
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.hardware.config import RobotFile
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,8 @@ from antennate.experiments.wall.config import WallConfig
 from antennate.experiments.wall.passage import passage
 from antennate.experiments.wall.run import run
 from antennate.messages import command_words
+from antennate.params.bench import SweepParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.sweep import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim import chain as fast
 from antennate.sim.bench import Ball, Bar, Bench, Slider, compile_bench

@@ -21,7 +21,7 @@ from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.messages import one_line
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 from antennate.sim.world import World
 from antennate.studies.formats import strict, to_csv, to_toml
 from antennate.twin.config import TwinConfig

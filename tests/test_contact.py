@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from antennate.control.contact import ContactState, classify
+from antennate.control.conditioning import ContactState, contact_of
 from antennate.params.control import RuleParams
 from antennate.types import Contact
 
@@ -29,7 +29,7 @@ def test_nan_is_unknown_and_is_not_remembered_as_contact() -> None:
 
 
 def test_a_side_does_not_know_of_the_other() -> None:
-    said = classify(PARAMS, np.array([[0.9, math.nan]]), np.zeros((1, 2), dtype=np.int64))
+    said = contact_of(PARAMS, np.array([[0.9, math.nan]]), np.zeros((1, 2), dtype=np.int64))
     assert said.tolist() == [[Contact.CONTACT, Contact.UNKNOWN]]
 
 

@@ -19,7 +19,7 @@ from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.hardware.driving.teleop import KeyController
 from antennate.params.control import ControlParams
-from antennate.params.setup import TeleopParams
+from antennate.params.hardware import TeleopParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.view.pace import Tuning
 

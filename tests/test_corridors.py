@@ -21,9 +21,8 @@ from antennate.params.scene import CorridorsParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.corridors import CorridorsScene
-from antennate.sim.scenes.hard import HARD
-from antennate.sim.scenes.plan import Arm, Plan, Room
-from antennate.sim.scenes.registry import SHIPPED, make_scene
+from antennate.sim.scenes.geometry import Arm, Plan, Room
+from antennate.sim.scenes.registry import HARD, SHIPPED, make_scene
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.trial import (
     Judge,
@@ -35,7 +34,7 @@ from antennate.sim.trial import (
     time_limit_of,
     variation_of,
 )
-from antennate.sim.warp.arenas import PaddedTunnels
+from antennate.sim.warp.robot import PaddedTunnels
 from antennate.testing import check_scene
 from antennate.types import AntennaFrame, Floats, Maneuver
 

@@ -12,7 +12,7 @@ from esp32_streams import encoded, hello, made
 
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.ports.network import Bucket, Verifier
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 KEY = bytes(range(32))
 NONCE = bytes(range(16, 32))

@@ -195,7 +195,7 @@ def test_one_objective_and_three_are_drawn(goals: str) -> None:
 
 def test_the_shipped_searches_can_be_run() -> None:
     config = experiments.load("design").config
-    from antennate.params.reading import read_file
+    from antennate.params.base import read_file
 
     paths = sorted((HERE.parent / "studies").glob("design_*.toml"))
     assert len(paths) > 1

@@ -21,7 +21,7 @@ from antennate.errors import CalibrationError
 from antennate.hardware.safety import channel as diagnosis
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding, Reading
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
 DAY = 8_640_000

@@ -17,7 +17,7 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.ports.errors import OpenError
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 
 
 def memory(patient: Patient) -> list[dict[str, int]]:

@@ -7,14 +7,13 @@ import pytest
 from hardware_rig import BAND, PERIOD, Ticker, armed
 
 from antennate.antenna.sensor import reading_noise
-from antennate.control.conditioning import bending_level
-from antennate.control.contact import classify
+from antennate.control.conditioning import bending_level, contact_of
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import Drift, SignalQuality
 from antennate.params.control import ConditioningParams, RuleParams
-from antennate.params.endurance import DriftParams
-from antennate.robots.sensor import SensorParams
+from antennate.params.safety import DriftParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Contact, Floats
 
 SPAN = BAND.high - BAND.low
@@ -38,7 +37,7 @@ def contacts(counts: Floats) -> Floats:
         return enters
     seen, before = np.zeros(len(level), bool), np.full((1, 1), int(Contact.FREE))
     for n, b in enumerate(level):
-        before = classify(RuleParams(), np.array([[b]]), before)
+        before = contact_of(RuleParams(), np.array([[b]]), before)
         seen[n] = before[0, 0] == Contact.CONTACT
     return seen
 

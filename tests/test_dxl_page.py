@@ -12,7 +12,7 @@ from pages import Block, blocks
 from test_servo_clients import served
 
 from antennate.dxl.models import XL330_M288, XL430_W250, servo_model
-from antennate.twin.servo_box import read_list
+from antennate.twin.servos import read_list
 
 BLOCKS: dict[str, list[Block]] = {}
 for _block in blocks("dxl.md"):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from antennate.distributions import ENGINES, engines
+from antennate.sim.engine_setup import ENGINES, engines
 
 PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
 (PIN,) = (each for each in PYPROJECT["project"]["dependencies"] if each.startswith("mujoco"))

@@ -29,9 +29,10 @@ from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.film import ending, films
 from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.params.sweep import SweepParams
-from antennate.sim import gl, layers
+from antennate.params.bench import SweepParams
+from antennate.sim import engine_setup
 from antennate.sim.camera import Camera
+from antennate.sim.parts import ANTENNA_BIT, LEG_BIT
 from antennate.telemetry import film
 from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder
 from antennate.telemetry.strip import WINDOW, Band, Strip, Trace
@@ -42,16 +43,16 @@ QUICK = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1"
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.chdir(tmp_path)
-    gl.backend.cache_clear()
+    engine_setup.backend.cache_clear()
     yield
-    gl.backend.cache_clear()
+    engine_setup.backend.cache_clear()
 
 
 def require_drawing() -> None:
     """Skip where the machine has neither EGL nor OSMesa."""
     pytest.importorskip("av")
     try:
-        gl.backend()
+        engine_setup.backend()
     except AntennateError as error:
         pytest.skip(str(error))
 
@@ -141,8 +142,8 @@ def test_a_thin_antenna_is_seen_and_the_physics_keeps_its_own() -> None:
     require_drawing()
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><worldbody>
-        <geom type="capsule" fromto="-1 0 0 1 0 0" size="1e-4" contype="{layers.ANTENNA}"/>
-        <geom type="capsule" fromto="-1 1 0 1 1 0" size="1e-4" contype="{layers.LEG}"/>
+        <geom type="capsule" fromto="-1 0 0 1 0 0" size="1e-4" contype="{ANTENNA_BIT}"/>
+        <geom type="capsule" fromto="-1 1 0 1 1 0" size="1e-4" contype="{LEG_BIT}"/>
         </worldbody></mujoco>"""
     )
     sides = ((0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0))

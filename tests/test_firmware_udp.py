@@ -22,7 +22,7 @@ from test_firmware import FIRMWARE, load
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
 from antennate.hardware.ports.network import UdpPort, Verifier
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 
 Run = Callable[[Radio, int], None]
 

@@ -19,8 +19,7 @@ from antennate.experiments.force import loads, post_traverse
 from antennate.experiments.force import run as force
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Bench
 from antennate.studies.formats import to_csv, to_json, to_toml
 

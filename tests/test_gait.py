@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antennate.control.gait import Gait, targets
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import JointCommand, Maneuver
 

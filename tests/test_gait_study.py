@@ -8,7 +8,7 @@ import pytest
 from antennate.errors import ConfigError
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import Walk, measure, rolling_speed
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Maneuver

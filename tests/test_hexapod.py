@@ -22,7 +22,8 @@ from antennate.experiments.gait import figure
 from antennate.experiments.gait import run as study
 from antennate.experiments.gait.pace import measure
 from antennate.experiments.gait.unknown import Unknown, drawn
-from antennate.params.control import ControlParams, GaitParams
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec

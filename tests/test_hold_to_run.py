@@ -21,7 +21,7 @@ from antennate.hardware.driving.drive import Operator, drive
 from antennate.hardware.driving.stopping import DeadMan
 from antennate.hardware.safety.session import Session
 from antennate.messages import typed
-from antennate.params.dead_man import DeadManParams
+from antennate.params.hardware import DeadManParams
 from antennate.twin.config import TwinConfig
 
 REPEATS = {"Linux console": (0.25, 1 / 10.9), "X server": (0.66, 1 / 25)}

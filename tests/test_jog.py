@@ -12,7 +12,7 @@ from antennate.dxl.bus import Bus
 from antennate.hardware.setup.jog import Jog
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of
-from antennate.params.setup import JogParams
+from antennate.params.hardware import JogParams
 
 YAW1, LEG = joints_of(ROBOT)[0], joints_of(ROBOT)[5]
 TICK = 2 * math.pi / 4096

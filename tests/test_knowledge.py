@@ -11,13 +11,14 @@ import pytest
 
 from antennate.cli import main
 from antennate.control.knowledge import Knowledge
+from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
-from antennate.control.retunable import Retunable
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import check, run
-from antennate.params.control import ControlParams, GaitParams
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.knowledge import (

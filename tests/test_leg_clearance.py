@@ -11,17 +11,17 @@ import pytest
 
 from antennate.control.gait import targets
 from antennate.errors import ConfigError
-from antennate.params.control import GaitParams
-from antennate.params.reading import from_values
+from antennate.params.base import from_values
+from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim import robot_part
+from antennate.sim.parts import build_robot
 
 QUARTER_TURN = [math.cos(math.pi / 4), math.sin(math.pi / 4), 0.0, 0.0]
 
 
 def rings(robot: RobotSpec) -> mujoco.MjModel:
     """The robot with flat rings for legs, as they are printed, in place of crowned ones."""
-    spec = robot_part.build(robot)
+    spec = build_robot(robot)
     for geom in spec.geoms:
         if geom.name in robot.leg_names:
             geom.type = mujoco.mjtGeom.mjGEOM_CYLINDER

@@ -15,7 +15,8 @@ from antennate.control.gait import Gait
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
 from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params.control import ControlParams, GaitParams
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.joints import YawParams
 from antennate.robots.spec import RobotSpec

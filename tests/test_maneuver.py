@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from antennate.control.maneuver import Hold, decide
+from antennate.control.controllers import Hold, decide
 from antennate.params.control import RuleParams
 from antennate.types import Contact, Maneuver
 

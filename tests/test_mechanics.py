@@ -19,8 +19,7 @@ from antennate.antenna.statics import (
     with_profile,
 )
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Bench, compile_bench
 from antennate.types import Floats
 

@@ -22,9 +22,9 @@ from antennate.errors import BadInputError
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
 from antennate.hardware.ports.finder import finder, read_key
 from antennate.hardware.ports.network import UdpPort
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Port, PortError
-from antennate.twin.udp import UdpEndpoint
+from antennate.twin.board import UdpEndpoint
 
 KEY = bytes(range(32))
 

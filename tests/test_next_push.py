@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from antennate.antenna import fitting
-from antennate.antenna.curves import Samples
+from antennate.antenna.curves import Samples, with_divider
 from antennate.antenna.next_push import Assessment, Pushes, assess
-from antennate.antenna.rivals import with_divider
 from antennate.cli import main
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.recording import RecordingParams, read

@@ -12,9 +12,8 @@ from doctor_rig import Patient, wrong
 from hardware_rig import BAND, FREE, PERIOD
 from twin_rig import simulation
 
-from antennate.antenna.curves import Samples
+from antennate.antenna.curves import Samples, plateau_of, white_noise
 from antennate.antenna.fitting import check
-from antennate.antenna.plateau import plateau_of, white_noise
 from antennate.control.conditioning import bending_level
 from antennate.control.loop import run_loop
 from antennate.errors import CalibrationError
@@ -25,7 +24,7 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.safety.channel import ChannelDiagnosis, Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.params.safety import SupervisorParams
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand
 

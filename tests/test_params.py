@@ -11,10 +11,10 @@ from pydantic import ValidationError
 from antennate import experiments
 from antennate.errors import ConfigError
 from antennate.params.base import Params, meaning
-from antennate.params.control import ConditioningParams, ControlParams, GaitParams
+from antennate.params.control import ConditioningParams, ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antennate.control.repetition import RepetitionDetector
+from antennate.control.conditioning import RepetitionDetector
 from antennate.params.control import RepetitionParams
 
 PERIOD, FREQUENCY = 0.01, 0.5

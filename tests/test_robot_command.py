@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import main
+from antennate.robots.parts import supply
 from antennate.robots.spec import RobotSpec
-from antennate.robots.supply import supply
 
 
 @pytest.mark.parametrize("links", [4, 6, 8])

@@ -40,9 +40,8 @@ from antennate.hardware.ports.finder import finder
 from antennate.hardware.safety.session import Session
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.messages import command_words
-from antennate.params.base import Params
-from antennate.params.network import NetworkParams
-from antennate.params.reading import read_file
+from antennate.params.base import Params, read_file
+from antennate.params.hardware import NetworkParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.feed import Feed

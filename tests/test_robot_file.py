@@ -19,7 +19,7 @@ from antennate.cli.robot import RobotOptions, parse_robot
 from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.checkup import examine
 from antennate.messages import command_words
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 from antennate.studies.formats import to_toml
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"

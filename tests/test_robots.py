@@ -15,7 +15,7 @@ from antennate.cli import BAD_INPUT, main
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.run import TunnelConfig
 from antennate.hardware.joints import Joints
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import RobotSpec

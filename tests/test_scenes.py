@@ -13,11 +13,10 @@ import pytest
 from antennate import simulate
 from antennate.cli import main
 from antennate.errors import AntennateError, ConfigError, SceneError
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.mjcf import MjcfScene
-from antennate.sim.scenes.mjcf_file import require_compiles
+from antennate.sim.scenes.mjcf import MjcfScene, require_compiles
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import FlatScene, Route
 from antennate.sim.scenes.tunnel import TunnelScene

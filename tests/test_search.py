@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from antennate.control.search import Search
+from antennate.control.escape import Search
 from antennate.params.control import SearchParams
 from antennate.types import Maneuver
 

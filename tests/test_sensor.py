@@ -16,9 +16,9 @@ from antennate.errors import ConfigError
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.messages import command_words
+from antennate.params.base import read_file
 from antennate.params.control import ControlParams, CurveParams
-from antennate.params.reading import read_file
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 
 FLAT, GAIN = 10e3, 1.2 / math.pi
 

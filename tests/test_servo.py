@@ -15,8 +15,7 @@ from servo_recordings import RATE, of_twin, written
 import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.robots.servo_model import NAMES, STEP, Course, replay
-from antennate.robots.servos import ServosParams, XL330Params
+from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, ServosParams, XL330Params, replay
 from antennate.types import Floats
 
 REAL = Path(__file__).parents[2] / "shared/data/servo_xl330_bam/raw"
@@ -34,7 +33,7 @@ def model(**changes: float) -> Floats:
         "armature": 0.001,
         **HELD,
     }
-    return np.array([[(values | changes)[name] for name in NAMES]])
+    return np.array([[(values | changes)[name] for name in MODEL_NUMBERS]])
 
 
 def course(

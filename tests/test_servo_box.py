@@ -18,7 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
-from antennate.twin.servo_box import ServoBox, read_list
+from antennate.twin.servos import ServoBox, read_list
 
 
 def models(text: str) -> list[tuple[int, int, int]]:

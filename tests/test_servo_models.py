@@ -14,7 +14,7 @@ from antennate.dxl.packets import StatusError
 from antennate.dxl.parser import Parser
 from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import ConfigError
-from antennate.twin.servo_box import read_list
+from antennate.twin.servos import read_list
 
 XM430_W210 = """
 like = "xc430-w240"

@@ -13,7 +13,7 @@ from antennate.errors import BadInputError
 from antennate.hardware.setup.person import Quit, SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
-from antennate.params.setup import SetupParams
+from antennate.params.hardware import SetupParams
 from antennate.robots.spec import RobotSpec
 
 NAMES = ROBOT.joint_names

@@ -15,8 +15,8 @@ from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.session import Session
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.twin.board import TouchStimulus
 from antennate.twin.config import TwinConfig
-from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
 
 TOUCHED = TwinConfig(touch=("left@0.5s", "right@2s"))

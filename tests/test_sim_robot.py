@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from antennate.params.scene import PhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 

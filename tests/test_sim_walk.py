@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from antennate.control.gait import Gait, targets
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene

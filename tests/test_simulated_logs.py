@@ -27,10 +27,10 @@ from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.run import GaitStudyConfig, run
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.experiments.tunnel.run import run as cross
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim import gl
+from antennate.sim import engine_setup
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
@@ -234,7 +234,7 @@ def drawable() -> bool:
     """Whether films can be made here."""
     pytest.importorskip("av")
     try:
-        gl.backend()
+        engine_setup.backend()
     except AntennateError:
         return False
     return True

@@ -10,7 +10,7 @@ from design_plans import refusal
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
 from antennate.messages import command_words
-from antennate.params.reading import read_file
+from antennate.params.base import read_file
 
 CHOICES = "expected a list of values, or a table with low and high (names with dots need quotes)"
 GOOD = '[vary]\n"tunnel.strewn" = [1]\n'

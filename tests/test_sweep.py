@@ -14,10 +14,9 @@ from antennate.experiments.sweep import estimates, reach
 from antennate.experiments.sweep import run as sweep
 from antennate.experiments.sweep import scan as sweeping
 from antennate.experiments.sweep.config import SweepConfig
+from antennate.params.bench import EstimateParams, ShapeParams, SweepParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Bench
 from antennate.studies.formats import to_csv, to_json, to_toml
 

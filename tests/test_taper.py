@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antennate.antenna import taper
+from antennate.antenna import springs
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.taper.experiment import TaperConfig, run
 from antennate.params.spring import TaperParams
@@ -25,7 +25,7 @@ GEOMETRIC = (
 @pytest.mark.parametrize(("law", "expected"), [("linear", LINEAR), ("geometric", GEOMETRIC)])
 def test_proxies_of_fourteen_segments(law: str, expected: tuple[float, ...]) -> None:
     config = TaperParams.model_validate({"law": law})
-    assert taper.proxy(taper.diameters(config)) == pytest.approx(expected, rel=0.05)
+    assert springs.proxy(springs.diameters(config)) == pytest.approx(expected, rel=0.05)
 
 
 def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
@@ -35,27 +35,27 @@ def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
 
 
 def test_a_round_section_of_one_millimetre() -> None:
-    assert taper.second_moment(np.array([1e-3]))[0] == pytest.approx(4.909e-14, rel=1e-3)
+    assert springs.second_moment(np.array([1e-3]))[0] == pytest.approx(4.909e-14, rel=1e-3)
 
 
 def test_springs_in_a_row_give_as_much_as_the_segments_they_stand_for() -> None:
     values = np.random.default_rng(0).uniform(0.1, 1.0, 14)
     for bins in (1, 2, 6, 7, 14):
-        give = (1 / taper.binned(values, bins)).sum() * 14 / bins
+        give = (1 / springs.binned(values, bins)).sum() * 14 / bins
         assert give == pytest.approx((1 / values).sum())
-    assert taper.binned(values, 14) == pytest.approx(values)
+    assert springs.binned(values, 14) == pytest.approx(values)
 
 
 def test_a_uniform_antenna_gets_a_uniform_ladder() -> None:
-    assert taper.follow(np.ones(6), 3, 9).tolist() == [3] * 6
+    assert springs.follow(np.ones(6), 3, 9).tolist() == [3] * 6
 
 
 def test_a_taper_within_the_limits_is_followed_exactly() -> None:
-    assert taper.follow(np.array([1, 1 / 2, 1 / 3, 1 / 10]), 2, 40).tolist() == [2, 4, 6, 20]
+    assert springs.follow(np.array([1, 1 / 2, 1 / 3, 1 / 10]), 2, 40).tolist() == [2, 4, 6, 20]
 
 
 def test_a_steeper_taper_ends_at_the_limits() -> None:
-    coils = taper.follow(np.array([1.0, 1e-3]), 3, 30)
+    coils = springs.follow(np.array([1.0, 1e-3]), 3, 30)
     assert coils.tolist() == [3, 30]
 
 

@@ -20,7 +20,7 @@ from antennate.hardware.driving.teleop import Gamepad, KeyController
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
-from antennate.params.setup import TeleopParams
+from antennate.params.hardware import TeleopParams
 from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, Maneuver
 

@@ -20,11 +20,10 @@ from antennate.experiments.touch import sensing
 from antennate.experiments.touch.config import TouchConfig, site
 from antennate.experiments.touch.sensing import runs
 from antennate.experiments.touch.traverse import plan
+from antennate.params.bench import TouchWallsParams
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.touch import TouchWallsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
 from antennate.studies.formats import to_csv, to_json, to_toml

@@ -19,10 +19,10 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.esp32.wire import FrameDecoder, Sample
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
-from antennate.params.twin import BatteryParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
+from antennate.twin.board import Converter
 from antennate.twin.config import TwinConfig, watched
-from antennate.twin.converter import Converter
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 

@@ -19,8 +19,8 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.twin.board import TouchStimulus
 from antennate.twin.config import TwinConfig
-from antennate.twin.touch import TouchStimulus
 
 ANTENNA = AntennaSpec()
 REST = float(counts(ANTENNA.sensor, np.array(0.0)))

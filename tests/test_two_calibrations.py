@@ -14,8 +14,8 @@ from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.params.base import read_file
 from antennate.params.control import ControlParams
-from antennate.params.reading import read_file
 from antennate.studies.formats import to_toml
 from antennate.types import AntennaFrame, Contact
 

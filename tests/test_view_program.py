@@ -16,8 +16,8 @@ import pytest
 from view_rig import ANTENNATE, child_of, shown
 
 from antennate import simulate
+from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
-from antennate.control.retunable import Retunable
 from antennate.params.control import ControlParams, RuleParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, picture, snapshot

@@ -29,10 +29,8 @@ from antennate.sim.scenes.scene import Route
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_scene, draw_trial
-from antennate.sim.warp.arenas import PaddedTunnels, is_parked
-from antennate.sim.warp.packages import require_warp
-from antennate.sim.warp.robot import WarpRobot
-from antennate.sim.warp.worlds import Limits
+from antennate.sim.warp.robot import PaddedTunnels, WarpRobot, is_parked
+from antennate.sim.warp.worlds import Limits, require_warp
 from antennate.types import AntennaFrame, Floats, JointCommand
 
 CONTROL, PHYSICS = ControlParams(), PhysicsParams()
@@ -54,7 +52,7 @@ def test_a_missing_package_is_named_with_its_install(monkeypatch: pytest.MonkeyP
 
 def test_warp_of_another_series_than_the_engine_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed: docs/gpu.md")
-    monkeypatch.setattr("antennate.sim.warp.packages.metadata.version", lambda _: "3.2.1")
+    monkeypatch.setattr("antennate.sim.warp.worlds.metadata.version", lambda _: "3.2.1")
     engine = ".".join(mujoco.__version__.split(".")[:2])
     expected = rf"mujoco-warp {engine}, as the engine mujoco is {mujoco.__version__}, found 3\.2\.1"
     with pytest.raises(ConfigError, match=expected):

@@ -18,7 +18,7 @@ from antennate.hardware.esp32.board import Board, BoardReader
 from antennate.hardware.ports.network import Verifier
 from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.twin.config import TwinConfig
 
 KEY = bytes(range(32))

@@ -40,15 +40,15 @@ def real(
         BadInputError: Of the given type: it is something else.
     """
     try:
-        found = (
+        number = (
             float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
         )
     except OverflowError:  # a whole number of hundreds of digits
-        found = math.inf
-    if not (math.isfinite(found) and found > above):
+        number = math.inf
+    if not (math.isfinite(number) and number > above):
         bound = f" above {above:g}" if math.isfinite(above) else ""
         raise _refusal(name, f"a finite number{bound}{_in(unit)}", value, error)
-    return found
+    return number
 
 
 def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int:
@@ -57,11 +57,11 @@ def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int
     Raises:
         ConfigError: It is something else.
     """
-    found = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
-    if found is None or found < least or (most is not None and found > most):
+    number = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if number is None or number < least or (most is not None and number > most):
         bounds = f"of at least {least}" if most is None else f"of {least} to {most}"
         raise _refusal(name, f"a whole number {bounds}", value)
-    return found
+    return number
 
 
 def array(
@@ -94,21 +94,21 @@ def array(
     if any(isinstance(part, np.ma.MaskedArray) for part in parts):
         raise error(f"{name}: expected {wanted}, found a masked array; leave masked values out")
     try:
-        found = np.asarray(value)
+        numbers = np.asarray(value)
     except (ValueError, TypeError):  # rows of different lengths
         raise _refusal(name, wanted, value, error) from None
-    if found.dtype.kind not in "fiu":
+    if numbers.dtype.kind not in "fiu":
         raise _refusal(name, wanted, value, error)
-    same = len(found.shape) == len(shape) and all(
+    same = len(numbers.shape) == len(shape) and all(
         isinstance(want, str) or length == want
-        for length, want in zip(found.shape, shape, strict=True)
+        for length, want in zip(numbers.shape, shape, strict=True)
     )
     if shape and not same:
-        raise error(f"{name}: expected {wanted}, found shape {found.shape}")
-    if finite and not np.isfinite(found).all():
-        bad = found[~np.isfinite(found)]
+        raise error(f"{name}: expected {wanted}, found shape {numbers.shape}")
+    if finite and not np.isfinite(numbers).all():
+        bad = numbers[~np.isfinite(numbers)]
         raise error(f"{name}: expected {wanted}, found {len(bad)} that are not, such as {bad[0]}")
-    return found.astype(np.float64, copy=False)
+    return numbers.astype(np.float64, copy=False)
 
 
 def whole_array(
@@ -122,11 +122,11 @@ def whole_array(
     Raises:
         BadInputError: Of the given type: it is something else.
     """
-    found = array(name, value, shape, error=error)
-    odd = (found != np.rint(found)) | (found < -(2.0**63)) | (found >= 2.0**63)
+    numbers = array(name, value, shape, error=error)
+    odd = (numbers != np.rint(numbers)) | (numbers < -(2.0**63)) | (numbers >= 2.0**63)
     if odd.any():
-        raise error(f"{name}: expected whole numbers, found {found[odd][0]:g}")
-    return found.astype(np.int64)
+        raise error(f"{name}: expected whole numbers, found {numbers[odd][0]:g}")
+    return numbers.astype(np.int64)
 
 
 def path(name: str, value: Any) -> Path:
@@ -136,12 +136,12 @@ def path(name: str, value: Any) -> Path:
         ConfigError: It is none.
     """
     try:
-        found = Path(value)
+        place = Path(value)
     except TypeError:
         raise _refusal(name, "a path", value) from None
-    if value == "" or "\0" in str(found):
+    if value == "" or "\0" in str(place):
         raise _refusal(name, "a path", value)
-    return found
+    return place
 
 
 def text(name: str, value: Any) -> str:

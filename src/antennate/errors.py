@@ -88,8 +88,8 @@ def reason(error: BaseException) -> str:
 
     What the system says of an OSError; else the text of the exception; of one without, its type.
     """
-    said = getattr(error, "strerror", None) or str(error)
-    return " ".join(said.split()) or type(error).__name__
+    text = getattr(error, "strerror", None) or str(error)
+    return " ".join(text.split()) or type(error).__name__
 
 
 def raised(error: BaseException) -> str:
@@ -113,5 +113,5 @@ def _where(error: BaseException) -> str:
     if not own:
         return ""
     path, line = own[-1]
-    here = Path.cwd()
-    return f" ({path.relative_to(here) if path.is_relative_to(here) else path}:{line})"
+    folder = Path.cwd()
+    return f" ({path.relative_to(folder) if path.is_relative_to(folder) else path}:{line})"

@@ -62,7 +62,7 @@ def require_room(path: Path, least: float, error: type[BadInputError] = OutputEr
 
 def in_units(size: float) -> str:
     """A number of bytes for people, as 12.3 MB."""
-    unit, scale = next((each for each in _UNITS if size >= each[1]), _UNITS[-1])
+    unit, scale = next((step for step in _UNITS if size >= step[1]), _UNITS[-1])
     return f"{size / scale:.4g} {unit}"
 
 
@@ -217,8 +217,8 @@ def remove_abandoned(folder: Path, is_ours: Callable[[str], bool]) -> None:
     form = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM}}}", re.DOTALL)
     with contextlib.suppress(OSError):
         for left in list(folder.iterdir()):
-            found = form.fullmatch(left.name)
-            if found is None or not is_ours(found[1]):
+            match = form.fullmatch(left.name)
+            if match is None or not is_ours(match[1]):
                 continue
             with contextlib.suppress(OSError), open_regular(left) as file:
                 if lock(file):

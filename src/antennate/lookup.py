@@ -79,7 +79,7 @@ class Registry(Generic[T]):
         others = (point.name for point in installed(self._group))
         return tuple(dict.fromkeys((*self._ours, *others, *self.added)))
 
-    def add(self, name: str, found: T) -> None:
+    def add(self, name: str, value: T) -> None:
         """Make an object known under a name, here and in workers; a later one takes its place.
 
         Raises:
@@ -89,7 +89,7 @@ class Registry(Generic[T]):
             raise ConfigError(
                 f"expected a new name without a colon for a {self._kind}, found {name!r}"
             )
-        self.added[name] = found
+        self.added[name] = value
 
     def check(self, name: str) -> str:
         """Return the name if it may be valid; no code of the user runs.
@@ -124,18 +124,18 @@ class Registry(Generic[T]):
             return added
         self.check(name)
         try:
-            found = self._load(name)
+            value = self._load(name)
         except KeyboardInterrupt:
             raise
         except BaseException as error:
             ours = isinstance(error, LookupError | FileNotFoundError) and str(error)[:3] == "no "
             what = str(error) if ours else raised(error)
             raise ConfigError(f"expected a {self._kind} at {name!r}, found {what}") from error
-        if not callable(found):
+        if not callable(value):
             raise ConfigError(
-                f"expected a class or a function at {name!r}, found {type(found).__name__}"
+                f"expected a class or a function at {name!r}, found {type(value).__name__}"
             )
-        return cast("T", found)
+        return cast("T", value)
 
     def _load(self, name: str) -> Any:
         for point in installed(self._group):

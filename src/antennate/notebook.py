@@ -1,15 +1,48 @@
-"""How a result shows itself in a notebook: a sentence, a table and a figure, without any script."""
+"""How a result leaves this package: as a data frame, and in a notebook as text, table and figure.
+
+pandas is optional: it is imported when the first data frame is asked for.
+"""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from antennate.errors import MissingPackageError
+
+
+def from_columns(columns: Mapping[str, Any]) -> Any:
+    """A pandas DataFrame of equally long columns.
+
+    Raises:
+        MissingPackageError: pandas is not installed.
+    """
+    try:
+        import pandas
+    except ImportError:
+        raise MissingPackageError(
+            "to_dataframe: expected pandas, found none; install it with `pip install pandas`, or "
+            "in a clone `uv sync --extra pandas`"
+        ) from None
+    return pandas.DataFrame(dict(columns))
+
+
+def from_rows(rows: Iterable[Any]) -> Any:
+    """A pandas DataFrame of dataclasses or mappings of one kind: a column for each field.
+
+    Raises:
+        MissingPackageError: pandas is not installed.
+    """
+    mappings = [row if isinstance(row, Mapping) else asdict(row) for row in rows]
+    names = mappings[0] if mappings else ()
+    return from_columns({name: [row[name] for row in mappings] for name in names})
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
 _CELL = "text-align: {}; padding: .15rem .8rem .15rem 0; white-space: pre-wrap;"
 _WIDEST = 36
 """Width of a figure [rem], where there is room: letters are as large as those of the notebook."""

@@ -5,6 +5,7 @@ Arrays carry a leading batch axis of B robots; B is 1 for a single one.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
@@ -16,7 +17,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-
+SIDES = ("l", "r")
+"""Left and right: the order of every array with an axis over the two sides."""
+LEFT, RIGHT = 0, 1
+SIDE_SIGN = (1.0, -1.0)
+"""Sign of the lateral (y) coordinate on each side; y points to the robot's left."""
 _EMPTY = np.zeros((0, 0))
 
 
@@ -72,6 +77,14 @@ class JointCommand:
     leg: Floats
     antenna: Floats
     pitch: Floats = field(default_factory=lambda: _EMPTY)
+
+
+def joint_angles(command: JointCommand, parts: Iterable[str], batch: int = 1) -> Floats:
+    """All angles of a command side by side [rad], shape (B, n), by the names of its parts.
+
+    The parts that a robot has, in the order of its joints, are those of `RobotSpec.command_shapes`.
+    """
+    return np.concatenate([getattr(command, name).reshape(batch, -1) for name in parts], axis=1)
 
 
 class Clock(Protocol):

@@ -168,18 +168,18 @@ class Calibration(Strict):
         path = checks.path("path", path)
         data = read_limited(path, _LARGEST_FILE, CalibrationError)
         try:
-            found = cls.model_validate_json(data, strict=True)
+            calibration = cls.model_validate_json(data, strict=True)
             json.loads(data, object_pairs_hook=_once)
         except ValidationError as error:
             raise CalibrationError(f"{path}: {describe(error, cls)}") from None
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from None
-        if sensor_id is not None and found.sensor_id != sensor_id:
+        if sensor_id is not None and calibration.sensor_id != sensor_id:
             raise CalibrationError(
-                f"{path}: sensor_id: expected {sensor_id}, found {found.sensor_id}: the "
+                f"{path}: sensor_id: expected {sensor_id}, found {calibration.sensor_id}: the "
                 "calibration of another flex sensor"
             )
-        return found
+        return calibration
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:
@@ -191,31 +191,31 @@ def _once(pairs: list[tuple[str, object]]) -> None:
         raise CalibrationError(f"{key}: expected a number, found a boolean")
 
 
-def _impossible(found: Calibration) -> str:
+def _impossible(calibration: Calibration) -> str:
     """Why no flex sensor can have this curve, empty if one can; no file can widen these bounds."""
-    span = found.counts_high - found.counts_low
+    span = calibration.counts_high - calibration.counts_low
     if span < NARROWEST_SPAN:
         return (
             f"counts_high: expected {NARROWEST_SPAN:g} counts more than counts_low or more, found "
-            f"{found.counts_low:g} and {found.counts_high:g}"
+            f"{calibration.counts_low:g} and {calibration.counts_high:g}"
         )
     for field in ("slope_95", "midpoint_95", "valid_counts", "valid_bend"):
-        ends: tuple[float, float] | None = getattr(found, field)
+        ends: tuple[float, float] | None = getattr(calibration, field)
         if ends is not None and not ends[0] <= ends[1]:
             return f"{field}: expected the lower end first, found {ends[0]:g} and {ends[1]:g}"
-    low, high = found.valid_counts
+    low, high = calibration.valid_counts
     if not (0 <= low < high <= FULL_SCALE):
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
-    if (width := _RISE * span / found.slope) < NARROWEST_RISE:
+    if (width := _RISE * span / calibration.slope) < NARROWEST_RISE:
         return (
             f"slope: expected a level that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
             f"more, found {width:.3g}"
         )
-    levels = found.level(np.array([found.counts_low, found.counts_high]))
-    straight, bent = levels if found.polarity > 0 else levels[::-1]
-    if not straight < found.threshold < bent:
+    levels = calibration.level(np.array([calibration.counts_low, calibration.counts_high]))
+    straight, bent = levels if calibration.polarity > 0 else levels[::-1]
+    if not straight < calibration.threshold < bent:
         return (
-            f"midpoint: expected a level below the threshold {found.threshold:g} at the straight "
-            f"end and above it at the bent end, found {straight:.3g} and {bent:.3g}"
+            f"midpoint: expected a level below the threshold {calibration.threshold:g} at the "
+            f"straight end and above it at the bent end, found {straight:.3g} and {bent:.3g}"
         )
     return ""

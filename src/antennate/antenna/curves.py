@@ -4,7 +4,9 @@
 
 b is the level, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k
 the slope. The fit minimises the squared error of b. A straight line and an isotonic regression
-stand beside it for comparison.
+stand beside it: how they do on pushes that served no fit, beyond noise or not. Readings of one push
+err together, so whole pushes are left out in turn. Readings that stand at their highest code, as of
+a converter that saturates below its rail, are a plateau.
 """
 
 from __future__ import annotations
@@ -14,8 +16,11 @@ from typing import Literal
 
 import numpy as np
 
+from antennate.antenna.calibration import FEWEST
+from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import sigmoid
-from antennate.types import Floats, Ints
+from antennate.jackknife import student95
+from antennate.types import Bools, Floats, Ints
 
 MODELS = ("sigmoid", "line", "isotonic")
 
@@ -69,8 +74,8 @@ def fit_sigmoid(x: Floats, level: Floats, sign: int) -> tuple[float, float]:
     def error(p: Floats) -> Floats:
         return curve(z, float(np.exp(p[0])), float(p[1])) - level
 
-    found = least_squares(error, start, bounds=np.transpose(BOUNDS)).x
-    return float(np.exp(found[0])), sign * float(found[1])
+    fitted = least_squares(error, start, bounds=np.transpose(BOUNDS)).x
+    return float(np.exp(fitted[0])), sign * float(fitted[1])
 
 
 def _sorted(by: Floats, other: Floats) -> tuple[Floats, Floats]:
@@ -104,3 +109,165 @@ def predict(model: str, x: Floats, level: Floats, at: Floats, sign: int) -> Floa
         return np.asarray(np.clip(straight, 0.0, 1.0), dtype=np.float64)
     z, b = _sorted(sign * x, level)
     return np.asarray(np.interp(sign * at, z, isotonic_regression(b).x), dtype=np.float64)
+
+
+MOST_GROUPS = 30
+"""More pushes than this are left out in so many groups of whole pushes."""
+OTHER_DIVIDERS = {"half the divider": 0.5, "twice the divider": 2.0}
+"""Fixed resistors under which a rival is tried again, over the one in use."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """How much smaller a rival's error of b is than the sigmoid's, over pushes left out.
+
+    Attributes:
+        mean: Mean over pushes; `interval_95` its 95 % interval.
+        pushes: How many.
+    """
+
+    mean: float
+    interval_95: tuple[float, float]
+    pushes: int
+
+    @property
+    def wins(self) -> bool:
+        """Whether the rival is better beyond noise."""
+        return self.interval_95[0] > 0
+
+
+def with_divider(samples: Samples, factor: float) -> Samples:
+    """The readings that another fixed resistor would have given, by the ideal divider.
+
+    A reading's share u of the full scale has odds u / (1 - u) in proportion to that resistor.
+    """
+    share = np.clip(samples.counts / FULL_SCALE, 0.0, 1.0)
+    counts = FULL_SCALE * share * factor / (1.0 + share * (factor - 1.0))
+    return Samples(counts, samples.level, samples.trial, samples.speed, samples.row)
+
+
+def left_out(
+    samples: Samples, number: Ints, used: Bools, full_scale: bool = False
+) -> dict[str, list[Floats]]:
+    """Errors of b of each model on every push that served no fit.
+
+    Args:
+        samples: The readings.
+        number: Number of the push of each, shape (n,).
+        used: Readings that take part, shape (n,).
+        full_scale: Whether readings are normalised by 0 to 4095.
+
+    Returns:
+        For each of MODELS a list over pushes of errors, curve minus bend; empty with one push.
+    """
+    errors: dict[str, list[Floats]] = {model: [] for model in MODELS}
+    rows = np.flatnonzero(used)
+    numbers = [n for n in np.unique(number[rows]) if (number[rows] == n).sum() > 1]
+    low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
+    x, level, sign = (samples.counts - low) / (high - low), samples.level, polarity(samples)
+    for group in range(min(MOST_GROUPS, len(numbers))):
+        group_numbers = numbers[group::MOST_GROUPS]
+        rest = rows[~np.isin(number[rows], group_numbers)]
+        if len(rest) < FEWEST:
+            continue
+        parts = [rows[number[rows] == one] for one in group_numbers]
+        at = np.concatenate(parts)
+        cuts = np.cumsum([len(part) for part in parts])[:-1]
+        for model in MODELS:
+            wrong = predict(model, x[rest], level[rest], x[at], sign) - level[at]
+            errors[model] += np.split(wrong, cuts)
+    return errors
+
+
+def rms(errors: list[Floats]) -> Floats:
+    """Root mean squared error of each push, shape (pushes,)."""
+    return np.array([float(np.sqrt(np.mean(error**2))) for error in errors])
+
+
+def gain_of(errors: dict[str, list[Floats]], rival: str) -> Gain:
+    """How much a rival gains, from `left_out` of two pushes or more."""
+    gain = rms(errors["sigmoid"]) - rms(errors[rival])
+    half = student95(len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
+    mean = float(gain.mean())
+    return Gain(mean, (mean - float(half), mean + float(half)), len(gain))
+
+
+PLATEAU_FEWEST = 150
+"""Fewest readings of which a plateau is told: the noise of the quietest real sensor, 1.7 counts,
+puts a fifth of so many within a count of the highest once in 50,000 times (computed)."""
+PLATEAU_SHARE = 0.2
+"""Share of the readings that stand at their highest from which on they say nothing (assumed)."""
+PLATEAU_SHOWN = 0.05
+"""The same share over different bends, from which on it is told: noise alone does 1 % (assumed)."""
+_COVERED = 0.1
+"""Share of all bends that a plateau covers at least; a quiet antenna that is held covers none."""
+_NEAR = 1.0
+"""Distance from the highest reading that is the same [counts]."""
+
+_STILL = 2.0
+"""Farthest apart that readings are which stand still [counts], as of a converter that is stuck."""
+_SIGMA = 1.0 / (0.6745 * 6.0**0.5)
+"""From the median of what normal noise does to second differences to its standard deviation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plateau:
+    """The highest reading [counts], and the share of all that stand at it.
+
+    Attributes:
+        still: Whether none lies below it by more than a converter that is stuck toggles.
+    """
+
+    counts: float
+    share: float
+    still: bool = False
+
+    def text(self, whose: str) -> str:
+        """It in words, with what may be wrong."""
+        if self.still:
+            return (
+                f"all of {whose} stand at {self.counts:.0f} counts or at most {_STILL:.0f} below: "
+                "the converter is stuck there"
+            )
+        return (
+            f"{100 * self.share:.0f} % of {whose} stand at {self.counts:.0f} counts, the highest: "
+            "the converter saturates there; check its attenuation and the divider"
+        )
+
+
+def plateau_of(counts: Floats, bend: Floats | None = None) -> Plateau | None:
+    """The plateau of readings [counts], shape (n,); None without one, or of too few readings.
+
+    Args:
+        counts: The readings.
+        bend: How far the antenna was bent at each, same shape; None if that is not known.
+    """
+    if len(counts) < PLATEAU_FEWEST:
+        return None
+    most = float(counts.max())
+    there, least = counts >= most - _NEAR, PLATEAU_SHARE
+    if bend is not None:
+        ends = np.percentile(bend[there], [5, 95])
+        if np.ptp(ends) < _COVERED * np.ptp(bend):
+            return None
+        least = PLATEAU_SHOWN
+    share = float(there.mean())
+    still = bool(most - counts.min() <= _STILL)
+    return Plateau(most, share, still) if share >= least else None
+
+
+def white_noise(counts: Floats, part: Ints) -> float:
+    """Standard deviation [counts] of the noise of readings in order, shape (n,).
+
+    From the median of second differences, so that bends and single spikes do not count.
+
+    Args:
+        counts: The readings.
+        part: Which push or hold each belongs to.
+
+    Returns:
+        NaN of fewer than three readings in a row.
+    """
+    second = np.abs(counts[:-2] - 2.0 * counts[1:-1] + counts[2:])
+    inside = (part[:-2] == part[1:-1]) & (part[1:-1] == part[2:])
+    return _SIGMA * float(np.median(second[inside])) if inside.any() else float("nan")

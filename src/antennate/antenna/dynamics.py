@@ -79,12 +79,12 @@ class LinearChain:
         zero, one = np.zeros_like(inverse), np.eye(n)
         system = np.block([[zero, one], [-inverse * self.stiffness, -inverse * self.damping]])
         roots, left, right = eig(system, left=True, right=True)  # pyright: ignore[reportAssignmentType]
-        found = []
+        modes = []
         for root, row, column in zip(roots, left.T.conj(), right.T, strict=True):
             way = (row[:n] @ self.pushed_at_tip()) / (row @ column) * (self.lever @ column[:n])
             if root.imag >= 0:
-                found.append(Mode(complex(root), row, abs(way) * (2 if root.imag > 0 else 1)))
-        return sorted(found, key=lambda mode: abs(mode.root))
+                modes.append(Mode(complex(root), row, abs(way) * (2 if root.imag > 0 else 1)))
+        return sorted(modes, key=lambda mode: abs(mode.root))
 
 
 @dataclass(frozen=True, slots=True)

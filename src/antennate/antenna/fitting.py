@@ -16,15 +16,18 @@ from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibra
 from antennate.antenna.curves import (
     BOUNDS,
     MODELS,
+    MOST_GROUPS,
+    PLATEAU_SHARE,
     Samples,
     curve,
     ends,
     fit_sigmoid,
+    gain_of,
+    left_out,
+    plateau_of,
     polarity,
     predict,
 )
-from antennate.antenna.plateau import SHARE, plateau_of
-from antennate.antenna.rivals import MOST_GROUPS, gain_of, left_out
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.control.conditioning import usable
 from antennate.errors import CalibrationError
@@ -55,7 +58,7 @@ def check(samples: Samples) -> None:
             f"found {len(counts)}; record longer"
         )
     railed = ~usable(counts)
-    if railed.mean() > SHARE:
+    if railed.mean() > PLATEAU_SHARE:
         first = int(np.argmax(railed))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings between the rails, found "
@@ -63,7 +66,7 @@ def check(samples: Samples) -> None:
             "choose another divider resistor"
         )
     plateau = plateau_of(counts, level)
-    if plateau is not None and plateau.share > SHARE:
+    if plateau is not None and plateau.share > PLATEAU_SHARE:
         first = int(np.argmax(counts))
         raise CalibrationError(
             f"row {samples.row[first]}: expected readings that change with the bend, found "
@@ -89,12 +92,12 @@ def check(samples: Samples) -> None:
 def _check_monotonic(samples: Samples, span: float) -> None:
     edges = np.linspace(samples.level.min(), samples.level.max(), _BINS + 1)
     place = np.clip(np.digitize(samples.level, edges) - 1, 0, _BINS - 1)
-    held = [b for b in range(_BINS) if (place == b).any()]
-    means = np.array([samples.counts[place == b].mean() for b in held])
+    bins = [b for b in range(_BINS) if (place == b).any()]
+    means = np.array([samples.counts[place == b].mean() for b in bins])
     rising = polarity(samples) * means
     worst = rising - np.maximum.accumulate(rising)
     if worst.min() < -REVERSAL * span:
-        bad = held[int(np.argmin(worst))]
+        bad = bins[int(np.argmin(worst))]
         row = samples.row[np.flatnonzero(place == bad)[0]]
         raise CalibrationError(
             f"row {row}: expected readings that go one way with the level, found them turning back "
@@ -233,18 +236,18 @@ def _rmse(predicted: Floats, level: Floats) -> float:
 
 def _per_speed(samples: Samples, predicted: Floats) -> list[SpeedFit]:
     keys = np.where(np.isnan(samples.speed), -1.0, samples.speed)
-    found = []
+    fits = []
     for speed in np.unique(keys).tolist():
-        here = keys == speed
-        found.append(
+        rows = keys == speed
+        fits.append(
             SpeedFit(
                 speed_m_s=None if speed < 0 else speed,
-                samples=int(here.sum()),
-                r2=_r2(predicted[here], samples.level[here]),
-                rmse=_rmse(predicted[here], samples.level[here]),
+                samples=int(rows.sum()),
+                r2=_r2(predicted[rows], samples.level[rows]),
+                rmse=_rmse(predicted[rows], samples.level[rows]),
             )
         )
-    return found
+    return fits
 
 
 def _intervals(
@@ -282,11 +285,11 @@ def _folds(samples: Samples) -> list[Ints]:
 def cross_validate(samples: Samples, x: Floats, sign: int) -> dict[str, Floats]:
     """Root mean squared error of each model on folds it has not seen, shape (folds,)."""
     errors: dict[str, list[float]] = {model: [] for model in MODELS}
-    for held in _folds(samples):
-        rest = np.setdiff1d(np.arange(len(x)), held)
+    for fold in _folds(samples):
+        rest = np.setdiff1d(np.arange(len(x)), fold)
         for model in MODELS:
-            predicted = predict(model, x[rest], samples.level[rest], x[held], sign)
-            errors[model].append(_rmse(predicted, samples.level[held]))
+            predicted = predict(model, x[rest], samples.level[rest], x[fold], sign)
+            errors[model].append(_rmse(predicted, samples.level[fold]))
     return {model: np.array(e) for model, e in errors.items()}
 
 

@@ -1,4 +1,4 @@
-"""What a calibration is worth on the next push: hysteresis, predictive interval, rival curves.
+"""What a calibration is worth on the next push: hysteresis, relaxation, intervals, rival curves.
 
 A push is one way from straight to bent and back: a trial of the recording, or a part of one that
 ends where the next loading begins. Everything here leaves out whole pushes, since readings of one
@@ -13,20 +13,90 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna.calibration import FEWEST, Calibration
-from antennate.antenna.curves import MODELS, Samples, polarity, predict
-from antennate.antenna.fitting import FEWEST_PUSHES
-from antennate.antenna.holds import Relaxation, relaxation
-from antennate.antenna.rivals import (
+from antennate.antenna.curves import (
+    MODELS,
     OTHER_DIVIDERS,
     Gain,
+    Samples,
     gain_of,
     left_out,
+    polarity,
+    predict,
     rms,
     with_divider,
 )
+from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.jackknife import student95
 from antennate.types import Bools, Floats, Ints
+
+_STEADY = 0.01
+"""Share of the bend's range within which it is held."""
+_SHORTEST, _FEWEST = 0.3, 20
+"""Shortest hold [s], and its fewest readings."""
+_END = 0.2
+"""Share of a hold at its beginning and at its end over which readings are averaged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxation:
+    """How readings move while the bend is held, over the span of readings.
+
+    Attributes:
+        mean: Mean over holds: above 0 readings go on as before the hold, below 0 they go back.
+        mean_95: 95 % interval of it over holds, None with fewer than two.
+        largest: Largest change of a hold.
+        time: Median length of the holds [s].
+        holds: How many there are.
+    """
+
+    mean: float
+    mean_95: tuple[float, float] | None
+    largest: float
+    time: float
+    holds: int
+
+
+def relaxation(samples: Samples, t: Floats, span: float) -> Relaxation | None:
+    """What holds after a change of the bend show; None if there is no such hold.
+
+    Args:
+        samples: The readings, those of a trial in the order of time.
+        t: Their times [s], shape (n,).
+        span: Counts from straight to bent.
+    """
+    changes, times = list[float](), list[float]()
+    for rows, before in _holds(samples):
+        if len(rows) < _FEWEST or t[rows[-1]] - t[rows[0]] < _SHORTEST:
+            continue
+        end = max(1, round(_END * len(rows)))
+        moved = samples.counts[rows[-end:]].mean() - samples.counts[rows[:end]].mean()
+        way = polarity(samples) * np.sign(samples.level[rows[0]] - before)
+        changes.append(float(way * moved / span))
+        times.append(float(t[rows[-1]] - t[rows[0]]))
+    if not changes:
+        return None
+    mean, interval = float(np.mean(changes)), None
+    if len(changes) > 1:
+        half = student95(len(changes) - 1) * float(np.std(changes, ddof=1)) / len(changes) ** 0.5
+        interval = (mean - half, mean + half)
+    largest = max(changes, key=abs)
+    return Relaxation(mean, interval, largest, float(np.median(times)), len(changes))
+
+
+def _holds(samples: Samples) -> Iterator[tuple[Ints, float]]:
+    """Rows of each part of a trial at one bend, and the bend before it; not the first part."""
+    steady = _STEADY * float(np.ptp(samples.level))
+    for trial in np.unique(samples.trial):
+        rows = np.flatnonzero(samples.trial == trial)
+        level, start = samples.level[rows], 0
+        for at in range(1, len(rows) + 1):
+            if at < len(rows) and abs(level[at] - level[start]) <= steady:
+                continue
+            if start > 0:
+                yield rows[start:at], float(level[start - 1])
+            start = at
+
 
 TURN = 0.1
 """Share of the bend's range by which it must fall back or rise again to count as a turn."""
@@ -154,16 +224,16 @@ RECORDED = "as recorded"
 """Name of the first check of a rival."""
 
 
-def assess(samples: Samples, found: Calibration, t: Floats | None = None) -> Assessment:
+def assess(samples: Samples, calibration: Calibration, t: Floats | None = None) -> Assessment:
     """Ask what a calibration is worth beyond its own pushes.
 
     Args:
         samples: The readings that it was fitted to, those of a trial in the order of time.
-        found: The calibration.
+        calibration: The calibration.
         t: Times of the readings [s], shape (n,); None if they are not known.
     """
     pushes = Pushes.of(samples)
-    full_scale = (found.counts_low, found.counts_high) == (0.0, float(FULL_SCALE))
+    full_scale = (calibration.counts_low, calibration.counts_high) == (0.0, float(FULL_SCALE))
     whole = np.ones(len(samples.counts), dtype=bool)
 
     def check(of: Samples, used: Bools) -> dict[str, list[Floats]]:
@@ -176,19 +246,21 @@ def assess(samples: Samples, found: Calibration, t: Floats | None = None) -> Ass
         if (pushes.way > 0).any() and (pushes.way < 0).any():
             for name, sign in (("loading alone", 1), ("unloading alone", -1)):
                 checks[name] = check(samples, pushes.way == sign)
-    kept = {name: errors for name, errors in checks.items() if len(errors["sigmoid"]) > 1}
+    repeated = {name: errors for name, errors in checks.items() if len(errors["sigmoid"]) > 1}
     rivals = {
-        rival: {name: gain_of(errors, rival) for name, errors in kept.items()}
+        rival: {name: gain_of(errors, rival) for name, errors in repeated.items()}
         for rival in MODELS[1:]
     }
     named = tuple(r for r, gains in rivals.items() if gains and all(g.wins for g in gains.values()))
     return Assessment(
         pushes.count,
-        hysteresis(samples, pushes, found),
+        hysteresis(samples, pushes, calibration),
         _new_push(checks[RECORDED]["sigmoid"]),
         rivals,
         named,
-        None if t is None else relaxation(samples, t, found.counts_high - found.counts_low),
+        None
+        if t is None
+        else relaxation(samples, t, calibration.counts_high - calibration.counts_low),
     )
 
 
@@ -224,8 +296,8 @@ def branches(samples: Samples, pushes: Pushes) -> tuple[Floats, Floats, Floats]:
     grid = np.linspace(samples.level.min(), samples.level.max(), _GRID)
     pairs = []
     for number in np.unique(pushes.number):
-        here = pushes.number == number
-        both = [_branch(samples, here & (pushes.way == sign), grid) for sign in (1, -1)]
+        rows = pushes.number == number
+        both = [_branch(samples, rows & (pushes.way == sign), grid) for sign in (1, -1)]
         if np.isfinite(both[0] + both[1]).any():
             pairs.append(both)
     loaded, released = np.array(pairs).reshape(-1, 2, _GRID).swapaxes(0, 1)
@@ -240,27 +312,27 @@ def _branch(samples: Samples, rows: Bools, grid: Floats) -> Floats:
     edges = np.linspace(grid[0], grid[-1], _SLICES + 1)
     place = np.clip(np.digitize(level, edges) - 1, 0, _SLICES - 1)
     size = np.bincount(place, minlength=_SLICES)
-    kept = size > 0
-    middle = np.bincount(place, level, _SLICES)[kept] / size[kept]
-    mean = np.bincount(place, counts, _SLICES)[kept] / size[kept]
+    filled = size > 0
+    middle = np.bincount(place, level, _SLICES)[filled] / size[filled]
+    mean = np.bincount(place, counts, _SLICES)[filled] / size[filled]
     return np.interp(grid, middle, mean, left=np.nan, right=np.nan)
 
 
-def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteresis | None:
+def hysteresis(samples: Samples, pushes: Pushes, calibration: Calibration) -> Hysteresis | None:
     """The gap between loading and unloading; None if no push has both."""
     grid, loaded, released = branches(samples, pushes)
     usual = np.isfinite(loaded - released).sum(axis=0) >= max(1, len(loaded) / 2)
     if not usual.any():
         return None
     up, down = loaded[:, usual], released[:, usual]
-    span = found.counts_high - found.counts_low
+    span = calibration.counts_high - calibration.counts_low
     gap = np.nanmean(up - down, axis=0) / span
-    levels = np.nanmean(found.level(up) - found.level(down), axis=0)
+    levels = np.nanmean(calibration.level(up) - calibration.level(down), axis=0)
     worst = int(np.argmax(abs(gap)))
-    each = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
-    mean, interval = float(np.mean(each)), None
-    if len(each) > 1:
-        half = student95(len(each) - 1) * float(np.std(each, ddof=1)) / len(each) ** 0.5
+    gaps = [float(np.nanmean(one)) / span for one in up - down if np.isfinite(one).any()]
+    mean, interval = float(np.mean(gaps)), None
+    if len(gaps) > 1:
+        half = student95(len(gaps) - 1) * float(np.std(gaps, ddof=1)) / len(gaps) ** 0.5
         interval = (mean - half, mean + half)
     return Hysteresis(
         float(gap[worst]),
@@ -268,7 +340,7 @@ def hysteresis(samples: Samples, pushes: Pushes, found: Calibration) -> Hysteres
         mean,
         interval,
         float(levels[np.argmax(abs(levels))]),
-        len(each),
+        len(gaps),
         (sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)),
     )
 

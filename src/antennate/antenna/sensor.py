@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from antennate.robots.sensor import (
+from antennate.robots.antenna import (
     CONVERTER_AT_1_0_V,
     CONVERTER_AT_1_2_V,
     CONVERTER_LINE_END,

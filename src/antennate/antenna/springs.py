@@ -7,6 +7,11 @@ torque per turn: divide it by 2 pi for a stiffness per radian. Stress at the ins
 is K_i 32 M / (pi d^3), K_i = (4 C^2 - C - 1) / (4 C (C - 1)), C = D / d (Shigley, section 10-12).
 A spring bears a million cycles where amplitude a and mean m of that stress satisfy Gerber's
 a / S_e + (m / S_ut)^2 < 1 (the same section).
+
+A ladder of springs follows a tapering antenna. Bending stiffness E I of a round section goes with
+the fourth power of its diameter, so that the proxy is K = (d / d_1)^4 with d_1 at the base. The
+angles of springs in a row add up, each under the same torque: one spring that replaces a stretch of
+antenna has the harmonic mean of its stiffnesses.
 """
 
 from __future__ import annotations
@@ -21,7 +26,7 @@ import numpy as np
 
 from antennate import checks
 from antennate.errors import ConfigError
-from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringParams
+from antennate.params.spring import RATE_FACTOR, STOCK_WIRES_MM, WIRES, SpringParams, TaperParams
 from antennate.types import Floats
 
 Numbers = float | Floats | Sequence[float]
@@ -83,13 +88,13 @@ def _positive(name: str, value: Any, unit: str) -> float | Floats:
     """A finite number above 0, or an array of such."""
     if not isinstance(value, list | tuple) and np.ndim(value) == 0:
         return checks.real(name, value, unit, above=0.0)
-    found = checks.array(name, value, (), unit)
-    if (found <= 0.0).any():
+    numbers = checks.array(name, value, (), unit)
+    if (numbers <= 0.0).any():
         raise ConfigError(
             f"{name}: expected finite numbers above 0{f' [{unit}]' if unit else ''}, found "
-            f"{found[found <= 0.0][0]:g}"
+            f"{numbers[numbers <= 0.0][0]:g}"
         )
-    return found
+    return numbers
 
 
 def _stiffness(modulus: Any, wire: Any, coil: Any, coils: Any) -> Any:
@@ -205,14 +210,14 @@ def _reversals(course: Floats, least: float) -> int:
     """Turning points (n,) that the course leaves by more than `least`."""
     slope = np.sign(np.diff(course))
     turns = course[1:-1][slope[1:] * slope[:-1] <= 0.0].tolist()
-    found, way, end = 0, 0, float(course[0])
+    reversals, way, end = 0, 0, float(course[0])
     for value in [*turns, float(course[-1])]:
         if way * (value - end) > 0.0:
             end = value
         elif abs(value - end) > least:
-            found += way != 0
+            reversals += way != 0
             way, end = (1 if value > end else -1), value
-    return found
+    return reversals
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,3 +306,57 @@ def _wind(
         yield_angle=min(yield_angle(params, wire, coil, n) for n in coils),
         length=(max(coils) + 1) * wire,
     )
+
+
+def diameters(params: TaperParams) -> Floats:
+    """Diameters base to tip [m], shape (segments,)."""
+    ends, count = (1e-3 * params.base_mm, 1e-3 * params.tip_mm), params.segments
+    return np.geomspace(*ends, count) if params.law == "geometric" else np.linspace(*ends, count)
+
+
+def second_moment(diameter: Floats) -> Floats:
+    """Second moment of area of round sections [m⁴], same shape as their diameters [m]."""
+    return math.pi * diameter**4 / 64.0
+
+
+def proxy(diameter: Floats) -> Floats:
+    """Stiffness over that of the base, (d / d_1)^4, shape (n,)."""
+    return (diameter / diameter[0]) ** 4
+
+
+def binned(values: Floats, bins: int) -> Floats:
+    """Harmonic means of equal stretches of a row of segments, shape (bins,).
+
+    Args:
+        values: Stiffness of each segment, shape (n,); a segment that lies in two stretches counts
+            for each by its share.
+        bins: Number of stretches.
+    """
+    edges = np.linspace(0.0, len(values), bins + 1)
+    give = np.concatenate([[0.0], np.cumsum(1.0 / values)])
+    return len(values) / bins / np.diff(np.interp(edges, np.arange(len(values) + 1), give))
+
+
+def ladder_proxy(coils: Floats) -> Floats:
+    """Stiffness of a ladder of springs over that of its first, shape (n,)."""
+    return coils[0] / coils
+
+
+def distance_decades(first: Floats, second: Floats) -> float:
+    """Root mean square of the difference of two proxies in powers of ten."""
+    return float(np.sqrt(np.mean(np.log10(first / second) ** 2)))
+
+
+def follow(wanted: Floats, fewest: int, most: int) -> Floats:
+    """Whole coil counts whose ladder follows a proxy best, within limits, shape of `wanted`.
+
+    The base takes every count in turn; each further spring then takes the count that comes nearest
+    in proportion. Of these ladders the one nearest in decades wins, of equals the shortest.
+    """
+    ladders = []
+    for base in range(fewest, most + 1):
+        exact = np.clip(base / wanted * wanted[0], fewest, most)
+        below, above = np.floor(exact), np.minimum(np.ceil(exact), most)
+        ladders.append(np.where(exact / below <= above / exact, below, above))
+    aim = wanted / wanted[0]
+    return min(ladders, key=lambda coils: distance_decades(ladder_proxy(coils), aim))

@@ -74,9 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code.
     """
     from antennate.cli.terminal import safe_streams
-    from antennate.sim.describing import describe_only
-    from antennate.sim.engine_warnings import dropped
-    from antennate.sim.gl import keep_wish
+    from antennate.sim.engine_setup import describe_only, dropped, keep_wish
 
     keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)

@@ -18,9 +18,8 @@ from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import Option, fields_of, flag_of, option, options_of
 from antennate.errors import ConfigError
 from antennate.messages import command_words, nearest, shortened, shown
-from antennate.params.base import Params, changes
+from antennate.params.base import Config, Params, changes, put_over, read_file
 from antennate.params.faults import describe, group_of
-from antennate.params.reading import Config, put_over, read_file
 
 
 class HelpRequest(Exception):

@@ -30,8 +30,7 @@ from antennate.errors import (
 )
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import command_words, extra, one_line, shortened, typed
-from antennate.params.base import Params
-from antennate.params.reading import from_values
+from antennate.params.base import Params, from_values
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
 from antennate.studies.report import command_of

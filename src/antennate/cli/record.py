@@ -15,7 +15,7 @@ from statistics import fmean, pstdev
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.antenna.plateau import plateau_of
+from antennate.antenna.curves import plateau_of
 from antennate.cli import OK
 from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
@@ -28,7 +28,7 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recording import Recorder
 from antennate.hardware.host import HostClock
 from antennate.messages import typed
-from antennate.params.record import RecordParams
+from antennate.params.bench import RecordParams
 
 DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you

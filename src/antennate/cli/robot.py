@@ -24,11 +24,9 @@ from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.check import same
 from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
-from antennate.params.base import Params
-from antennate.params.reading import Config, read_file
-from antennate.robots.parts import bill
+from antennate.params.base import Config, Params, read_file
+from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
 from antennate.robots.spec import RobotSpec
-from antennate.robots.supply import Rail, Supply, servos_of, supply
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View

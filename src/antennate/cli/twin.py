@@ -31,13 +31,13 @@ from antennate.hardware.ports.finder import read_key
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
 from antennate.telemetry.twin_log import TwinLog
+from antennate.twin.board import UdpEndpoint
 from antennate.twin.config import Passage, TwinConfig, watched
 from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
-from antennate.twin.servo_box import ServoBox, ServoEntry, read_list
-from antennate.twin.udp import UdpEndpoint
+from antennate.twin.servos import ServoBox, ServoEntry, read_list
 from antennate.types import AntennaFrame
 
 if TYPE_CHECKING:

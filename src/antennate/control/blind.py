@@ -23,8 +23,13 @@ import numpy as np
 from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
 from antennate.control.knowledge import Knowledge
-from antennate.params.blind import RandomParams, ScheduleParams, ZigzagParams
-from antennate.params.control import ControlParams, EscapeParams
+from antennate.params.control import (
+    ControlParams,
+    EscapeParams,
+    RandomParams,
+    ScheduleParams,
+    ZigzagParams,
+)
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Contact, Floats, Ints, Maneuver
 

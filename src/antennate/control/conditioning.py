@@ -1,8 +1,16 @@
-"""Counts to the bending level b in [0, 1]: a running mean over T_avg, then one sigmoid.
+"""From counts to what is felt: bending level, contact, and whether readings repeat.
 
-A sample that cannot be used, one that is missing or at a rail of the converter, makes the level of
-its side NaN as long as it is in the window of the mean. `contact.py` turns NaN into UNKNOWN. So a
-broken wire is UNKNOWN in simulation, too; on a robot the diagnosis of each channel finds more.
+A running mean over T_avg, then one sigmoid give the level b in [0, 1]. A sample that cannot be
+used, one that is missing or at a rail of the converter, makes the level of its side NaN as long as
+it is in the window of the mean, and its contact UNKNOWN. So a broken wire is UNKNOWN in simulation,
+too; on a robot the diagnosis of each channel finds more.
+
+Is the robot stuck? It is if its readings repeat from one gait cycle to the next. A robot that
+advances touches new things in every cycle, so its readings change. A robot that walks on the spot
+gets the same readings in every cycle. The measure is the mean over a window of |y(t) - y(t - T)|, T
+the gait period and y the flex of an antenna as a fraction of its calibrated range (0 straight, 1
+fully bent). Where it stays small while an antenna is pressed, the robot is stuck. In free air it is
+small too, but nothing is pressed. Only the antennae and the gait's own phase enter.
 """
 
 from __future__ import annotations
@@ -11,8 +19,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from antennate.params.control import ConditioningParams, ControlParams, CurveParams
-from antennate.types import Bools, Floats, Ints
+from antennate.params.control import (
+    ConditioningParams,
+    ControlParams,
+    CurveParams,
+    RepetitionParams,
+    RuleParams,
+)
+from antennate.types import Bools, Contact, Floats, Ints
 
 LOW_RAIL = 5.0
 """Readings up to this are at the lower rail [counts]: two sigma of the noise above 0 (assumed)."""
@@ -69,7 +83,9 @@ def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
 def level_and_fraction(params: CurveParams | Curves, counts: Floats) -> tuple[Floats, Floats]:
     """`bending_level`, and flex as a fraction of the calibrated range: 0 straight, 1 fully bent."""
     x = _share(params, counts)
-    return _level(params, x), _fraction(params, x)
+    if isinstance(params, Curves):
+        return _level(params, x), np.where(params.polarity > 0, x, 1.0 - x)
+    return _level(params, x), x if params.polarity > 0 else 1.0 - x
 
 
 def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
@@ -79,12 +95,6 @@ def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
 
 def _level(params: CurveParams | Curves, x: Floats) -> Floats:
     return sigmoid(params.polarity * params.slope * (x - params.midpoint))
-
-
-def _fraction(params: CurveParams | Curves, x: Floats) -> Floats:
-    if isinstance(params, Curves):
-        return np.where(params.polarity > 0, x, 1.0 - x)
-    return x if params.polarity > 0 else 1.0 - x
 
 
 class RunningMean:
@@ -113,3 +123,96 @@ class RunningMean:
         self._short -= 1
         self._seen = np.minimum(self._seen + 1, self.length)
         return total / self._seen[:, None]
+
+
+_FREE, _CONTACT, _UNKNOWN = int(Contact.FREE), int(Contact.CONTACT), int(Contact.UNKNOWN)
+"""As plain integers: comparing an array with an enum costs four times as much."""
+
+
+def contact_of(params: RuleParams, level: Floats, before: Ints) -> Ints:
+    """Contact of each side.
+
+    Args:
+        params: Threshold and hysteresis.
+        level: Bending levels, shape (B, 2); NaN where it is unknown.
+        before: Contact at the tick before, shape (B, 2).
+
+    Returns:
+        One `Contact` a side, shape (B, 2).
+    """
+    touching = before == _CONTACT
+    bound = params.threshold - params.hysteresis * touching
+    state = np.where(level >= bound, _CONTACT, _FREE)
+    return np.where(np.isnan(level), _UNKNOWN, state)
+
+
+class ContactState:
+    """Contact with its memory of the tick before."""
+
+    def __init__(self, params: RuleParams, batch: int) -> None:
+        self._params = params
+        self._state: Ints = np.full((batch, 2), int(Contact.FREE))
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows start free."""
+        self._state[rows] = Contact.FREE
+
+    def step(self, level: Floats) -> Ints:
+        """Contact for bending levels, shape (B, 2)."""
+        self._state = contact_of(self._params, level, self._state)
+        return self._state
+
+
+class RepetitionDetector:
+    """Compares every sample with the one a gait cycle before, per row and side."""
+
+    def __init__(
+        self, params: RepetitionParams, batch: int, period: float, frequency: float
+    ) -> None:
+        self._params = params
+        cycle = max(1, round(1.0 / (frequency * period)))
+        window = max(1, round(params.window_cycles * cycle))
+        self._needed = cycle + window
+        self._last: Floats = np.zeros((cycle, batch, 2))
+        self._change: Floats = np.zeros((window, batch, 2))
+        self._press: Floats = np.zeros((window, batch, 2))
+        self._ticks = 0
+        self._walked: Ints = np.zeros(batch, dtype=np.int64)
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows forget everything."""
+        for memory in (self._last, self._change, self._press):
+            memory[:, rows] = 0.0
+        self._walked[rows] = 0
+
+    def step(self, flex: Floats, walking: Bools) -> Bools:
+        """Take one sample and say which rows are stuck.
+
+        Args:
+            flex: 0 straight, 1 fully bent, shape (B, 2); NaN counts as straight.
+            walking: Rows whose gait runs forward undisturbed, shape (B,).
+
+        Returns:
+            Rows that walk, are pressed, and whose readings repeat, shape (B,). Only samples taken
+            while walking are compared, so nothing repeats before a cycle and a window are over.
+        """
+        sample = np.where(np.isnan(flex), 0.0, flex)
+        in_cycle, in_window = self._ticks % len(self._last), self._ticks % len(self._change)
+        self._change[in_window] = np.abs(sample - self._last[in_cycle])
+        self._press[in_window] = np.abs(sample)
+        self._last[in_cycle] = sample
+        self._ticks += 1
+        self._walked = np.where(walking, self._walked + 1, 0)
+        ready = self._walked >= self._needed
+        if not np.count_nonzero(ready):
+            return ready
+        pressed = ready & (_largest_mean(self._press) > self._params.pressure)
+        if not np.count_nonzero(pressed):  # the other mean costs as much as the rest of a step
+            return pressed
+        return pressed & (_largest_mean(self._change) < self._params.change)
+
+
+def _largest_mean(memory: Floats) -> Floats:
+    """Mean over the window (ticks, B, 2) of the side where it is larger, shape (B,)."""
+    left, right = (np.add.reduce(memory, axis=0) / len(memory)).T
+    return np.maximum(left, right)

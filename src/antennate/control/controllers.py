@@ -11,23 +11,135 @@ Conditioning, contact and gait are the same in all. The rule that chooses the ma
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
 
-from antennate.control.conditioning import RunningMean, curves, level_and_fraction
-from antennate.control.contact import ContactState
-from antennate.control.escape import Escape
+from antennate.control.conditioning import (
+    ContactState,
+    RepetitionDetector,
+    RunningMean,
+    curves,
+    level_and_fraction,
+)
+from antennate.control.escape import Escape, SearchRule
 from antennate.control.gait import Gait
-from antennate.control.knowledge import Kind, Knowledge
-from antennate.control.maneuver import Hold, decide
-from antennate.control.map_rule import MapRule
-from antennate.control.repetition import RepetitionDetector
-from antennate.control.search import SearchRule
-from antennate.params.control import ControlParams
-from antennate.robots.sides import LEFT, RIGHT
+from antennate.control.knowledge import ALIGNED, Kind, Knowledge, aligned
+from antennate.params.control import ControlParams, EscapeParams, RuleParams
 from antennate.robots.spec import RobotSpec, require_antennae
-from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
+from antennate.types import (
+    LEFT,
+    RIGHT,
+    AntennaFrame,
+    Bools,
+    Contact,
+    Floats,
+    Ints,
+    JointCommand,
+    Maneuver,
+)
+
+
+def decide(params: RuleParams, contact: Ints, level: Floats) -> Ints:
+    """The paper's table.
+
+    No side in contact: FORWARD. Both strong and similar: REVERSE. Otherwise turn away from the side
+    that touches, or that touches more; right if both touch alike. A side that is UNKNOWN: HOLD.
+
+    Args:
+        params: Bounds of strong and similar.
+        contact: One `Contact` a side, shape (B, 2).
+        level: Bending levels, shape (B, 2).
+
+    Returns:
+        One `Maneuver` a row, shape (B,).
+    """
+    touch = contact == Contact.CONTACT
+    difference = level[:, LEFT] - level[:, RIGHT]
+    strong = (level >= params.strong).all(axis=1)
+    blocked = touch.all(axis=1) & strong & (np.abs(difference) < params.similar)
+    lean = np.where(touch.all(axis=1), difference, touch[:, LEFT] * 1.0 - touch[:, RIGHT])
+    turn = np.where(lean >= 0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
+    chosen = np.where(touch.any(axis=1), turn, int(Maneuver.FORWARD))
+    chosen = np.where(blocked, int(Maneuver.REVERSE), chosen)
+    return np.where((contact == Contact.UNKNOWN).any(axis=1), int(Maneuver.HOLD), chosen)
+
+
+class Hold:
+    """Keeps a maneuver for its time; FORWARD is left as soon as something touches, HOLD at once."""
+
+    def __init__(self, batch: int) -> None:
+        self.current: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self.until: Floats = np.full(batch, -np.inf)
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows start FORWARD and free to change."""
+        self.current[rows] = Maneuver.FORWARD
+        self.until[rows] = -np.inf
+
+    def step(self, t: Floats, wanted: Ints, duration: Floats | float) -> Ints:
+        """The maneuver in force at t [s], shape (B,); a new one is kept for `duration` [s]."""
+        stop = wanted == Maneuver.HOLD
+        held = (t < self.until) & (self.current != Maneuver.HOLD) & ~stop
+        chosen = np.where(held, self.current, wanted)
+        renewed = ~held & (wanted != Maneuver.FORWARD) & ~stop
+        self.until = np.where(renewed, t + duration, np.where(stop, -np.inf, self.until))
+        self.current = chosen
+        return chosen
+
+
+TURN_FROM = math.radians(45.0)
+"""Angle to the point ahead from which on it turns [rad]; the head itself swings by 25 degrees."""
+
+
+class MapRule:
+    """Turns to a point ahead and walks there."""
+
+    knows: tuple[Kind, ...] = ("jam", "map")
+    needs: tuple[Kind, ...] = knows
+
+    def __init__(self, control: ControlParams, batch: int) -> None:
+        self._params: EscapeParams = control.escape
+        self.turn_offset = control.escape.turn_offset
+        self._maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self._until: Floats = np.zeros(batch)
+        self._jam: Bools = np.zeros(batch, dtype=bool)
+        self._map: Floats = np.full(batch, math.nan)
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows begin anew, walking."""
+        self._maneuver[rows] = Maneuver.FORWARD
+        self._until[rows] = 0.0
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take what holds now."""
+        if knowledge.jam is not None:
+            self._jam = knowledge.jam
+        if knowledge.map is not None:
+            self._map = knowledge.map
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        """As of a `Rule`; a row without a heading, or with a reading that is UNKNOWN, holds."""
+        known = ~(contact == int(Contact.UNKNOWN)).any(axis=1) & ~np.isnan(self._map)
+        walking = known & (self._maneuver == int(Maneuver.FORWARD))
+        backing = known & (self._maneuver == int(Maneuver.REVERSE))
+        turning = known & ~walking & ~backing
+        over = t >= self._until
+        off = np.abs(np.nan_to_num(self._map))
+        ahead = aligned(self._maneuver, self._map)
+        self._to(turning & ahead, int(Maneuver.FORWARD), t)
+        back = (walking & self._jam) | (turning & over & ~ahead)
+        self._to(back, int(Maneuver.REVERSE), t + self._params.reverse_time)
+        turn = (walking & ~back & (off > TURN_FROM)) | (backing & over & (off > ALIGNED))
+        side = np.where(self._map > 0, int(Maneuver.TURN_L), int(Maneuver.TURN_R))
+        self._to(turn, side, t + self._params.return_time)
+        self._to(backing & over & ~turn, int(Maneuver.FORWARD), t)
+        return np.where(known, self._maneuver, int(Maneuver.HOLD))
+
+    def _to(self, rows: Bools, maneuver: Ints | int, until: Floats) -> None:
+        self._maneuver = np.where(rows, maneuver, self._maneuver)
+        self._until = np.where(rows, until, self._until)
 
 
 class Rule(Protocol):

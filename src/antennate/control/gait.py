@@ -22,8 +22,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from antennate.params.control import GaitParams
-from antennate.params.gaits import LiftParams
+from antennate.params.gaits import GaitParams, LiftParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 

@@ -1,12 +1,33 @@
-"""The control loop of all robots: read, decide, write, wait for the next tick."""
+"""The control loop of all robots: read, decide, write, wait for the next tick.
+
+What stands between robot and controller: a check of every answer, since a controller may be
+anybody's code, and new numbers for a controller that runs.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
 
-from antennate.types import AntennaFrame, JointCommand, Robot
+import numpy as np
+
+from antennate.control.knowledge import Kind, Knowing, Knowledge
+from antennate.errors import ControllerError, is_ctrl_c, raised
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import (
+    AntennaFrame,
+    Bools,
+    Contact,
+    Controller,
+    Floats,
+    Ints,
+    JointCommand,
+    Maneuver,
+    Robot,
+)
 
 _ROUNDING = 1e-6
 
@@ -55,3 +76,205 @@ def run_loop(
 def next_tick(number: int, elapsed: float, period: float) -> int:
     """The first tick after one of this number that is not yet due, a time [s] after the start."""
     return max(number + 1, math.ceil(elapsed / period - _ROUNDING))
+
+
+_LAST, _MOST_CONTACT = max(Maneuver), max(Contact)
+_KINDS = (
+    ("maneuver", "whole numbers", "iu"),
+    ("contact", "whole numbers", "iu"),
+    ("level", "real numbers", "fiu"),
+)
+"""What the numbers of a decision are, and the kinds of NumPy that hold them."""
+
+
+@contextmanager
+def _errors_of(what: str) -> Iterator[None]:
+    """Raise a ControllerError for whatever a method of a controller raises, but Ctrl-C."""
+    try:
+        yield
+    except BaseException as error:
+        if is_ctrl_c(error):
+            raise
+        raise ControllerError(f"{what} raised {raised(error)}") from error
+
+
+class CheckedController:
+    """A controller, and what is wrong with its last step.
+
+    An exception, an array of another shape or a decision that is no integer affects all rows and
+    raises `ControllerError`. An angle that is not finite, an infinite level, or a number that is no
+    `Maneuver` or `Contact`, affects one row and is listed in `faults`.
+
+    Args:
+        controller: The controller of `batch` robots.
+        robot: The robot.
+        batch: Number of robots B.
+
+    Attributes:
+        maneuver: `Maneuver` of the last step, shape (B,).
+        faults: What is wrong with a row of the last step, by row.
+    """
+
+    def __init__(self, controller: Controller, robot: RobotSpec, batch: int) -> None:
+        self._controller = controller
+        self._shapes = robot.command_shapes(batch)
+        self._attributes = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
+        self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self.faults: dict[int, str] = {}
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew.
+
+        Raises:
+            ControllerError: The controller raised an exception.
+        """
+        with _errors_of("reset"):
+            self._controller.reset(rows, phase)
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Give it what a simulation knows, if it can use any.
+
+        Raises:
+            ControllerError: The controller raised an exception.
+        """
+        if isinstance(self._controller, Knowing):
+            with _errors_of("know"):
+                self._controller.know(knowledge)
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period of all rows.
+
+        Raises:
+            ControllerError: The step raised an exception, or its answer has another form.
+        """
+        self.faults = {}
+        try:
+            command = self._controller.step(frame)
+            if command is None:  # pyright: ignore[reportUnnecessaryComparison] `return` forgotten
+                raise ControllerError("expected a JointCommand from step, found None")
+            self._require_shapes(command)
+            self.maneuver = self._controller.maneuver
+            sound = self._all_sound(command)
+        except ControllerError:
+            raise
+        except BaseException as error:
+            if is_ctrl_c(error):
+                raise
+            raise ControllerError(f"step raised {raised(error)}") from error
+        if not sound:
+            self._find_faults(command)
+        return command
+
+    def _require_shapes(self, command: JointCommand) -> None:
+        """Arrays of the right shapes."""
+        for owner, shapes in ((command, self._shapes), (self._controller, self._attributes)):
+            for name, shape in shapes.items():
+                value = getattr(owner, name)
+                if not isinstance(value, np.ndarray):
+                    raise ControllerError(
+                        f"expected an array as {name}, found {type(value).__name__}"
+                    )
+                if value.shape != shape:
+                    raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
+        for name in self._shapes:
+            if (kind := getattr(command, name).dtype).kind not in "fiu":
+                raise ControllerError(f"expected real numbers as {name}, found an array of {kind}")
+        for name, words, kinds in _KINDS:
+            kind = getattr(self._controller, name).dtype
+            if kind.kind not in kinds:
+                raise ControllerError(f"expected {words} as {name}, found an array of {kind}")
+
+    def _all_sound(self, command: JointCommand) -> bool:
+        """Whether no row has a fault. A product that is finite has finite factors."""
+        maneuvers, contacts = self.maneuver.tolist(), self._controller.contact.ravel().tolist()
+        angles = [getattr(command, name) for name in self._shapes]
+        squares = sum(float(np.vdot(a, a)) for a in angles)
+        known = min(contacts) >= 0 and max(contacts) <= _MOST_CONTACT
+        known = known and not np.isinf(self._controller.level).any()
+        return known and math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
+
+    def _find_faults(self, command: JointCommand) -> None:
+        for name in self._shapes:
+            angles: Floats = getattr(command, name)
+            for row in np.flatnonzero(~np.isfinite(angles.reshape(len(angles), -1)).all(axis=1)):
+                self.faults[int(row)] = f"expected finite angles in {name}, found {angles[row]}"
+        for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
+            self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"
+        contact = self._controller.contact
+        for row in np.flatnonzero(((contact < 0) | (contact > _MOST_CONTACT)).any(axis=1)):
+            self.faults[int(row)] = f"expected contacts of 0 to 2, found {contact[row]}"
+        level = self._controller.level
+        for row in np.flatnonzero(np.isinf(level).any(axis=1)):
+            self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {level[row]}"
+
+
+class Retunable:
+    """A controller of one robot that is made anew with other numbers and keeps its gait phase.
+
+    What it remembered is forgotten then: means, the maneuver that it held, an escape.
+
+    Args:
+        make: Makes the controller of such numbers.
+        control: The numbers at first.
+
+    Attributes:
+        control: The numbers in force.
+    """
+
+    def __init__(self, make: Callable[[ControlParams], Controller], control: ControlParams) -> None:
+        self._make, self.control = make, control
+        self._made = make(control)
+
+    def retune(self, control: ControlParams) -> None:
+        """Go on with other numbers.
+
+        Raises:
+            ConfigError: There is no such controller with these.
+        """
+        phase: Any = getattr(self._made, "phase", None)
+        self._made = self._make(control)
+        self.control = control
+        self._made.reset(np.array([0]), 0.0 if phase is None else np.array(phase))
+
+    @property
+    def maneuver(self) -> Ints:
+        """As of a `Controller`."""
+        return self._made.maneuver
+
+    @property
+    def contact(self) -> Ints:
+        """As of a `Controller`."""
+        return self._made.contact
+
+    @property
+    def level(self) -> Floats:
+        """As of a `Controller`."""
+        return self._made.level
+
+    @property
+    def phase(self) -> Floats | None:
+        """Gait phase [rad], shape (1,); None if the controller tells none."""
+        return getattr(self._made, "phase", None)
+
+    @property
+    def knows(self) -> tuple[Kind, ...]:
+        """As of `Knowing`; none of a controller that is none."""
+        return self._made.knows if isinstance(self._made, Knowing) else ()
+
+    @property
+    def needs(self) -> tuple[Kind, ...]:
+        """As of `Knowing`; none of a controller that is none."""
+        return self._made.needs if isinstance(self._made, Knowing) else ()
+
+    def know(self, knowledge: Knowledge) -> None:
+        """As of `Knowing`."""
+        if isinstance(self._made, Knowing):
+            self._made.know(knowledge)
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """As of a `Controller`."""
+        self._made.reset(rows, phase)
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """As of a `Controller`."""
+        return self._made.step(frame)

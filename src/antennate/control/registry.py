@@ -119,7 +119,7 @@ def make_controller(
     checks.instance("robot", robot, RobotSpec)
     batch = checks.whole("batch", batch, least=1)
     try:
-        made = factory(control, robot, batch)
+        controller = factory(control, robot, batch)
     except KeyboardInterrupt:
         raise
     except ConfigError as error:
@@ -129,8 +129,10 @@ def make_controller(
             f"expected a controller that is made from (control, robot, batch), found {name!r}: "
             f"{raised(error)}"
         ) from error
-    if lacking := [part for part in ("reset", "step") if not callable(getattr(made, part, None))]:
+    if lacking := [
+        part for part in ("reset", "step") if not callable(getattr(controller, part, None))
+    ]:
         raise ConfigError(
             f"expected a controller with reset and step, found {name!r} without {lacking[0]}"
         )
-    return made
+    return controller

@@ -6,7 +6,7 @@ import numpy as np
 
 from antennate.antenna import sensor as flex_sensor
 from antennate.params.control import ConditioningParams
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Floats, Ints
 
 

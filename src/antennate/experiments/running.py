@@ -11,12 +11,10 @@ from typing import Any
 
 from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, ControllerFactory
-from antennate.dataframe import from_rows
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
-from antennate.notebook import html
-from antennate.params.base import Params
-from antennate.params.reading import from_values
+from antennate.notebook import from_rows, html
+from antennate.params.base import Params, from_values
 from antennate.studies.engines import LOCAL, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity

@@ -9,22 +9,32 @@ from typing import Any, ClassVar, Self, TypeVar
 from pydantic import field_validator, model_validator
 
 from antennate.antenna.calibration import Calibration
-from antennate.control.readers import TELEOP, UNREAD, unread_by_all
+from antennate.control.readers import (
+    SIMULATION_ALONE,
+    TELEOP,
+    UNDRIVEN,
+    UNREAD,
+    unread_by_all,
+    unused,
+)
 from antennate.control.registry import BUILT_IN, check_for_robots
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.hardware.safety import deadlines
 from antennate.messages import shown
 from antennate.params.base import Params, number, paths_of
+from antennate.params.bench import RecordParams
 from antennate.params.control import ConditioningParams, ControlParams
-from antennate.params.dead_man import DeadManParams
-from antennate.params.doctor import DoctorParams
-from antennate.params.endurance import DriftParams
-from antennate.params.network import NetworkParams
-from antennate.params.record import RecordParams
-from antennate.params.safety import SupervisorParams, TouchCheckParams
-from antennate.params.setup import JogParams, PortsParams, SetupParams, TeleopParams
-from antennate.robots.readers import SIMULATION_ALONE, UNDRIVEN, unused
+from antennate.params.hardware import (
+    DeadManParams,
+    DoctorParams,
+    JogParams,
+    NetworkParams,
+    PortsParams,
+    SetupParams,
+    TeleopParams,
+)
+from antennate.params.safety import DriftParams, SupervisorParams, TouchCheckParams
 from antennate.robots.spec import RobotSpec
 
 

@@ -1,14 +1,16 @@
-"""How a number is declared: a frozen model and a field with unit and source."""
+"""A group of numbers: how one is declared, and how it is read from a file or from Python."""
 
 from __future__ import annotations
 
 import ast
 import functools
 import inspect
+import json
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, ClassVar, Self
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeVar, cast
 
 from pydantic import (
     BaseModel,
@@ -20,7 +22,8 @@ from pydantic import (
 )
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.params.faults import Unread, describe
+from antennate.files import TOO_LONG, read_toml
+from antennate.params.faults import Unread, describe, group_of
 
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
@@ -96,20 +99,20 @@ def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any]]:
         group: Any = config
         for part in groups:
             group = getattr(group, part)
-        if (found := getattr(group, name)) != type(group).model_fields[name].default:
-            yield path, found
+        if (value := getattr(group, name)) != type(group).model_fields[name].default:
+            yield path, value
 
 
 def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
     """Every parameter of a group that stands at a dotted path."""
-    found: list[str] = []
+    paths: list[str] = []
     for name, field in model.model_fields.items():
         kind, deeper = field.annotation, f"{path}.{name}".lstrip(".")
         if isinstance(kind, type) and issubclass(kind, Params):
-            found += paths_of(kind, deeper)
+            paths += paths_of(kind, deeper)
         else:
-            found.append(deeper)
-    return tuple(found)
+            paths.append(deeper)
+    return tuple(paths)
 
 
 def require_default(config: Params, why: str, *paths: str) -> None:
@@ -203,7 +206,7 @@ def _docstrings(model: type) -> dict[str, str]:
     They are read from the source when they are asked for: pydantic's `use_attribute_docstrings`
     reads it whenever a class is made, which took a fifth of the time of a refused command.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for kind in reversed(model.__mro__):
         if not issubclass(kind, BaseModel) or kind.__module__.startswith("pydantic"):
             continue
@@ -214,7 +217,82 @@ def _docstrings(model: type) -> dict[str, str]:
         for field, text in pairwise(body.body if isinstance(body, ast.ClassDef) else ()):
             match field, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(ast.Constant(str(words))):
-                    found[name] = inspect.cleandoc(words)
+                    texts[name] = inspect.cleandoc(words)
                 case _:
                     pass
-    return found
+    return texts
+
+
+LARGEST_FILE = 1_000_000
+"""Most bytes of a configuration file."""
+
+Config = TypeVar("Config", bound=Params)
+
+
+def read_file(path: Path, model: type[Config]) -> Config:
+    """A configuration from a TOML file with the model's keys.
+
+    Where the model has a group of which some are known by name, such as a robot, the file may hold
+    that name or the path of a file, or a table whose `base` is one; a path starts at the folder of
+    the file that holds it.
+
+    Args:
+        path: The file.
+        model: What it holds.
+
+    Raises:
+        ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
+    """
+    table = with_bases(read_toml(path, LARGEST_FILE), model, path.parent)
+    try:
+        text = json.dumps(table, default=str)
+    except ValueError:  # of TOML's whole numbers in other bases
+        raise ConfigError(f"{path}: {TOO_LONG}") from None
+    try:
+        return model.model_validate_json(text, strict=True)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {describe(error, model)}") from None
+
+
+def with_bases(table: Mapping[str, Any], model: type[BaseModel], folder: Path) -> dict[str, Any]:
+    """The table with names and bases of known groups replaced by what they stand for."""
+    result = dict(table)
+    for name, field in model.model_fields.items():
+        group, value = group_of(field.annotation), table.get(name)
+        named = getattr(group, "named", None)
+        if group is None:
+            continue
+        if named is not None and isinstance(value, str):
+            value = {"base": value}
+        if isinstance(value, dict):
+            value = with_bases(cast("dict[str, Any]", value), group, folder)
+            if named is not None and isinstance(base := value.get("base"), str):
+                known = named(base, folder).model_dump(mode="json")
+                value = put_over(known, {k: v for k, v in value.items() if k != "base"})
+            result[name] = value
+    return result
+
+
+def put_over(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables: the values of `table` over those of `base`."""
+    result = dict(base)
+    for key, value in table.items():
+        old = result.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            old, value = cast("dict[str, Any]", old), cast("dict[str, Any]", value)
+            result[key] = put_over(old, value)
+        else:
+            result[key] = value
+    return result
+
+
+def from_values(model: type[Config], values: Mapping[str, Any]) -> Config:
+    """A configuration from values given in Python.
+
+    Raises:
+        ConfigError: A value is unknown, of the wrong type or out of bounds.
+    """
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        raise ConfigError(describe(error, model)) from None

@@ -1,9 +1,11 @@
-"""What the antenna meets on the bench, and how it is moved there."""
+"""The bench: what the antenna meets there, how it is moved, and how it is recorded."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
 
 from antennate.params.base import Params, number
 
@@ -66,3 +68,186 @@ class BenchVariationParams(Params):
     """Half range of the base angle."""
     overlap: float = number(0.0005, "m", "assumed: set by hand", ge=0, le=0.01)
     """Half range of the overlap."""
+
+
+_BLUNT = "assumed: a blunt end, which the antenna meets from the side"
+_GRAZED = "assumed: the tip comes to the wall at a shallow angle, as beside a robot that drifts"
+
+
+class FlatWallParams(Params):
+    """A straight wall, parallel to the traverse."""
+
+    entry_deg: float = number(15.0, "deg", _GRAZED, ge=5, le=90)
+    """Angle of the faces at both ends to the traverse; 90 is blunt."""
+
+
+class SinusoidalWallParams(Params):
+    """A wavy wall about the straight one."""
+
+    amplitude: float = number(0.005, "m", "assumed: as thick as the antenna", gt=0, le=0.05)
+    """Amplitude."""
+    wavelength: float = number(0.05, "m", "assumed: half the length of the antenna", ge=0.004, le=1)
+    """Length of a wave."""
+    entry_deg: float = number(15.0, "deg", _GRAZED, ge=5, le=90)
+    """Angle of the faces at both ends to the traverse; 90 is blunt."""
+
+
+class BouldersWallParams(Params):
+    """Spheres in a row; the wall's surface touches them all."""
+
+    radius: float = number(0.003175, "m", "paper: spheres of 6.35 mm", ge=0.0005, le=0.1)
+    """Radius of a sphere."""
+    pitch: float = number(0.00635, "m", "paper: spheres in a column, touching", ge=0.001)
+    """Distance of neighbours."""
+
+
+class StepWallParams(Params):
+    """A wall that steps back in its middle."""
+
+    depth: float = number(0.06, "m", "assumed: half the antenna; it then comes off", gt=0, le=0.4)
+    """How far it steps back."""
+    entry_deg: float = number(90.0, "deg", _BLUNT, ge=5, le=90)
+    """Angle of the faces at both ends to the traverse; 90 is blunt."""
+
+
+class GapWallParams(Params):
+    """A wall with a gap in its middle."""
+
+    width: float = number(0.20, "m", "assumed: a trailing antenna swings in 0.16 m", gt=0, le=2)
+    """Width of the gap."""
+    entry_deg: float = number(90.0, "deg", _BLUNT, ge=5, le=90)
+    """Angle of the faces at both ends to the traverse; 90 is blunt."""
+
+
+class CornerWallParams(Params):
+    """A wall that turns towards the traverse behind its middle, and ends there."""
+
+    turn_deg: float = number(30.0, "deg", "assumed: an obtuse inner corner", ge=5, le=90)
+    """Turn of the wall."""
+    rise: float = number(0.02, "m", "assumed: as far as the overlap", gt=0, le=0.4)
+    """How much nearer the wall comes."""
+    entry_deg: float = number(90.0, "deg", _BLUNT, ge=5, le=90)
+    """Angle of the faces at both ends to the traverse; 90 is blunt."""
+
+
+class TouchWallsParams(Params):
+    """The walls of `antennate bench touch` by kind."""
+
+    flat: FlatWallParams = FlatWallParams()
+    sinusoidal: SinusoidalWallParams = SinusoidalWallParams()
+    boulders: BouldersWallParams = BouldersWallParams()
+    step: StepWallParams = StepWallParams()
+    gap: GapWallParams = GapWallParams()
+    corner: CornerWallParams = CornerWallParams()
+
+
+_Place = Annotated[float, Field(gt=0, le=1)]
+
+
+class SweepParams(Params):
+    """The sweep of an antenna's base, theta0 + A sin(2 pi f t)."""
+
+    centre: float = number(math.radians(47.0), "rad", "assumed: the mounting angle", ge=0, le=2.0)
+    """Centre theta0 of the sweep from the heading, outwards."""
+    amplitude: float = number(math.radians(30.0), "rad", "assumed: ahead to sideways", gt=0, le=1.5)
+    """Amplitude A of the sweep."""
+    frequency: float = number(
+        0.5,
+        "Hz",
+        "assumed: that of the gait; inertia bends the antenna by 2.3 deg, at 1 Hz by 7",
+        gt=0,
+        le=3,
+    )
+    """Sweeps a second, f."""
+
+
+class ShapeParams(Params):
+    """What tells the shapes of a touching antenna apart."""
+
+    flex: float = number(
+        math.radians(5.0),
+        "rad",
+        "assumed: twice the 2.3 deg that inertia bends it in free air",
+        gt=0,
+        le=1,
+    )
+    """Summed hinge angles under the flex sensor below which the antenna is straight."""
+    offset: float = number(
+        math.radians(2.5),
+        "rad",
+        "assumed: half of that flex, as at the tip of an evenly bent chain",
+        gt=0,
+        le=1,
+    )
+    """Angle of the tip off the base's direction below which the antenna is straight."""
+    gap: float = number(5e-4, "m", "assumed: depth over which contacts stiffen", gt=0, le=0.01)
+    """Distance to a wall that counts as touching."""
+
+
+class EstimateParams(Params):
+    """Trials of the estimates, and what differs between them."""
+
+    trials: int = number(60, "1", "assumed: three times the paper's 20", ge=6, le=100000)
+    """Trials to calibrate, and as many to test, in every condition."""
+    distance: tuple[_Place, _Place] = number(
+        (0.4, 0.9), "1", "assumed: within reach of the default sweep"
+    )
+    """Range of wall distances, over the length of the antenna."""
+    centre_range: float = number(
+        math.radians(10.0), "rad", "assumed: the body yaws by so much while it walks", ge=0, le=1
+    )
+    """Half range of the centre where the sweep is varied."""
+    amplitude_range: float = number(
+        math.radians(10.0), "rad", "assumed: a third of the default amplitude", ge=0, le=1
+    )
+    """Half range of the amplitude where the sweep is varied."""
+    tilt_range: float = number(0.15, "rad", "assumed: placed by hand, as in the tunnel", ge=0, le=1)
+    """Half range of the walls' angle where they are tilted."""
+    base_zero: float = number(
+        0.02, "rad", "assumed: a horn mounted by hand, about 1 deg", ge=0, le=0.3
+    )
+    """Standard deviation of the base's zero."""
+    gain: float = number(0.05, "1", "assumed: strips repeat within 10 % (2 sigma)", ge=0, le=1)
+    """Standard deviation of the sensor's gain from trial to trial, where there is sensor noise."""
+    friction: float = number(1.0 / 3.0, "1", "assumed: walls differ", ge=0, le=1)
+    """Half range of the friction, over the antenna's."""
+
+
+_Mark = Annotated[float, Field(ge=-1000, le=1000)]
+
+
+class RecordParams(Params):
+    """What is recorded: marks held by hand, pushes of a stage, or whatever comes."""
+
+    side: Literal["left", "right"] = number("left", "1", "assumed: the first")
+    """Antenna to record; without marks and speed both are."""
+    marks: tuple[_Mark, ...] = number((), "unit", "assumed: none")
+    """Bends or positions to hold the antenna at, each confirmed by Enter; 0 is straight."""
+    unit: Literal["1", "rad", "deg", "m", "mm"] = number("mm", "1", "assumed: a ruler")
+    """Unit of the marks."""
+    hold: float = number(1.0, "s", "assumed: 100 readings", gt=0, le=600)
+    """Time recorded at each mark."""
+    speed: float | None = number(None, "m/s", "assumed: no stage", gt=0, le=1)
+    """Constant speed of a stage that pushes."""
+    length: float = number(0.05, "m", "assumed: as the simulated rig", gt=0, le=1)
+    """Way of the stage in one push."""
+    passes: int = number(4, "1", "assumed: there and back, twice: two trials", ge=1, le=1000)
+    """Times the marks are gone through, every other time backwards, or pushes of a stage."""
+    duration: float | None = number(None, "s", "assumed: until Ctrl-C", gt=0)
+    """Time to record without marks and speed."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> RecordParams:
+        if self.marks and self.speed is not None:
+            raise ValueError(
+                f"expected marks or speed, found marks {_said(self.marks)} and speed {self.speed:g}"
+            )
+        if self.marks and len(set(self.marks)) < 2:
+            raise ValueError(
+                f"marks must be two different values or more, found {_said(self.marks)}"
+            )
+        return self
+
+
+def _said(numbers: tuple[float, ...]) -> str:
+    return " ".join(f"{number:g}" for number in numbers)

@@ -1,77 +1,83 @@
-"""Parameters of the controllers: from counts to joint targets."""
+"""Parameters of the controllers: from counts to maneuvers, and of controllers without touch."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from antennate.errors import ConfigError
-from antennate.messages import nearest, shown
 from antennate.params.base import Params, number
-from antennate.params.blind import RandomParams, ScheduleParams, TimedParams, ZigzagParams
-from antennate.params.gaits import GAITS, LiftParams
-from antennate.params.reading import read_file
+from antennate.params.gaits import GaitParams
+
+_Angle = Annotated[float, Field(gt=0, le=math.pi)]
+_Time = Annotated[float, Field(ge=0, le=30)]
 
 
-class GaitParams(Params):
-    """The serpenoid body wave and the stepping legs."""
+class TimedParams(Params):
+    """When `timed` escapes; how it escapes is `escape`."""
 
-    choice: ClassVar[str] = f"{', '.join(GAITS)} (the first is the default), or a TOML file"
-    frequency: float = number(
-        0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
+    walk_time: float = number(5.0, "s", "assumed: three gait cycles; not tuned", gt=0, le=300)
+    """Time to walk between two escapes."""
+
+
+class ScheduleParams(Params):
+    """Turns of `schedule`, to one side and to the other, farther and farther."""
+
+    walk_time: float = number(
+        12.0, "s", "fitted: best of 5, 8, 12 and 18 s (docs/science/corridors.md)", gt=0, le=300
     )
-    """Cycles per second."""
-    wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)
-    """Waves along the body."""
-    amplitude: float = number(
-        math.radians(25.0), "rad", "assumed: 15 to 35 deg is usual", ge=0, le=1.2
-    )
-    """Amplitude of a yaw joint."""
-    body_phase: float = number(
-        math.radians(200.0),
+    """Time to walk between two escapes."""
+    headings: tuple[_Angle, ...] = number(
+        (0.785, 0.785, 1.571, 1.571),
         "rad",
-        "fitted: antennate gait, sweep of the leg phase; left feet are down at a bend to the left",
-        ge=-2 * math.pi,
-        le=2 * math.pi,
+        "fitted: better than 60, 60, 100, 100, 130 deg (docs/science/corridors.md)",
+        min_length=1,
+        max_length=20,
     )
-    """Lead of the body wave over the legs."""
-    turn_offset: float = number(
-        math.radians(20.0), "rad", "assumed: antennate gait measures 35 deg a cycle", ge=0, le=1.0
+    """Headings that it turns to, from the first heading, right and left by turns."""
+    reverse_times: tuple[_Time, ...] = number(
+        (2.2, 3.5, 5.0),
+        "s",
+        "assumed: as escape.reverse_time, then room for a longer turn",
+        min_length=1,
+        max_length=20,
     )
-    """Yaw offset while turning."""
-    offset_rate: float = number(1.5, "rad/s", "assumed: half a second for a full change", gt=0)
-    """Largest change of the offset."""
-    antenna_mean: float = number(0.0, "rad", "assumed: the mounting angle", ge=-0.8, le=0.8)
-    """Angle about which the antenna bases sweep, or at which they are held."""
-    antenna_amplitude: float = number(0.0, "rad", "assumed: held, as in the paper", ge=0, le=0.7)
-    """Amplitude of the sweep of the antenna bases."""
-    antenna_frequency: float = number(0.5, "Hz", "assumed: within the servos' speed", gt=0, le=1.0)
-    """Sweeps of the antenna bases per second."""
-    lift: LiftParams = LiftParams()
+    """Times to back off before each turn; the last one for all further turns."""
+    turn_rate: float = number(
+        math.pi / 7.5, "rad/s", "assumed: 180 deg in escape.return_time", gt=0, le=3
+    )
+    """Turning in free space at escape.turn_offset, by which the time of a turn is reckoned."""
 
-    @classmethod
-    def named(cls, text: str | Path, folder: Path = Path()) -> Self:
-        """The gait of a name, or of a TOML file with the keys of this model.
 
-        Args:
-            text: The name, or the path of the file.
-            folder: Where a path that is not absolute starts.
+class ZigzagParams(Params):
+    """Turns of `zigzag`, all of one size."""
 
-        Raises:
-            ConfigError: There is no such gait, or its file cannot be used.
-        """
-        if (table := GAITS.get(str(text))) is not None:
-            return cls.model_validate(table)
-        path = folder / text
-        if not str(text) or (path.suffix != ".toml" and not path.exists()):
-            raise ConfigError(
-                f"--gait: expected {', '.join(GAITS)} or a TOML file{nearest(str(text), GAITS)}, "
-                f"found {shown(str(text))}"
-            )
-        return read_file(path, cls)
+    walk_time: float = number(5.0, "s", "assumed: as timed.walk_time", gt=0, le=300)
+    """Time to walk between two turns."""
+    reverse_time: float = number(
+        0.8, "s", "assumed: half a gait cycle, so that the head comes free", ge=0, le=30
+    )
+    """Time to back off before a turn."""
+    turn_time: float = number(
+        4.4, "s", "assumed: twice escape.turn_time, from one side to the other", gt=0, le=60
+    )
+    """Time of each turn; the first is half as long."""
+
+
+class RandomParams(Params):
+    """Chance of `random`; the same seed and gait phase at the start give the same choices."""
+
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of its choices, beside the gait phase at the start."""
+    walk_time: float = number(5.0, "s", "assumed: as timed.walk_time", gt=0, le=300)
+    """Mean time to walk between two escapes; it is distributed exponentially."""
+    reverse_time: float = number(2.2, "s", "assumed: as escape.reverse_time", ge=0, le=30)
+    """Mean time to back off; it is uniform from 0 to twice that."""
+    turn_time: float = number(
+        4.4, "s", "assumed: its mean is that of escape.turn_time", gt=0, le=60
+    )
+    """Longest turn; a turn is uniform from 0 to that, to either side alike."""
 
 
 class CurveParams(Params):

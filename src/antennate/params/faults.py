@@ -79,11 +79,11 @@ class Unread(ValueError):
         if top == "robot":
             return []
         read = [each.rpartition(".")[::2] for each in self.read if each.startswith(f"{top}.")]
-        found = [f"{place}.{last}" for place, last in read if last == name]
-        while not found and "." in group:
-            found = [f"{place}.{last}" for place, last in read if place == group]
+        names = [f"{place}.{last}" for place, last in read if last == name]
+        while not names and "." in group:
+            names = [f"{place}.{last}" for place, last in read if place == group]
             group = group.rpartition(".")[0]
-        return (found or list(dict.fromkeys(f"{p}.*" for p, _ in read if p != top)))[:_MOST_NAMED]
+        return (names or list(dict.fromkeys(f"{p}.*" for p, _ in read if p != top)))[:_MOST_NAMED]
 
 
 def dotted(path: Place) -> str:

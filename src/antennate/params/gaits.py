@@ -1,12 +1,15 @@
-"""The step of lifting legs, and the gaits that are known by name."""
+"""The gait: its wave, the step of lifting legs, and the gaits that are known by name."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar, Self
 
-from antennate.params.base import Params, number
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shown
+from antennate.params.base import Params, number, read_file
 
 
 class LiftParams(Params):
@@ -64,3 +67,61 @@ GAITS: Mapping[str, Mapping[str, Any]] = {
 and front right legs are in the air in rows 7 to 30, in `in_phase` in rows 13 to 36, the other three
 in the rest. The period is not published; 2 s is assumed.
 """
+
+
+class GaitParams(Params):
+    """The serpenoid body wave and the stepping legs."""
+
+    choice: ClassVar[str] = f"{', '.join(GAITS)} (the first is the default), or a TOML file"
+    frequency: float = number(
+        0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
+    )
+    """Cycles per second."""
+    wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)
+    """Waves along the body."""
+    amplitude: float = number(
+        math.radians(25.0), "rad", "assumed: 15 to 35 deg is usual", ge=0, le=1.2
+    )
+    """Amplitude of a yaw joint."""
+    body_phase: float = number(
+        math.radians(200.0),
+        "rad",
+        "fitted: antennate gait, sweep of the leg phase; left feet are down at a bend to the left",
+        ge=-2 * math.pi,
+        le=2 * math.pi,
+    )
+    """Lead of the body wave over the legs."""
+    turn_offset: float = number(
+        math.radians(20.0), "rad", "assumed: antennate gait measures 35 deg a cycle", ge=0, le=1.0
+    )
+    """Yaw offset while turning."""
+    offset_rate: float = number(1.5, "rad/s", "assumed: half a second for a full change", gt=0)
+    """Largest change of the offset."""
+    antenna_mean: float = number(0.0, "rad", "assumed: the mounting angle", ge=-0.8, le=0.8)
+    """Angle about which the antenna bases sweep, or at which they are held."""
+    antenna_amplitude: float = number(0.0, "rad", "assumed: held, as in the paper", ge=0, le=0.7)
+    """Amplitude of the sweep of the antenna bases."""
+    antenna_frequency: float = number(0.5, "Hz", "assumed: within the servos' speed", gt=0, le=1.0)
+    """Sweeps of the antenna bases per second."""
+    lift: LiftParams = LiftParams()
+
+    @classmethod
+    def named(cls, text: str | Path, folder: Path = Path()) -> Self:
+        """The gait of a name, or of a TOML file with the keys of this model.
+
+        Args:
+            text: The name, or the path of the file.
+            folder: Where a path that is not absolute starts.
+
+        Raises:
+            ConfigError: There is no such gait, or its file cannot be used.
+        """
+        if (table := GAITS.get(str(text))) is not None:
+            return cls.model_validate(table)
+        path = folder / text
+        if not str(text) or (path.suffix != ".toml" and not path.exists()):
+            raise ConfigError(
+                f"--gait: expected {', '.join(GAITS)} or a TOML file{nearest(str(text), GAITS)}, "
+                f"found {shown(str(text))}"
+            )
+        return read_file(path, cls)

@@ -1,23 +1,49 @@
-"""Servo models: what a robot's description may name, with the numbers that its physics needs.
+"""Servo models: the numbers of a description and how such a servo moves a load.
 
-The numbers and their sources are those of the model files (`dxl.models`).
+The numbers and their sources are those of the model files (`dxl.models`), and so are the meanings
+of a model's fields those of `ServoParams`. In position mode
+
+    drive    u = clip(gain (goal - q), -1, 1),   gain = P / divisor · 4096 / 2π / 885
+    motor    τ = stall · v · u - stall / no_load_speed · ω
+    friction |f| ≤ friction + load_friction · |τ|,   against the motion; it holds a shaft at rest
+    shaft    (armature + inertia) ω' = τ + f - gravity · sin q
+
+v is the supply over the voltage at which stall torque and no-load speed are given. Without torque
+u and τ are 0.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from antennate.dxl.model import ServoModel, position_gain
 from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
 from antennate.params.base import Params, number
+from antennate.types import Bools, Floats
 
 ServoName = Literal["xc430_w240", "xl330_m288", "xl430_w250"]
 
 
-def _rated(model: ServoModel, name: str, unit: str, **bounds: Any) -> Any:
+_NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
+    "gain_divisor": ("1", {"gt": 0}),
+    "stall_torque": ("N·m", {"gt": 0}),
+    "no_load_speed": ("rad/s", {"gt": 0}),
+    "armature": ("kg·m²", {"ge": 0}),
+    "friction": ("N·m", {"ge": 0}),
+    "load_friction": ("1", {"ge": 0, "lt": 1}),
+}
+"""Unit and bounds of each number of the model file, in the order of an array of them."""
+MODEL_NUMBERS = tuple(_NUMBERS)
+"""Their names, the fields of `ServoParams` that a fit changes."""
+
+
+def _rated(model: ServoModel, name: str) -> Any:
     """A number of a model, as it stands in its file."""
-    source = model.rating.sources[name]
-    return number(getattr(model.rating, name), unit, source, **bounds)
+    unit, bounds = _NUMBERS[name]
+    return number(getattr(model.rating, name), unit, model.rating.sources[name], **bounds)
 
 
 def _gain(model: ServoModel) -> Any:
@@ -36,19 +62,19 @@ class ServoParams(Params):
 
     servo: ClassVar[ServoModel] = XC430_W240
 
-    stall_torque: float = _rated(XC430_W240, "stall_torque", "N·m", gt=0)
+    stall_torque: float = _rated(XC430_W240, "stall_torque")
     """Torque at standstill."""
-    no_load_speed: float = _rated(XC430_W240, "no_load_speed", "rad/s", gt=0)
+    no_load_speed: float = _rated(XC430_W240, "no_load_speed")
     """Speed unloaded."""
     p_gain: float = _gain(XC430_W240)
     """Gain of the position loop as its register holds it."""
-    gain_divisor: float = _rated(XC430_W240, "gain_divisor", "1", gt=0)
+    gain_divisor: float = _rated(XC430_W240, "gain_divisor")
     """What that gain is divided by: counts of drive per tick of position error."""
-    armature: float = _rated(XC430_W240, "armature", "kg·m²", ge=0)
+    armature: float = _rated(XC430_W240, "armature")
     """Inertia at the output."""
-    friction: float = _rated(XC430_W240, "friction", "N·m", ge=0)
+    friction: float = _rated(XC430_W240, "friction")
     """Friction at the output that is always there."""
-    load_friction: float = _rated(XC430_W240, "load_friction", "1", ge=0, lt=1)
+    load_friction: float = _rated(XC430_W240, "load_friction")
     """Friction of the gear as a share of the torque of its motor."""
 
     @property
@@ -102,20 +128,13 @@ class XL330Params(ServoParams):
 
     servo: ClassVar[ServoModel] = XL330_M288
 
-    stall_torque: float = _rated(XL330_M288, "stall_torque", "N·m", gt=0)
-    """Torque at standstill."""
-    no_load_speed: float = _rated(XL330_M288, "no_load_speed", "rad/s", gt=0)
-    """Speed unloaded."""
+    stall_torque: float = _rated(XL330_M288, "stall_torque")
+    no_load_speed: float = _rated(XL330_M288, "no_load_speed")
     p_gain: float = _gain(XL330_M288)
-    """Gain of the position loop as its register holds it."""
-    gain_divisor: float = _rated(XL330_M288, "gain_divisor", "1", gt=0)
-    """What that gain is divided by: counts of drive per tick of position error."""
-    armature: float = _rated(XL330_M288, "armature", "kg·m²", ge=0)
-    """Inertia at the output."""
-    friction: float = _rated(XL330_M288, "friction", "N·m", ge=0)
-    """Friction at the output that is always there."""
-    load_friction: float = _rated(XL330_M288, "load_friction", "1", ge=0, lt=1)
-    """Friction of the gear as a share of the torque of its motor."""
+    gain_divisor: float = _rated(XL330_M288, "gain_divisor")
+    armature: float = _rated(XL330_M288, "armature")
+    friction: float = _rated(XL330_M288, "friction")
+    load_friction: float = _rated(XL330_M288, "load_friction")
 
 
 class XL430Params(ServoParams):
@@ -123,12 +142,9 @@ class XL430Params(ServoParams):
 
     servo: ClassVar[ServoModel] = XL430_W250
 
-    stall_torque: float = _rated(XL430_W250, "stall_torque", "N·m", gt=0)
-    """Torque at standstill."""
-    no_load_speed: float = _rated(XL430_W250, "no_load_speed", "rad/s", gt=0)
-    """Speed unloaded."""
+    stall_torque: float = _rated(XL430_W250, "stall_torque")
+    no_load_speed: float = _rated(XL430_W250, "no_load_speed")
     p_gain: float = _gain(XL430_W250)
-    """Gain of the position loop as its register holds it."""
 
 
 class ServosParams(Params):
@@ -141,3 +157,81 @@ class ServosParams(Params):
     def of(self, name: ServoName) -> ServoParams:
         """The model of a name."""
         return getattr(self, name)
+
+
+STEP = 0.002
+"""Time step of the replay [s]; the position loop holds its drive for one."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What F servos were told, and what hung on them, at T times that are `STEP` apart.
+
+    A shaft begins where it was measured, and again wherever torque is switched.
+
+    Attributes:
+        goal: Goal positions [rad], shape (T, F).
+        torque: Whether torque was on, shape (T, F).
+        supply: Supply over the nominal voltage, shape (T, F).
+        position: Measured positions [rad], shape (T, F).
+        speed: Measured speeds [rad/s], shape (T, F).
+        p_gain: Gain of the position loop as its register held it, shape (F,).
+        inertia: Inertia of the load [kg·m²], shape (F,).
+        gravity: Torque of the load's weight at a right angle [N·m], shape (F,); 0 rad hangs down.
+    """
+
+    goal: Floats
+    torque: Bools
+    supply: Floats
+    position: Floats
+    speed: Floats
+    p_gain: Floats
+    inertia: Floats
+    gravity: Floats
+
+    @property
+    def begins(self) -> Bools:
+        """Where a shaft begins from its measurement, shape (T, F)."""
+        switched = self.torque[1:] != self.torque[:-1]
+        return np.vstack([np.ones((1, self.torque.shape[1]), bool), switched])
+
+
+def values_of(servo: ServoParams) -> Floats:
+    """The parameters of a servo in the order of MODEL_NUMBERS, shape (6,)."""
+    return np.array([getattr(servo, name) for name in MODEL_NUMBERS])
+
+
+def replay(values: Floats, course: Course, every: int = 1) -> Floats:
+    """Positions [rad] of servos that are told what a course says, shape (T / every, B, F).
+
+    Args:
+        values: Parameters of B servo models in the order of MODEL_NUMBERS, shape (B, 6).
+        course: What F of each are told.
+        every: Only every so many times are kept.
+    """
+    divisor, stall, fastest, armature, dry, loaded = values.T[:, :, None]
+    gain = position_gain(course.p_gain, divisor)
+    inertia = armature + course.inertia
+    braking = stall / fastest
+    faded = np.exp(-STEP * braking / inertia)  # share of a speed that braking leaves after a step
+    braked = (1.0 - faded) / braking  # speed that a torque adds in a step
+    positions = np.empty((-(-len(course.goal) // every), *gain.shape))
+    begins = course.begins
+    ever = np.flatnonzero(begins.any(axis=1)).tolist()
+    q = w = np.zeros(gain.shape)
+    for i, goal in enumerate(course.goal):
+        if i in ever:
+            q = np.where(begins[i], course.position[i], q)
+            w = np.where(begins[i], course.speed[i], w)
+        if i % every == 0:
+            positions[i // every] = q
+        on = course.torque[i]
+        driven = stall * course.supply[i] * np.clip(gain * (goal - q), -1.0, 1.0) * on
+        q = q + 0.5 * STEP * w
+        grip = dry + loaded * abs(driven - braking * w * on)
+        added = np.where(on, braked, STEP / inertia)
+        free = np.where(on, faded, 1.0) * w + added * (driven - course.gravity * np.sin(q))
+        # what friction leaves; it stops a shaft, and does not turn it back
+        w = np.copysign(np.maximum(abs(free) - added * grip, 0.0), free)
+        q = q + 0.5 * STEP * w
+    return positions

@@ -16,8 +16,7 @@ from antennate import checks
 from antennate.dxl.model import EXTENDED_MODE, POSITION_MODE
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import Params, number
-from antennate.params.reading import read_file
+from antennate.params.base import Params, number, read_file
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
@@ -29,7 +28,7 @@ from antennate.robots.joints import (
     YawParams,
 )
 from antennate.robots.servos import ServoName, ServosParams
-from antennate.robots.sides import SIDES
+from antennate.types import SIDES
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch"]
 ROBOTS = ("scuttle", "hexapod")
@@ -217,11 +216,11 @@ class RobotSpec(Params):
     @property
     def ids(self) -> tuple[int, ...]:
         """Servo ids of all joints."""
-        found: list[int] = []
+        ids: list[int] = []
         for _, group, count in self.groups:
-            first = len(found) + 1
-            found += group.ids or range(first, first + count)
-        return tuple(found)
+            first = len(ids) + 1
+            ids += group.ids or range(first, first + count)
+        return tuple(ids)
 
     @property
     def directions(self) -> tuple[int, ...]:

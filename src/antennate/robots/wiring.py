@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
+from antennate.robots.parts import Supply, servos_of, supply
 from antennate.robots.servos import ServoParams
-from antennate.robots.sides import SIDES
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
-from antennate.robots.supply import Supply, servos_of, supply
+from antennate.types import SIDES
 
 Place = tuple[float, float]
 
@@ -39,8 +39,8 @@ def wiring(robot: RobotSpec) -> Figure:
     """The diagram; the order of the bus is that of the cable, head first."""
     power, places = supply(robot), _places(robot)
     end = _FIRST - 2 * (robot.links - 1) * _ROW
-    told = _told(power)
-    low = end - 0.5 - 0.16 * told.count("\n") - 0.2
+    legend = _told(power)
+    low = end - 0.5 - 0.16 * legend.count("\n") - 0.2
     figure = Figure(figsize=(style.WIDTH, -low))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
@@ -56,26 +56,26 @@ def wiring(robot: RobotSpec) -> Figure:
         width = 0.92 if not name.startswith(ANTENNA_PREFIXES) else 1.24
         _box(axes, places[name], f"{servo_id}  {name}\n{kind.product}", colour, width)
     _electronics(axes, power, bool(robot.antenna_count))
-    axes.text(0.1, end - 0.45, told, fontsize=_LETTERS, va="top", linespacing=1.4)
+    axes.text(0.1, end - 0.45, legend, fontsize=_LETTERS, va="top", linespacing=1.4)
     return figure
 
 
 def _places(robot: RobotSpec) -> dict[str, Place]:
     """Where each joint stands in the picture, head to the top."""
-    found: dict[str, Place] = {}
+    places: dict[str, Place] = {}
     antennae = (_ADAPTER, _ANTENNAE), (_BOARD, _ANTENNAE)
     for side, prefix, antenna in zip(SIDES, ANTENNA_PREFIXES, antennae, strict=True):
         for name in robot.joint_names:
             if name.startswith(prefix):
-                found[name] = antenna
+                places[name] = antenna
             elif name.startswith(f"leg_{side}"):
                 link = int(name.removeprefix(f"leg_{side}"))
-                found[name] = (_LEFT if side == SIDES[0] else _RIGHT, _FIRST - 2 * link * _ROW)
+                places[name] = (_LEFT if side == SIDES[0] else _RIGHT, _FIRST - 2 * link * _ROW)
     shift = 0.57 if robot.pitch_count else 0.0
     for j in range(1, robot.links):
-        found[f"yaw{j}"] = (_MIDDLE - shift, _FIRST - (2 * j - 1) * _ROW)
-        found[f"pitch{j}"] = (_MIDDLE + shift, _FIRST - (2 * j - 1) * _ROW)
-    return found
+        places[f"yaw{j}"] = (_MIDDLE - shift, _FIRST - (2 * j - 1) * _ROW)
+        places[f"pitch{j}"] = (_MIDDLE + shift, _FIRST - (2 * j - 1) * _ROW)
+    return places
 
 
 def _cable(robot: RobotSpec) -> list[str]:

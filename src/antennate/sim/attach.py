@@ -11,9 +11,8 @@ from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError
 from antennate.messages import shown
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim import antenna_part
-from antennate.sim.antenna_part import Side
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import Side, build_antenna, mounting_quaternion
 from antennate.types import AntennaFrame, Floats, Ints
 
 _MOST_BITS = 2**31 - 1
@@ -63,13 +62,13 @@ def attach_antenna(
     checks.instance("spec", spec, mujoco.MjSpec)
     checks.instance("antenna", antenna, AntennaSpec)
     outwards = antenna.base_angle if angle is None else checks.real("angle", angle, "rad")
-    quaternion = antenna_part.mounting_quaternion(outwards, side)
+    quaternion = mounting_quaternion(outwards, side)
     name = checks.text("name", f"antenna_{side}" if name is None else name)
     carrier = _carrier(spec, checks.text("body", body), name)
     place = checks.array("position", position, (3,), "m")
     contype = checks.whole("contype", contype, most=_MOST_BITS)
     conaffinity = checks.whole("conaffinity", conaffinity, most=_MOST_BITS)
-    part = antenna_part.build(antenna)
+    part = build_antenna(antenna)
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
             geom.contype, geom.conaffinity = contype, conaffinity

@@ -17,9 +17,9 @@ import numpy as np
 from antennate.errors import SimulationError
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import BASE, AntennaSpec
-from antennate.sim import antenna_part, layers
-from antennate.sim.bounds import ANGLE_LIMIT
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import ANTENNA_BIT, OBSTACLE_BIT, build_antenna
+from antennate.sim.places import ANGLE_LIMIT
 from antennate.sim.world import new_spec, set_contacts
 from antennate.types import Floats, Ints
 
@@ -91,7 +91,7 @@ def compile_bench(
         probe = _slider(spec, "probe")
         probe.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[probe_radius, 0, 0], **_OBSTACLE)
     frame = carriage.add_frame()
-    spec.attach(antenna_part.build(antenna), frame=frame, prefix=PREFIX)
+    spec.attach(build_antenna(antenna), frame=frame, prefix=PREFIX)
     set_contacts(spec, physics)
     return spec.compile()
 
@@ -99,8 +99,8 @@ def compile_bench(
 _OBSTACLE: dict[str, Any] = {
     "friction": [0, 0, 0],  # the larger of two counts: the antenna's
     "condim": 3,
-    "contype": layers.OBSTACLE,
-    "conaffinity": layers.ANTENNA,
+    "contype": OBSTACLE_BIT,
+    "conaffinity": ANTENNA_BIT,
 }
 
 
@@ -289,7 +289,7 @@ class Bench:
         for i in range(data.ncon):
             mujoco.mj_contactForce(self.model, data, i, wrench)
             force = data.contact.frame[i].reshape(3, 3).T @ wrench[:3]
-            on_second = self.model.geom_contype[data.contact.geom[i, 1]] == layers.ANTENNA
+            on_second = self.model.geom_contype[data.contact.geom[i, 1]] == ANTENNA_BIT
             total += force[:2] if on_second else -force[:2]
         return total
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from antennate.sim import gl, layers
-from antennate.sim.appearance import FLOOR, Colour, colours
+from antennate.sim import engine_setup
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import ANTENNA_BIT
+from antennate.sim.shapes import FLOOR, Colour, colours
 from antennate.types import Floats
 
 Picture = NDArray[np.uint8]
@@ -74,7 +75,7 @@ class Camera:
         size: tuple[int, int],
         sides: tuple[Colour, Colour],
     ) -> None:
-        name = gl.backend()
+        name = engine_setup.backend()
         os.environ.setdefault("PYOPENGL_PLATFORM", name)
         self._model = copy.copy(model)
         _prepare(self._model, size, sides)
@@ -154,7 +155,7 @@ def _thicken(model: mujoco.MjModel, shot: Shot, height: int) -> None:
     """Draw thin antennae thicker than they are; the model is only drawn."""
     angle = np.radians(model.vis.global_.fovy)
     seen = 2 * shot.distance * (1.0 if shot.flat else np.tan(angle / 2))
-    thin = (model.geom_contype & layers.ANTENNA) != 0
+    thin = (model.geom_contype & ANTENNA_BIT) != 0
     thin &= model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE.value
     model.geom_size[thin, 0] = np.maximum(model.geom_size[thin, 0], _THIN * seen / height)
 

@@ -21,8 +21,8 @@ from antennate.params.bench import Solver
 from antennate.params.faults import Unread
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.antenna_part import STOPS
 from antennate.sim.bench import CARRIAGE_MASS, SLIDE_DAMPING, SLIDE_STIFFNESS, Ball, Bar
+from antennate.sim.parts import STOPS
 from antennate.sim.world import CONTACT_IMPEDANCE
 from antennate.types import Bools, Floats
 
@@ -228,11 +228,11 @@ class ChainBench:
             probe: Targets of the rod [m], shape (k, 2); without, it stays where it was put.
             probe_speeds: Its speeds there [m/s], shape (k, 2).
         """
-        found = np.zeros((len(places), 9))
-        found[:, :2], found[:, 2:4], found[:, 4] = places, speeds, base
-        found[:, 5:7] = self._q[-2:] if probe is None else probe
-        found[:, 7:] = 0.0 if probe_speeds is None else probe_speeds
-        return found
+        commands = np.zeros((len(places), 9))
+        commands[:, :2], commands[:, 2:4], commands[:, 4] = places, speeds, base
+        commands[:, 5:7] = self._q[-2:] if probe is None else probe
+        commands[:, 7:] = 0.0 if probe_speeds is None else probe_speeds
+        return commands
 
     def drive(self, commands: Floats, steps: int) -> Motion:
         """Follow commands, `steps` physics steps each.

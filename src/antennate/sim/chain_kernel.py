@@ -241,7 +241,7 @@ def _nearest(obstacle, x, y, c, s, length, second):
 
 
 @njit(**_PART)
-def _pairs(model, joints, cosine, sine, reach, found):
+def _pairs(model, joints, cosine, sine, reach, pairs):
     """Links and obstacles nearer than `reach` [m] to one another."""
     count = 0
     for i in range(1, len(model.length)):
@@ -251,7 +251,7 @@ def _pairs(model, joints, cosine, sine, reach, found):
             way, px, py = _nearest(obstacle, x, y, c, s, model.length[i], False)
             near = reach + model.radius + obstacle[4]
             if (x + way * c - px) ** 2 + (y + way * s - py) ** 2 < near * near:
-                found[count, 0], found[count, 1] = i, k
+                pairs[count, 0], pairs[count, 1] = i, k
                 count += 1
     return count
 

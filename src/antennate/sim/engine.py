@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import re
 
-from antennate.distributions import engines
 from antennate.errors import ConfigError, in_one_line
-from antennate.sim.describing import is_described
+from antennate.sim.engine_setup import engines, is_described
 
 _OLDEST, _WRONG, _TOO_NEW = (3, 17), (4, 0, 0), (5,)
 """As in pyproject.toml. 4.0.0 factors the sparse Newton system wrongly (engine issue 3767)."""

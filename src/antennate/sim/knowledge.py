@@ -137,7 +137,7 @@ def angle_ahead(route: Floats, head: Floats, heading: float, ahead: float = AHEA
         ahead: How far ahead along the route the point is [m].
     """
     x, y = (_place(route, geometry.progress(route, head) + ahead)[0] - head).tolist()
-    return _wrapped(math.atan2(y, x) - heading)
+    return (math.atan2(y, x) - heading + math.pi) % (2 * math.pi) - math.pi
 
 
 def is_facing(route: Floats, head: Floats, heading: float) -> bool:
@@ -196,7 +196,3 @@ def _route_of(scene: SceneInstance) -> Floats | None:
             f"before, shape (n, 2) [m], found {shortened(repr(route.tolist()))}"
         )
     return route
-
-
-def _wrapped(angle: float) -> float:
-    return (angle + math.pi) % (2 * math.pi) - math.pi

@@ -1,13 +1,17 @@
-"""Where the parts of a robot are in the arrays of a compiled model."""
+"""A robot in a compiled model: where its parts are, what drives and touches them, what is sound."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
-from antennate.sim import layers
 from antennate.sim.engine import mujoco
-from antennate.types import Bools, Ints
+from antennate.sim.parts import OBSTACLE_BIT
+from antennate.types import Bools, Floats, Ints
 
 ROBOT_AND_OBSTACLE = 3
 """Sum of the `kinds` of a contact between the robot and an obstacle."""
@@ -57,9 +61,192 @@ class Places:
         self.turning: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names])
         self.links: Ints = np.array([model.body(prefix + n).id for n in robot.link_names])
         self.leg_geoms: Ints = np.array([model.geom(prefix + n).id for n in robot.leg_names])
-        self.obstacles: Bools = (model.geom_contype & layers.OBSTACLE) != 0
+        self.obstacles: Bools = (model.geom_contype & OBSTACLE_BIT) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self.own: Bools = owner == model.body(prefix + robot.link_names[0]).id
         self.kinds: Ints = self.own + 2 * self.obstacles.astype(np.int64)
         bodies = [model.body(n).name.removeprefix(prefix) for n in range(model.nbody)]
         self.parts: list[str] = [bodies[n] for n in model.geom_bodyid.tolist()]
+
+
+class Gears:
+    """The joints of a robot in a model, but its antennae.
+
+    Args:
+        model: The model, whose joints get that friction.
+        robot: The robot.
+        prefix: Before its names in the model.
+
+    Attributes:
+        share: Friction as a share of the torque of the motor, of those joints that have it, (n,).
+        drive, dof: Actuators and degrees of freedom of these joints, shape (n,).
+        dry: Their friction without a load [N·m], shape (n,).
+        damping: Their damping [N·m·s/rad], shape (n,).
+    """
+
+    def __init__(self, model: mujoco.MjModel, robot: RobotSpec, prefix: str) -> None:
+        self._model = model
+        share: dict[str, float] = {}
+        for group, joints, _ in robot.groups:
+            if group != "antennae":
+                loaded = robot.servos.of(joints.servo).load_friction
+                share |= dict.fromkeys(robot.joint_names[robot.places(group)], loaded)
+        names = [name for name in share if share[name] > 0.0]
+        self.share: Floats = np.array([share[name] for name in names])
+        self.drive: Ints = np.array([model.actuator(prefix + n).id for n in names], np.int64)
+        self.dof: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names], np.int64)
+        self.dry: Floats = model.dof_frictionloss[self.dof]
+        self.damping: Floats = model.dof_damping[self.dof]
+
+    def step(self, data: mujoco.MjData, count: int) -> None:
+        """Advance by `count` physics steps, each with friction from the torques of the one before.
+
+        Raises:
+            mujoco.FatalError: The engine failed.
+        """
+        if not len(self.dof):
+            mujoco.mj_step(self._model, data, count)
+            return
+        for _ in range(count):
+            motor = data.actuator_force[self.drive] - self.damping * data.qvel[self.dof]
+            self._model.dof_frictionloss[self.dof] = self.dry + self.share * abs(motor)
+            mujoco.mj_step(self._model, data)
+
+
+class ServoDrives:
+    """The actuators of driven joints, at first as the model has them.
+
+    Args:
+        model: The compiled model; its actuators are changed.
+        names: Names of the actuators.
+        stall_torques: Torque of each at full drive [N·m], shape (n,).
+    """
+
+    def __init__(self, model: mujoco.MjModel, names: Sequence[str], stall_torques: Floats) -> None:
+        self._model, self._stall = model, stall_torques
+        self._at: Ints = np.array([model.actuator(name).id for name in names])
+        self._stiffness: Floats = model.actuator_gainprm[self._at, 0]
+        self._damping: Floats = model.actuator_biasprm[self._at, 2]
+        self._range: Floats = model.actuator_forcerange[self._at]
+        self._limited = model.actuator_forcelimited[self._at] != 0
+        self._now: Floats = np.repeat([[1.0], [0.0], [0.0], [-1.0], [1.0]], len(names), axis=1)
+
+    def set(self, drives: Floats) -> None:
+        """Change gain and limits of all of them from now on.
+
+        The drive is `gain` times that of the model, plus `push`, less `brake` times the speed of
+        the joint, within `low` and `high`.
+
+        Args:
+            drives: Rows gain [1], push [full drives], brake [full drives·s/rad], low and high
+                [full drives], shape (5, n). As the model has them: 1, 0, 0, -1, 1.
+        """
+        if np.array_equal(drives, self._now):
+            return
+        self._now = drives.copy()
+        gain, push, brake, low, high = drives
+        model, at = self._model, self._at
+        model.actuator_gainprm[at, 0] = gain * self._stiffness
+        model.actuator_biasprm[at, 0] = push * self._stall
+        model.actuator_biasprm[at, 1] = -gain * self._stiffness
+        model.actuator_biasprm[at, 2] = self._damping - brake * self._stall
+        narrow = (low > -1.0) | (high < 1.0)
+        most = np.where(self._limited, self._range[:, 1], np.inf)
+        bounds = np.clip(np.stack([low, high]) * self._stall, -most, most).T
+        model.actuator_forcerange[at] = np.where(narrow[:, None], bounds, self._range)
+        model.actuator_forcelimited[at] = self._limited | narrow
+
+
+class Contacts(NamedTuple):
+    """All contacts of the last physics step.
+
+    Attributes:
+        geoms: Both geoms of each, shape (k, 2).
+        address: Its first row of `force`, negative where it does not push, shape (k,).
+        place: Where it is [m], shape (k, 3).
+        frame: Its normal, from the first geom to the second, then two tangents, shape (k, 9).
+        force: Forces of all constraints [N], shape (rows,).
+    """
+
+    geoms: NDArray[np.int32]
+    address: NDArray[np.int32]
+    place: Floats
+    frame: Floats
+    force: Floats
+
+    @classmethod
+    def of(cls, data: mujoco.MjData) -> Contacts:
+        """Those of a state."""
+        contact: Any = data.contact
+        parts = contact.geom, contact.efc_address, contact.pos, contact.frame, data.efc_force
+        return cls(*(part.copy() for part in parts))
+
+    @classmethod
+    def joined(cls, several: Sequence[Contacts]) -> Contacts:
+        """Those of several states as if they were of one."""
+        before = np.cumsum([0, *(len(each.force) for each in several)])
+        parts = [np.concatenate(part) for part in zip(*several, strict=True)]
+        shift = np.repeat(before[:-1], [len(each.address) for each in several])
+        parts[1] = np.where(parts[1] >= 0, parts[1] + shift, -1)
+        return cls._make(parts)
+
+    def between(self, kinds: Ints, total: int) -> tuple[Ints, Floats]:
+        """Contacts that push, of two geoms whose kinds have this sum.
+
+        Args:
+            kinds: The kind of each geom, shape (geoms,).
+            total: The sum.
+
+        Returns:
+            Their numbers, shape (n,), and normal forces [N], shape (n,).
+        """
+        first, second = kinds[self.geoms].T
+        which = np.flatnonzero(first + second == total)
+        if not len(which):
+            return which, np.zeros(0)
+        which = which[self.address[which] >= 0]
+        return which, self.force[self.address[which]]
+
+
+SPEED_LIMIT = 1e3
+"""No coordinate of a sound world moves faster [m/s or rad/s]."""
+DISTANCE_LIMIT = 100.0
+"""A head farther than this from the origin left the world [m]."""
+ANGLE_LIMIT = 6.3
+"""Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
+HEIGHT_LIMIT = 0.3
+"""A head above or below this left the world [m]."""
+
+
+def sound(heads: Floats, bounded: Floats, speeds: Floats) -> Bools:
+    """Which of B states are within all bounds, shape (B,); arguments as `broken` has them, by row.
+
+    Not a number is beyond every bound.
+    """
+    with np.errstate(invalid="ignore"):
+        return (
+            (abs(heads[:, :2]).max(axis=1) < DISTANCE_LIMIT)
+            & (heads[:, 2] > 0.0)
+            & (heads[:, 2] < HEIGHT_LIMIT)
+            & (abs(bounded).max(axis=1, initial=0.0) < ANGLE_LIMIT)
+            & (abs(speeds).max(axis=1) < SPEED_LIMIT)
+        )
+
+
+def broken(head: Floats, bounded: Floats, speeds: Floats) -> str:
+    """What is beyond its bound in a state; empty if nothing is.
+
+    Args:
+        head: Position of the head [m], shape (3,).
+        bounded: Joints that do not turn without end [rad], shape (n,).
+        speeds: All coordinates [m/s or rad/s], shape (nv,).
+    """
+    far, height = float(abs(head[:2]).max()), float(head[2])
+    angle, speed = float(abs(bounded).max(initial=0.0)), float(abs(speeds).max())
+    checks = (
+        (far < DISTANCE_LIMIT, f"the head is {far:.3g} m away"),
+        (angle < ANGLE_LIMIT, f"a joint is at {angle:.3g} rad"),
+        (speed < SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
+        (0.0 < height < HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),
+    )
+    return next((trouble for sound, trouble in checks if not sound), "")

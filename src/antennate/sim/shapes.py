@@ -1,11 +1,13 @@
-"""What a model shows, as plain arrays: shapes once, then where they are and which forces act.
+"""What a model shows: its colours, its shapes as plain arrays, and polygons as seen from above.
 
-Another process draws it without the engine.
+Shapes are packed once; then where they are and which forces act. Another process draws it without
+the engine.
 """
 
 from __future__ import annotations
 
 import io
+import math
 import struct
 import zipfile
 from typing import Any, NamedTuple
@@ -14,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from antennate.errors import BadInputError
-from antennate.sim import layers
-from antennate.sim.appearance import Colour, colours
-from antennate.sim.contacts import Contacts
+from antennate.robots.spec import ANTENNA_PREFIXES
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import ANTENNA_BIT, BODY_BIT, FLOOR_BIT, LEG_BIT, OBSTACLE_BIT
+from antennate.sim.places import Contacts
 from antennate.types import Bools, Floats, Ints
 
 SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
@@ -26,12 +28,112 @@ ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+Colour = tuple[float, float, float, float]
+
+_UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+"""The engine's colour of a geom that has none of its own."""
+FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
+_OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
+_BODY: Colour = (0.34, 0.34, 0.38, 1.0)
+_LEG: Colour = (0.53, 0.55, 0.60, 1.0)
+
+
+def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.float32]:
+    """Colour of each geom, red, green, blue and opacity, 0 to 1, shape (ngeom, 4).
+
+    Args:
+        model: The compiled model; geoms that it paints itself keep their colours.
+        sides: Colours of the left and the right antenna.
+    """
+    painted = model.geom_rgba.copy()
+    bare = (painted == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
+    kind = model.geom_contype
+    for bit, colour in (
+        (FLOOR_BIT, FLOOR),
+        (OBSTACLE_BIT, _OBSTACLE),
+        (BODY_BIT, _BODY),
+        (LEG_BIT, _LEG),
+        (ANTENNA_BIT, sides[0]),
+    ):
+        painted[bare & (kind == bit)] = colour
+    right = [ANTENNA_PREFIXES[1] in model.geom(i).name for i in range(model.ngeom)]
+    painted[bare & (kind == ANTENNA_BIT) & np.array(right)] = sides[1]
+    return painted
+
+
+_TURN = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+_RING = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
+_BALL = np.concatenate(
+    [
+        np.column_stack([math.cos(a) * _RING, np.full(len(_RING), math.sin(a))])
+        for a in np.linspace(-math.pi / 2, math.pi / 2, 9)
+    ]
+)
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_ROUND = (CAPSULE, CYLINDER)
+_UPRIGHT = 0.9999
+
+
+def outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
+    """Convex hull of a geom in plan [m], corners counter-clockwise, shape (n, 2).
+
+    A height field is the rectangle around it.
+    """
+    place, turn = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+    kind, disc = model.geom_type[geom], place[:2] + model.geom_size[geom, 0] * _RING
+    if kind == SPHERE or (kind in _ROUND and abs(turn[2, 2]) > _UPRIGHT):
+        return disc
+    if kind == CAPSULE:  # the discs of its ends
+        half = model.geom_size[geom, 1] * turn[:2, 2]
+        return _hull(np.concatenate([disc + half, disc - half]))
+    points = place + _points(model, geom) @ turn.T
+    return _hull(points[:, :2])
+
+
+def _points(model: mujoco.MjModel, geom: int) -> Floats:
+    """Points in the geom's own frame whose hull is the geom [m], shape (n, 3)."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    radius, half = size[0], np.array([0.0, 0.0, size[1]])
+    if kind == ELLIPSOID:
+        return size * _BALL
+    if kind == CYLINDER:
+        disc = np.column_stack([radius * _RING, np.zeros(len(_RING))])
+        return np.concatenate([disc + half, disc - half])
+    if kind == MESH:
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        return model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
+    box = model.geom_aabb[geom]
+    return box[:3] + _CORNERS * box[3:]
+
+
+def _hull(points: Floats) -> Floats:
+    """Convex hull of points in the plane, counter-clockwise (Andrew's monotone chain).
+
+    In plain floats, which are several times as fast here as small arrays.
+    """
+    ordered = sorted(set(map(tuple, points.tolist())))
+    chain: list[tuple[float, ...]] = []
+    for half in (ordered, ordered[::-1]):
+        side: list[tuple[float, ...]] = []
+        for point in half:
+            x, y = point
+            while len(side) > 1:
+                (x0, y0), (x1, y1) = side[-2:]
+                if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0.0:  # a turn to the left
+                    break
+                side.pop()
+            side.append(point)
+        chain.extend(side[:-1])
+    return np.array(chain or ordered)
+
+
 _DRAWN = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH)
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _SLIDE, _FREE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_FREE)
 _HIDDEN_GROUP = 3
 """Geoms of this group and above are collision shapes that no viewer of the engine shows."""
-_OURS = layers.LEG | layers.BODY | layers.ANTENNA
+_OURS = LEG_BIT | BODY_BIT | ANTENNA_BIT
 _LARGEST = 1 << 26
 _SNAPSHOT = struct.Struct("<dIII")
 """Begin of a snapshot: time [s], geoms, contacts, rows of constraint forces."""
@@ -119,15 +221,15 @@ def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows] | Non
         t, geoms, count, rows = _SNAPSHOT.unpack_from(content)
         if geoms != len(shapes.sides):
             return None
-        found, at = list[NDArray[Any]](), _SNAPSHOT.size
+        arrays, at = list[NDArray[Any]](), _SNAPSHOT.size
         for kind, *shape in (
             *((float, geoms, 3), (float, geoms, 9)),
             *((np.int32, count, 2), (np.int32, count), (float, count, 3), (float, count, 9)),
             (float, rows),
         ):
-            found.append(np.ndarray(shape, kind, content, at))
-            at += found[-1].nbytes
-        places, turned, *parts = found
+            arrays.append(np.ndarray(shape, kind, content, at))
+            at += arrays[-1].nbytes
+        places, turned, *parts = arrays
         contacts = Contacts._make(parts)
         poses = np.empty((len(shapes.geom), 12), np.float32)
         poses[:, :3], poses[:, 3:] = places[shapes.geom], turned[shapes.geom]
@@ -158,7 +260,7 @@ class VisibleModel:
         self._shown: Ints = np.flatnonzero(seen & (painted[:, 3] > 0))
         self._colour = np.rint(255 * painted[self._shown]).astype(np.uint8)
         self._ours = (model.geom_contype & _OURS) != 0
-        self._floor = (model.geom_contype & layers.FLOOR) != 0
+        self._floor = (model.geom_contype & FLOOR_BIT) != 0
         self._slides = {body: found for body in range(model.nbody) if (found := self._free(body))}
 
     def shapes(self) -> Shapes:
@@ -195,10 +297,10 @@ class VisibleModel:
 
     def poses(self, data: mujoco.MjData) -> Poses:
         """Where the shapes are."""
-        found = np.empty((len(self._shown), 12), np.float32)
-        found[:, :3] = data.geom_xpos[self._shown]
-        found[:, 3:] = data.geom_xmat[self._shown]
-        return found
+        poses = np.empty((len(self._shown), 12), np.float32)
+        poses[:, :3] = data.geom_xpos[self._shown]
+        poses[:, 3:] = data.geom_xmat[self._shown]
+        return poses
 
     def move(self, data: mujoco.MjData, body: int, x: float, y: float) -> bool:
         """Put a body that can be dragged to x, y [m], at rest; False if it is none.

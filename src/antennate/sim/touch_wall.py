@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from antennate.errors import SceneError
-from antennate.params.touch import TouchWallsParams
+from antennate.params.bench import TouchWallsParams
 from antennate.sim.bench import Ball, Bar
 from antennate.types import Floats
 

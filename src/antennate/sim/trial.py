@@ -13,14 +13,14 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
+from antennate.control.readers import unused
 from antennate.errors import AntennateError, ConfigError, SceneError, raised
 from antennate.messages import shortened
-from antennate.params.base import Params, changes, number, paths_of
-from antennate.params.control import ControlParams, GaitParams
-from antennate.params.reading import from_values
+from antennate.params.base import Params, changes, from_values, number, paths_of
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import CorridorsParams, PhysicsParams, TunnelParams, VariationParams
-from antennate.robots.readers import unused
-from antennate.robots.sensor import require_own_curve
+from antennate.robots.antenna import require_own_curve
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.geometry import crossing
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
@@ -289,14 +289,14 @@ def _answer(
     scene: SceneInstance, name: str, head: Floats, wanted: str, fits: Callable[[Any], bool]
 ) -> Any:
     try:
-        found = getattr(scene, name)(head.copy())
+        answer = getattr(scene, name)(head.copy())
     except Exception as error:
         raise SceneError(f"scene: {name} raised {raised(error)}") from error
-    if not fits(found):
+    if not fits(answer):
         raise SceneError(
-            f"scene: expected {name} to return {wanted}, found {shortened(repr(found))}"
+            f"scene: expected {name} to return {wanted}, found {shortened(repr(answer))}"
         )
-    return found
+    return answer
 
 
 def _is_finite(value: Any) -> bool:

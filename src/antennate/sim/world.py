@@ -15,16 +15,19 @@ import numpy as np
 from antennate.errors import SceneError, SimulationError, in_one_line
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim import layers, robot_part
-from antennate.sim.bounds import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT, broken
-from antennate.sim.contacts import Contacts
 from antennate.sim.engine import mujoco
-from antennate.sim.engine_warnings import drop_if_asked
-from antennate.sim.gears import Gears
-from antennate.sim.outline import outline
-from antennate.sim.places import ROBOT_AND_OBSTACLE, Places
+from antennate.sim.engine_setup import drop_if_asked
+from antennate.sim.parts import FLOOR_BIT, OBSTACLE_BIT, axle_height, build_robot
+from antennate.sim.places import (
+    ROBOT_AND_OBSTACLE,
+    Contacts,
+    Gears,
+    Places,
+    ServoDrives,
+    broken,
+)
 from antennate.sim.scenes.scene import SceneInstance, add_floor
-from antennate.sim.servo_drives import ServoDrives
+from antennate.sim.shapes import outline
 from antennate.types import Bools, Floats, Ints
 
 drop_if_asked()
@@ -67,8 +70,8 @@ def compile_world(
     else:
         scene.build(spec)
         _meet_robot(spec)
-    frame = spec.worldbody.add_frame(pos=[0, 0, robot_part.axle_height(robot)])
-    spec.attach(robot_part.build(robot), frame=frame, prefix=PREFIX)
+    frame = spec.worldbody.add_frame(pos=[0, 0, axle_height(robot)])
+    spec.attach(build_robot(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     set_contacts(spec, physics)
     try:
@@ -89,8 +92,8 @@ def _meet_robot(spec: mujoco.MjSpec) -> None:
     for geom in spec.geoms:
         if geom.contype == geom.conaffinity == 1:
             is_floor = int(geom.type) == _PLANE
-            geom.contype = layers.FLOOR if is_floor else layers.OBSTACLE
-            geom.conaffinity = 0 if is_floor else layers.OBSTACLE | layers.FLOOR
+            geom.contype = FLOOR_BIT if is_floor else OBSTACLE_BIT
+            geom.conaffinity = 0 if is_floor else OBSTACLE_BIT | FLOOR_BIT
 
 
 class World:
@@ -112,7 +115,7 @@ class World:
         self.model = model
         self.data = mujoco.MjData(model)
         self.places = places = Places(model, robot, PREFIX)
-        self._bounded, self._drive = places.bounded, places.drives
+        self._drive = places.drives
         self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
         stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
@@ -125,9 +128,6 @@ class World:
         self._torque = data.actuator_force
         self._shown = [memoryview(part) for part in (self._qpos, self._qvel, self._torque)]
         self.head: Floats = data.qpos[self.root : self.root + 3]
-        self._bent: Floats = np.zeros(len(self._bounded))
-        self._warnings = data.warning.number
-        self._no_warning = self._warnings.tobytes()
 
     @property
     def t(self) -> float:
@@ -146,9 +146,9 @@ class World:
     def state(self) -> Floats:
         """All that the physics goes on from, for `restore`."""
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
-        found = np.empty(mujoco.mj_stateSize(self.model, kind))
-        mujoco.mj_getState(self.model, self.data, found, kind)
-        return found
+        state = np.empty(mujoco.mj_stateSize(self.model, kind))
+        mujoco.mj_getState(self.model, self.data, state, kind)
+        return state
 
     def place_all(self, position: Floats) -> None:
         """Put everything at coordinates of the model [m, rad], shape (nq,), without physics."""
@@ -205,8 +205,8 @@ class World:
         Returns:
             These, shape (n, 3, drives), and all coordinates [m, rad], shape (n, nq).
         """
-        found = np.frombuffer(b"".join(snapshots)).reshape(len(snapshots), -1)
-        angles, speeds, torques = np.split(found, np.cumsum([self.model.nq, self.model.nv]), axis=1)
+        rows = np.frombuffer(b"".join(snapshots)).reshape(len(snapshots), -1)
+        angles, speeds, torques = np.split(rows, np.cumsum([self.model.nq, self.model.nv]), axis=1)
         places = self.places
         parts = angles[:, places.driven], speeds[:, places.turning], torques[:, places.drives]
         return np.stack(parts, axis=1), angles
@@ -239,32 +239,15 @@ class World:
         Raises:
             SimulationError: The engine warned, time stood still, or the state left all bounds.
         """
-        x, y, height = self.head.tolist()
-        bent, speed = self._bent, self._qvel
-        self._qpos.take(self._bounded, out=bent, mode="clip")
-        sound = (
-            abs(x) < DISTANCE_LIMIT
-            and abs(y) < DISTANCE_LIMIT
-            and 0.0 < height < HEIGHT_LIMIT
-            and self.data.time > self._before
-            and bent.dot(bent) < ANGLE_LIMIT**2  # no entry is larger than the norm
-            and speed.dot(speed) < SPEED_LIMIT**2
-            and self._warnings.tobytes() == self._no_warning
-        )
-        if not sound:
-            self._explain(self._before)
-
-    def _explain(self, before: float) -> None:
-        """Look closely at a state that may be unsound."""
         data = self.data
         warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
-        checks = (
+        troubles = (
             f"engine warning {', '.join(warned)}" if warned else "",
-            broken(self.head, data.qpos[self._bounded], data.qvel),
-            "" if data.time > before else f"time stood still at {data.time:.6g} s",
+            broken(self.head, data.qpos[self.places.bounded], data.qvel),
+            "" if data.time > self._before else f"time stood still at {data.time:.6g} s",
         )
-        for found in filter(None, checks):
-            raise SimulationError(self._steps, found)
+        for trouble in filter(None, troubles):
+            raise SimulationError(self._steps, trouble)
 
     @property
     def heading(self) -> float:
@@ -316,14 +299,14 @@ class World:
             Number, part of the robot, place [m], shape (contacts, 3), and normal force [N],
             shape (contacts,), of each contact.
         """
-        found = contacts or Contacts.of(self.data)
-        which, force = found.between(self.places.kinds, ROBOT_AND_OBSTACLE)
+        contacts_then = contacts or Contacts.of(self.data)
+        which, force = contacts_then.between(self.places.kinds, ROBOT_AND_OBSTACLE)
         if not len(which):
             return which, [], np.zeros((0, 3)), force
-        first, second = found.geoms[which].T
-        ours = np.where(self.places.own[first], first, second)
-        names = [self.places.parts[geom] for geom in ours.tolist()]
-        return which, names, found.place[which], force
+        first, second = contacts_then.geoms[which].T
+        robot_geoms = np.where(self.places.own[first], first, second)
+        names = [self.places.parts[geom] for geom in robot_geoms.tolist()]
+        return which, names, contacts_then.place[which], force
 
     def _on_obstacles(self) -> Bools:
         """Contacts between the robot and an obstacle, shape (contacts,)."""

@@ -25,7 +25,7 @@ from typing import Any
 
 from antennate.errors import WorkerError, in_one_line, raised
 from antennate.lookup import NotSent
-from antennate.sim.engine_warnings import dropped
+from antennate.sim.engine_setup import dropped
 from antennate.studies.processor import processor
 from antennate.studies.work import (
     Emit,

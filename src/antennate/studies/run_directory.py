@@ -26,8 +26,7 @@ from typing import Any
 from antennate import checks
 from antennate.errors import BadInputError, OutputError
 from antennate.files import writing_whole
-from antennate.params.base import Params
-from antennate.params.reading import Config, read_file
+from antennate.params.base import Config, Params, read_file
 from antennate.studies import dates, formats
 from antennate.studies.claim import Claim, claim, give_back
 from antennate.studies.processor import processor

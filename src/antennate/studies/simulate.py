@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from antennate import checks
-from antennate.control.checked import CheckedController
 from antennate.control.knowledge import require_own_senses
-from antennate.control.loop import run_loop
+from antennate.control.loop import CheckedController, run_loop
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import ConfigError, ControllerError
+from antennate.params.base import from_values
 from antennate.params.control import ControlParams
-from antennate.params.reading import from_values
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (

@@ -20,7 +20,7 @@ from antennate.errors import BadInputError, MissingPackageError
 from antennate.messages import extra
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import RobotSpec
-from antennate.sim import gl
+from antennate.sim import engine_setup
 from antennate.sim.camera import Camera, Picture, Shot
 from antennate.sim.world import World
 from antennate.telemetry.strip import Band, Strip, Trace, with_word
@@ -244,7 +244,7 @@ def require_video() -> None:
         BadInputError: PyAV cannot encode H.264, or nothing here can draw.
     """
     _encoder()
-    gl.backend()
+    engine_setup.backend()
 
 
 def _encoder() -> str:

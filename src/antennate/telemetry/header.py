@@ -20,12 +20,12 @@ from pydantic import Field, ValidationError
 
 from antennate import __version__
 from antennate.control.readings import OWN
-from antennate.distributions import engines
 from antennate.errors import LogError
 from antennate.params.base import Strict
 from antennate.params.control import ControlParams
 from antennate.params.faults import describe
 from antennate.robots.spec import RobotSpec
+from antennate.sim.engine_setup import engines
 from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS, Topic
 
 TWIN = "twin"

@@ -19,7 +19,7 @@ from typing import Any, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
-from antennate.sim.contacts import Contacts
+from antennate.sim.places import Contacts
 from antennate.sim.trial import LOOK_EVERY
 from antennate.sim.world import World
 from antennate.telemetry.cdr import Form

@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 
 from antennate import checks
-from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited, write_whole
 from antennate.messages import shortened, shown
-from antennate.notebook import html
+from antennate.notebook import from_columns, html
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
 FORMAT = "antennate time series 1"

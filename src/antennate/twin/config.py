@@ -7,9 +7,8 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from antennate.params.base import Params, number, paths_of
-from antennate.params.control import GaitParams
-from antennate.params.gaits import LiftParams
-from antennate.params.twin import BatteryParams
+from antennate.params.gaits import GaitParams, LiftParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot
@@ -23,9 +22,9 @@ from antennate.sim.trial import (
     scene_of,
 )
 from antennate.sim.world import World
+from antennate.twin.board import TouchStimulus
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servos import factory_new
-from antennate.twin.touch import TouchStimulus
 
 
 class TwinControlParams(Params):

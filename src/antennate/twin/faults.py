@@ -17,9 +17,9 @@ from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.frame import FULL_SCALE
-from antennate.twin.converter import SIDES
+from antennate.twin.board import SIDES
 from antennate.twin.robot import TwinRobot
-from antennate.twin.servo_box import ServoBox
+from antennate.twin.servos import ServoBox
 
 _FORM = re.compile(
     r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|wire)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"

@@ -54,7 +54,9 @@ class Pushes:
     ) -> None:
         self._names = list(names)
         self._ticks = ticks
-        self._waiting = sorted((self._read(text, "--push") for text in orders), key=_time)
+        self._waiting = sorted(
+            (self._read(text, "--push") for text in orders), key=lambda order: order[2]
+        )
         self._turning: dict[int, tuple[float, float, float]] = {}
         self._begin = math.inf
 
@@ -127,10 +129,6 @@ class Pushes:
             ) from None
         angle = math.radians(angle) if match["unit"] == "deg" else angle
         return self.places(match["joint"], what), angle, t
-
-
-def _time(order: tuple[list[int], float, float]) -> float:
-    return order[2]
 
 
 class Plugging:

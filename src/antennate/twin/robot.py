@@ -17,14 +17,13 @@ from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import SimulationError
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
-from antennate.params.twin import BatteryParams
+from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
-from antennate.twin.converter import Converter
+from antennate.twin.board import Converter, TouchStimulus
 from antennate.twin.orders import Plugging, Pushes
 from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
-from antennate.twin.touch import TouchStimulus
 from antennate.types import Floats
 
 GREETING_PERIOD = 1.0
@@ -109,7 +108,6 @@ class TwinRobot:
         self.battery = Battery(battery or BatteryParams())
         self.servos = list(servos or servos_of(robot))
         self.bus = ServoBus(self.servos, robot.baud)
-        self._zero: Floats = np.array(robot.zeros, float)
         self._pushes = Pushes(pushes, robot.joint_names, self._ticks_at)
         self.plugging = Plugging(self.servos, self._pushes)
         self._visit, self._touched = Visit(), False
@@ -251,7 +249,7 @@ class TwinRobot:
 
     def _ticks_at(self, place: int, angle: float) -> float:
         """Where a shaft is at an angle of its joint [ticks]."""
-        return float(self._zero[place] + self._sign[place] * angle / POSITION_UNIT)
+        return float(self._joints.positions(np.full(len(self.servos), angle))[place])
 
     def _push(self) -> None:
         """Turn shafts that are pushed; before the physics begins the joints follow at once."""
@@ -260,8 +258,7 @@ class TwinRobot:
             self.servos[place].push(ticks)
         if moved and self._standing:
             ticks = np.array([servo.motion.shaft.position for servo in self.servos])
-            angles = (ticks - self._zero) * self._sign * POSITION_UNIT
-            self._body.world(0).place_drives(angles)
+            self._body.world(0).place_drives(self._joints.angles(ticks))
 
     def _carry_back(self) -> None:
         """To where the trial began, as a person does between two drives."""

@@ -15,7 +15,7 @@ from antennate.hardware.host import claim
 from antennate.twin.faults import Faults
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
-from antennate.twin.servo_box import ServoBox
+from antennate.twin.servos import ServoBox
 from antennate.types import Floats
 
 _SWITCH = 0.00005

@@ -1,16 +1,27 @@
-"""The servos of the twin's robot: made for it, fed by a battery, used by clients in turn."""
+"""The servos of a twin: those of its robot, fed by a battery, or any set of DYNAMIXEL servos alone.
+
+A list without a robot is `1:xl330-m288 2:xl430-w250`.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from antennate.dxl.driven import DrivenServo
-from antennate.dxl.model import BAUD_RATES
+from antennate.dxl.model import BAUD_RATES, POSITION_UNIT
+from antennate.dxl.models import MODELS, servo_model
 from antennate.dxl.servo import Servo
-from antennate.params.twin import BatteryParams
+from antennate.dxl.servo_bus import ServoBus
+from antennate.errors import ConfigError
+from antennate.params.base import Params, from_values, number, read_file
+from antennate.params.hardware import BatteryParams
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
+from antennate.twin.orders import Plugging, Pushes
 
 _UNITS_A_VOLT = 10
 QUIET = 0.5
@@ -34,12 +45,12 @@ def factory_new(robot: RobotSpec) -> list[DrivenServo]:
 
 
 def _servo(servo: int, kind: ServoParams, mode: int, baud: int) -> DrivenServo:
-    made = DrivenServo(kind.servo, servo, drive=kind)
-    made.set("operating_mode", mode)
-    made.set("return_delay_time", 0)
-    made.set("baud_rate", BAUD_RATES.index(baud))
-    made.set("present_input_voltage", round(10 * kind.voltage))
-    return made
+    driven = DrivenServo(kind.servo, servo, drive=kind)
+    driven.set("operating_mode", mode)
+    driven.set("return_delay_time", 0)
+    driven.set("baud_rate", BAUD_RATES.index(baud))
+    driven.set("present_input_voltage", round(10 * kind.voltage))
+    return driven
 
 
 class Battery:
@@ -98,3 +109,135 @@ class Visit:
         if begins:
             self.begun = t
         return begins
+
+
+MIDDLE = 2048
+"""Position at the angle 0 [ticks]."""
+_FORM = re.compile(
+    r"(?P<id>\d{1,3}):(?P<model>[a-z0-9-]+?|.+?\.toml)(@(?P<baud>\d+))?(x(?P<count>\d{1,3}))?"
+)
+_FACTORY = "datasheet: as delivered"
+
+
+class ServoEntry(Params):
+    """One servo of a list: all else is as delivered."""
+
+    model: str = number("xc430-w240", "1", "assumed: the robot's")
+    """Its model, or a file with one."""
+    id: int = number(1, "1", _FACTORY, ge=0, le=252)
+    """Its id."""
+    baud: int = number(57_600, "bit/s", _FACTORY, gt=0)
+    """Its speed on the bus."""
+    position: float = number(
+        float(MIDDLE), "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575
+    )
+    """Where its shaft is."""
+    name: str = number("", "1", "assumed: its place in the list")
+    """Its name for orders."""
+
+    def make(self) -> Servo:
+        """The servo.
+
+        Raises:
+            ConfigError: There is no such model, or it has no such speed.
+        """
+        own = self.model.endswith(".toml")
+        model = servo_model(self.model) if own else _known(self.model, MODELS, "model")
+        most = model["baud_rate"].high or 0
+        codes = {baud: code for code, baud in enumerate(BAUD_RATES[: most + 1])}
+        servo = Servo(model, self.id, self.position)
+        servo.set("baud_rate", _known(self.baud, codes, f"speed of {self.model}"))
+        return servo
+
+
+class ServoList(Params):
+    """What the file of a list of servos holds: a table `[[servo]]` for each."""
+
+    servo: tuple[ServoEntry, ...] = number((), "1", "assumed: none", min_length=1, max_length=253)
+    """The servos."""
+
+
+def _known(value: Any, known: Mapping[Any, Any], what: str) -> Any:
+    if value not in known:
+        raise ConfigError(
+            f"--servos: expected as {what} one of {', '.join(map(str, known))}, found {value}"
+        )
+    return known[value]
+
+
+def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
+    """Servos from `ID:MODEL[@BAUD][xCOUNT]` each, or from one TOML file.
+
+    Raises:
+        ConfigError: It is neither.
+    """
+    if len(words) == 1 and words[0].endswith(".toml") and not _FORM.fullmatch(words[0]):
+        file = Path(words[0])
+        return tuple(
+            entry.model_copy(update={"model": str(file.parent / entry.model)})
+            if entry.model.endswith(".toml")
+            else entry
+            for entry in read_file(file, ServoList).servo
+        )
+    entries: list[dict[str, Any]] = []
+    for word in words:
+        match = _FORM.fullmatch(word)
+        if match is None:
+            raise ConfigError(
+                "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file alone "
+                f"that ends in .toml, found {word!r}"
+            )
+        model, count = match["model"], match["count"]
+        if count and not match["baud"] and model not in MODELS and not model.endswith(".toml"):
+            model, count = f"{model}x{count}", None  # the x is part of its name
+        entry: dict[str, Any] = {"id": int(match["id"]), "model": model}
+        if match["baud"]:
+            entry["baud"] = int(match["baud"])
+        entries += [entry] * int(count or 1)
+    return from_values(ServoList, {"servo": entries}).servo
+
+
+class ServoBox:
+    """Some servos on their wire.
+
+    Args:
+        entries: The servos.
+        plugged: Names of those on the bus at first, all by default.
+        pushes: Shafts that somebody turns, as `orders.Pushes` reads them.
+
+    Attributes:
+        servos: The servos.
+        bus: Their wire.
+        plugging: Plugs servos in and turns shafts, by orders.
+        t: Time up to which everything has happened [s].
+
+    Raises:
+        AntennateError: Something given cannot be used.
+    """
+
+    def __init__(
+        self,
+        entries: Sequence[ServoEntry],
+        plugged: Sequence[str] = (),
+        pushes: Sequence[str] = (),
+    ) -> None:
+        self.servos = [entry.make() for entry in entries]
+        self.bus = ServoBus(self.servos)
+        names = [entry.name or str(place) for place, entry in enumerate(entries, 1)]
+        self._pushes = Pushes(pushes, names, lambda _, angle: MIDDLE + angle / POSITION_UNIT)
+        self.plugging = Plugging(self.servos, self._pushes)
+        self.plugging.begin(plugged)
+        self.t = 0.0
+
+    def advance(self, t: float) -> None:
+        """Let everything happen until t [s]."""
+        used = any(servo.last_fed > 0.0 for servo in self.servos)
+        for place, ticks in self._pushes.apply(t, used, self.servos):
+            self.servos[place].push(ticks)
+        self.bus.advance(t)
+        self.t = max(self.t, t)
+
+    @property
+    def on_order(self) -> Callable[[str], None]:
+        """Carries out an order now."""
+        return lambda text: self.plugging.order(text, self.t)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
-from antennate.antenna.curves import Samples
+from antennate.antenna.curves import Plateau, Samples
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED, Pushes, branches
-from antennate.antenna.plateau import Plateau
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import conversion_sentence

@@ -18,7 +18,7 @@ from antennate.antenna.curves import Samples
 from antennate.antenna.sensor import FULL_SCALE, divider, transfer_curve
 from antennate.errors import CalibrationError
 from antennate.params.base import Params, meaning, number
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Bools, Floats, Ints
 
 TRIAL, SPEED, TIME, READING, BEND = range(5)

@@ -40,7 +40,7 @@ from antennate.experiments.calibrate.readings import (
     usual,
 )
 from antennate.files import read_limited
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.types import Bools, Floats, Ints
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}

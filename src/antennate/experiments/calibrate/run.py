@@ -18,9 +18,8 @@ from pydantic import model_validator
 
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
-from antennate.antenna.curves import Samples
+from antennate.antenna.curves import Samples, plateau_of, white_noise
 from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
-from antennate.antenna.plateau import plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError, ConfigError
@@ -31,8 +30,7 @@ from antennate.experiments.reading import mean_since
 from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Watch
 from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step

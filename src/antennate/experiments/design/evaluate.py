@@ -22,9 +22,8 @@ from antennate.experiments.study.subject import (
     table_of,
 )
 from antennate.messages import nearest, shortened
-from antennate.params.base import Params
+from antennate.params.base import Params, put_over
 from antennate.params.faults import group_of
-from antennate.params.reading import put_over
 from antennate.studies.experiment import Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers

@@ -17,8 +17,7 @@ from antennate.experiments.force.post_traverse import Traverse
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import require_own_curve
+from antennate.robots.antenna import AntennaSpec, require_own_curve
 from antennate.types import Bools, Floats, Ints
 
 

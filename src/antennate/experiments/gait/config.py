@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from antennate.control.readers import unread_lift
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.errors import ConfigError
 from antennate.experiments.gait.unknown import Unknown, changed
 from antennate.params.base import (
@@ -17,9 +17,8 @@ from antennate.params.base import (
     require_different,
     require_whole_steps,
 )
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
-from antennate.robots.readers import HARDWARE_ALONE, unused
 from antennate.robots.spec import RobotSpec
 
 _OF_UNKNOWN = ("draws", "seed")

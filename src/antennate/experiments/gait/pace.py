@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.params.control import GaitParams
+from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 

@@ -23,7 +23,8 @@ from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.metered import MeteredWorld
 from antennate.experiments.gait.pace import Pace, Walk, measure, rolling_speed
 from antennate.experiments.gait.unknown import drawn
-from antennate.params.control import ControlParams, GaitParams
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import FlatScene

@@ -11,8 +11,7 @@ import numpy as np
 
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import Params
-from antennate.params.reading import from_values
+from antennate.params.base import Params, from_values
 from antennate.types import Floats
 
 GROUPS = ("robot", "gait")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.antenna.taper import distance_decades
+from antennate.antenna.springs import distance_decades
 from antennate.experiments.reproduce.verdict import (
     ENOUGH_TO_STAY,
     Bar,

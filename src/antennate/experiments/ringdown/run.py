@@ -11,11 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from antennate.antenna.dynamics import LinearChain, Mode, cone_ratio, fitted_mode, least_damping
-from antennate.params.base import Params, number, paths_of
-from antennate.params.reading import read_file
+from antennate.params.base import Params, number, paths_of, read_file
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import MOST_HINGES, AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import MOST_HINGES, AntennaSpec, SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
 from antennate.studies.experiment import Outcome

@@ -12,7 +12,7 @@ import numpy as np
 from antennate.antenna import sensor
 from antennate.errors import ConfigError
 from antennate.params.base import Params, number
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import SensorParams
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Measure, Table
 from antennate.types import Floats

@@ -11,7 +11,7 @@ import numpy as np
 from antennate import figures as style
 from antennate.experiments.servo.recording import ServoConfig
 from antennate.experiments.servo.run import SEEN, SHOWN, ServoOutcome, run, stalled
-from antennate.robots.servo_model import NAMES, STEP
+from antennate.robots.servos import MODEL_NUMBERS, STEP
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 from antennate.types import Floats
@@ -58,7 +58,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         return compared, recordings, Table.of("Parameters", columns, PARAMETERS)
     for model in result["models"][-2:]:
         columns[model["name"]] = model
-        ends = {name: model["interval_95"].get(name) for name in NAMES}
+        ends = {name: model["interval_95"].get(name) for name in MODEL_NUMBERS}
         columns[f"{model['name']}, 95 %"] = ends
     note = f"Intervals are over {result['interval_over']}."
     return compared, recordings, Table.of("Parameters", columns, PARAMETERS, note)

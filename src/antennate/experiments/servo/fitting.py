@@ -14,7 +14,7 @@ import numpy as np
 
 from antennate.experiments.servo.recording import GRAVITY, Recording, ServoConfig
 from antennate.jackknife import jackknife95
-from antennate.robots.servo_model import NAMES, STEP, Course, replay, values_of
+from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, replay, values_of
 from antennate.types import Bools, Floats, Ints
 
 EVERY = 5
@@ -25,7 +25,7 @@ MOST_STRETCHES = 30
 """Stretches of neighbouring pieces that are left out in turn where recordings are few."""
 _ROBUST = 0.05
 """Errors beyond this count in proportion, not by their square [rad]."""
-_LOG = np.array([name not in ("friction", "load_friction") for name in NAMES])
+_LOG = np.array([name not in ("friction", "load_friction") for name in MODEL_NUMBERS])
 _LOW = np.where(_LOG, np.log([10.0, 0.01, 0.5, 1e-6, 1.0, 1.0]), 0.0)
 _HIGH = np.where(_LOG, np.log([3000.0, 20.0, 200.0, 0.2, 1.0, 1.0]), (0, 0, 0, 0, 2.0, 0.95))
 _NUDGE = np.where(_LOG, 1e-3, (0, 0, 0, 0, 2e-4, 2e-3))
@@ -126,7 +126,7 @@ class Model:
     @property
     def mask(self) -> Bools:
         """Which parameters are fitted, shape (6,)."""
-        return np.array([name in self.free for name in NAMES])
+        return np.array([name in self.free for name in MODEL_NUMBERS])
 
 
 Held = tuple[str, Bools]
@@ -172,7 +172,7 @@ def models(config: ServoConfig, measured: float | None, loaded: bool) -> list[Mo
     rows.append(Model("as given", given))
     for name, free in fits.items():  # friction that is not fitted is none
         values = start | {friction: 0.0 for friction in _FRICTION if friction not in free}
-        rows.append(Model(name, np.array([values[parameter] for parameter in NAMES]), free))
+        rows.append(Model(name, np.array([values[parameter] for parameter in MODEL_NUMBERS]), free))
     return rows
 
 
@@ -261,7 +261,7 @@ def _step(x: Floats, slope: Floats, bend: Floats, damping: Floats) -> Floats:
     moves = ~stays
     slope = np.where(moves, slope, 0.0)
     scale = np.einsum("bii->bi", bend)
-    eye = np.eye(len(NAMES))
+    eye = np.eye(len(MODEL_NUMBERS))
     bend = np.where(moves[:, :, None] & moves[:, None], bend, eye * scale[:, None])
     damped = bend + damping[:, None, None] * (eye * scale[:, None])
     return np.asarray(np.linalg.solve(damped, slope[..., None])[..., 0])
@@ -274,7 +274,7 @@ def _values(x: Floats) -> Floats:
 
 def _normal(data: Data, x: Floats, free: Bools, weight: Floats) -> tuple[Floats, Floats, Floats]:
     """Cost (B,), its slope (B, 6) and its curvature after Gauss and Newton (B, 6, 6)."""
-    size = len(NAMES)
+    size = len(MODEL_NUMBERS)
     tried = x[:, None] + np.vstack([np.zeros(size), np.diag(_NUDGE)])
     values = _values(tried).reshape(-1, size)
     positions = replay(values, data.course, EVERY)

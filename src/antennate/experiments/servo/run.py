@@ -38,8 +38,8 @@ from antennate.experiments.servo.recording import (
     check_torque,
     read,
 )
-from antennate.robots import servo_model
-from antennate.robots.servo_model import NAMES, STEP
+from antennate.robots import servos
+from antennate.robots.servos import MODEL_NUMBERS, STEP
 from antennate.studies.experiment import OnStep, no_step
 from antennate.types import Bools, Floats
 
@@ -139,12 +139,12 @@ class ServoOutcome:
 
     def _model(self, i: int, model: Model) -> dict[str, Any]:
         """What result.json says of a model."""
-        ends = dict(zip(NAMES, np.moveaxis(self.interval[i], 1, 0), strict=True))
+        ends = dict(zip(MODEL_NUMBERS, np.moveaxis(self.interval[i], 1, 0), strict=True))
         names = [name for name, _ in self.held]
         return {
             "name": model.name,
             "free": list(model.free),
-            **dict(zip(NAMES, self.fitted[i].tolist(), strict=True)),
+            **dict(zip(MODEL_NUMBERS, self.fitted[i].tolist(), strict=True)),
             "error_deg": float(np.degrees(self.errors[i])),
             "held_out_deg": dict(zip(names, np.degrees(self.held_errors[i]).tolist(), strict=True)),
             "interval_95": {
@@ -156,7 +156,7 @@ class ServoOutcome:
 
     def traces(self) -> Floats:
         """Positions that each model gives [rad], shape (T / 10, M, F)."""
-        return servo_model.replay(self.fitted, self.data.course, SHOWN)
+        return servos.replay(self.fitted, self.data.course, SHOWN)
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -204,7 +204,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         on_step(done, total)
         divisor = measured_divisor([recordings[i] for i in np.flatnonzero(part.any(axis=1))])
         fits.append(_fitted(data, [with_divisor(row, divisor) for row in rows], part))
-    interval = np.full((len(rows), 2, len(NAMES)), np.nan)
+    interval = np.full((len(rows), 2, len(MODEL_NUMBERS)), np.nan)
     if config.fit:
         on_step(len(seen), total)
         last = slice(-_JUDGED, None)
@@ -216,7 +216,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     ]
     errors = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
-    replayed = servo_model.replay(fits[0][-1:], data.course, EVERY)[:, 0]
+    replayed = servos.replay(fits[0][-1:], data.course, EVERY)[:, 0]
     return ServoOutcome(
         *(config, recordings, data, rows, fits[0], errors, held, held_errors, interval),
         rows=_recording_rows(recordings, data, replayed),

@@ -19,9 +19,8 @@ from antennate.experiments.study.effects import SUCCESS
 from antennate.files import in_units
 from antennate.lookup import Registry
 from antennate.messages import nearest, shortened, shown
-from antennate.params.base import ALLOWED, Params
+from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
-from antennate.params.reading import put_over, with_bases
 from antennate.studies.codec import dumped
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step

@@ -9,10 +9,9 @@ from pydantic import Field, model_validator
 
 from antennate.antenna.statics import PROFILES, Profile
 from antennate.params.base import Params, number, require_different, require_whole_steps
-from antennate.params.bench import Solver, solver
+from antennate.params.bench import EstimateParams, ShapeParams, Solver, SweepParams, solver
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.sweep import EstimateParams, ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.chain import require_read
 

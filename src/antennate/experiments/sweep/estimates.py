@@ -25,7 +25,7 @@ from antennate.experiments.sweep.reach import (
     feel,
 )
 from antennate.experiments.sweep.scan import Wall, record
-from antennate.params.sweep import SweepParams
+from antennate.params.bench import SweepParams
 from antennate.studies.statistics import mean95
 from antennate.types import Floats
 

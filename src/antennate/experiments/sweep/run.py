@@ -15,7 +15,7 @@ from antennate.experiments.sweep import scan as sweeping
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.estimates import Trial
 from antennate.experiments.sweep.outlines import Outlines
-from antennate.params.sweep import SweepParams
+from antennate.params.bench import SweepParams
 from antennate.sim import chain
 from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step

@@ -15,9 +15,8 @@ import numpy as np
 from antennate.antenna.shapes import Shape, classify
 from antennate.errors import SimulationError
 from antennate.experiments.force.post_traverse import speed_at, way
-from antennate.params.bench import Solver
+from antennate.params.bench import ShapeParams, Solver, SweepParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.sweep import ShapeParams, SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, Watch, compile_bench
 from antennate.sim.chain import ChainBench

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.antenna import taper
+from antennate.antenna import springs
 from antennate.csv_files import column, csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import read_limited
@@ -53,7 +53,7 @@ class TaperOutcome(Outcome):
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        suggested = taper.ladder_proxy(self.suggested)
+        suggested = springs.ladder_proxy(self.suggested)
         return {
             "schema": 1,
             "command": "taper",
@@ -61,7 +61,7 @@ class TaperOutcome(Outcome):
                 {"diameter_mm": 1e3 * d, "second_moment_mm4": 1e12 * i, "proxy": k}
                 for d, i, k in zip(
                     self.diameter.tolist(),
-                    taper.second_moment(self.diameter).tolist(),
+                    springs.second_moment(self.diameter).tolist(),
                     self.proxy.tolist(),
                     strict=True,
                 )
@@ -79,7 +79,7 @@ def _ladder(coils: Floats, proxy: Floats, stretches: Floats) -> dict[str, Any]:
         "active_coils": coils.tolist(),
         "proxy": proxy.tolist(),
         "base_over_tip": float(proxy[0] / proxy[-1]),
-        "distance_decades": taper.distance_decades(proxy, stretches / stretches[0]),
+        "distance_decades": springs.distance_decades(proxy, stretches / stretches[0]),
     }
 
 
@@ -93,18 +93,18 @@ def run(config: TaperConfig) -> TaperOutcome:
     if fewest >= most:
         raise ConfigError(f"coil_limits: expected the smaller first, found {fewest} and {most}")
     if config.diameters is None:
-        diameter = taper.diameters(config)
+        diameter = springs.diameters(config)
     else:
         diameter = read_diameters(Path(config.diameters))
-    proxy = taper.proxy(diameter)
-    stretches = taper.binned(proxy, len(config.ladder))
+    proxy = springs.proxy(diameter)
+    stretches = springs.binned(proxy, len(config.ladder))
     return TaperOutcome(
         config=config,
         diameter=diameter,
         proxy=proxy,
         stretches=stretches,
-        ladder=taper.ladder_proxy(np.array(config.ladder)),
-        suggested=taper.follow(stretches / stretches[0], fewest, most),
+        ladder=springs.ladder_proxy(np.array(config.ladder)),
+        suggested=springs.follow(stretches / stretches[0], fewest, most),
     )
 
 

@@ -10,11 +10,10 @@ from pydantic import Field, model_validator
 from antennate.antenna.statics import Profile
 from antennate.errors import SceneError
 from antennate.params.base import Params, number, require_different, require_whole_steps
+from antennate.params.bench import TouchWallsParams
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
-from antennate.params.touch import TouchWallsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import require_own_curve
+from antennate.robots.antenna import AntennaSpec, require_own_curve
 from antennate.sim import touch_wall
 from antennate.sim.touch_wall import WALLS, Site, WallKind
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna.sensor import reading_noise
-from antennate.control.conditioning import RunningMean, bending_level
-from antennate.control.contact import ContactState
+from antennate.control.conditioning import ContactState, RunningMean, bending_level
 from antennate.experiments import reading
 from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.traverse import Traverse

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Union
 
 import numpy as np
 
-from antennate.control.checked import CheckedController
 from antennate.control.knowledge import Kind, given_to
-from antennate.control.loop import run_loop
+from antennate.control.loop import CheckedController, run_loop
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import field_validator, model_validator
 
 from antennate.control.knowledge import KNOWABLE, Kind
-from antennate.control.readers import unread_by_all
+from antennate.control.readers import HARDWARE_ALONE, unread_by_all
 from antennate.control.readings import (
     KINDS,
     OWN,
@@ -20,7 +20,6 @@ from antennate.control.readings import (
 from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
-from antennate.robots.readers import HARDWARE_ALONE
 from antennate.sim.trial import TrialConfig, require_own_curves
 
 

@@ -8,10 +8,8 @@ from antennate.experiments.tunnel.batch import Emit, run_trials
 from antennate.experiments.tunnel.config import TunnelConfig
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.trial import draw_scene, scene_of
-from antennate.sim.warp.arenas import CountingRobot, PaddedTunnels
-from antennate.sim.warp.packages import require_device
-from antennate.sim.warp.robot import WarpRobot
-from antennate.sim.warp.worlds import Limits
+from antennate.sim.warp.robot import CountingRobot, PaddedTunnels, WarpRobot
+from antennate.sim.warp.worlds import Limits, require_device
 
 WARP_BATCH = 2048
 """Trials at once."""

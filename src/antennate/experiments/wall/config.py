@@ -11,8 +11,7 @@ from antennate.antenna.statics import PROFILES, Profile
 from antennate.params.base import Params, number, require_different
 from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
 from antennate.params.scene import BenchPhysicsParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.sensor import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim import chain
 
 COMMAND_PERIOD = 0.002

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.antenna.plateau import plateau_of
+from antennate.antenna.curves import plateau_of
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.config import DoctorConfig
@@ -23,7 +23,7 @@ from antennate.hardware.safety import channel as diagnosis
 from antennate.hardware.safety.channel import WINDOW, Band, ChannelDiagnosis, Noise, noise_of
 from antennate.messages import typed
 from antennate.params.control import CurveParams
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 

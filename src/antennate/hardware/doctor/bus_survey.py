@@ -18,7 +18,7 @@ from antennate.dxl.packets import OVERHEAD
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.wire import FrameDecoder
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.robots.spec import RobotSpec
 
 _BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)

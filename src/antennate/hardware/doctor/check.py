@@ -14,8 +14,7 @@ from typing import Literal, NamedTuple, TypeVar
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.errors import OpenError, holders
 from antennate.hardware.ports.finder import finder
-from antennate.params.doctor import DoctorParams
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import DoctorParams, NetworkParams
 from antennate.port import Port
 
 Grade = Literal["ok", "warn", "bad"]

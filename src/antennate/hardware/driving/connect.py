@@ -29,7 +29,7 @@ from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.messages import typed
-from antennate.params.doctor import DoctorParams
+from antennate.params.hardware import DoctorParams
 from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
-from antennate.params.dead_man import DeadManParams
+from antennate.params.hardware import DeadManParams
 
 STOPS = tuple(
     getattr(signal, name)

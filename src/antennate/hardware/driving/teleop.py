@@ -26,7 +26,7 @@ import numpy as np
 from antennate.control.controllers import RuleController
 from antennate.errors import BadInputError, reason
 from antennate.params.control import ControlParams
-from antennate.params.setup import TeleopParams
+from antennate.params.hardware import TeleopParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 

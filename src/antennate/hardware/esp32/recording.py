@@ -19,7 +19,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from antennate import checks
-from antennate.dataframe import from_columns
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.hardware.esp32.board import Board
@@ -27,8 +26,9 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
 from antennate.hardware.esp32.wire import Counters, FrameDecoder, Hello, Sample
 from antennate.messages import typed
-from antennate.params.doctor import DoctorParams
-from antennate.params.record import RecordParams
+from antennate.notebook import from_columns
+from antennate.params.bench import RecordParams
+from antennate.params.hardware import DoctorParams
 from antennate.types import Bools, Floats, Ints
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]

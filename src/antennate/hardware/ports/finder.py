@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 from antennate.errors import BadInputError, ConfigError, reason
 from antennate.files import open_regular
 from antennate.messages import extra
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Line, Port, PortError
 
 KEY_SIZE = 32

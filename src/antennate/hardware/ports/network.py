@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from antennate.errors import reason
 from antennate.hardware.esp32 import datagram, frame
-from antennate.params.network import NetworkParams
+from antennate.params.hardware import NetworkParams
 from antennate.port import Port, PortError, port_errors
 
 _COUNTS, _TAG = datagram.COUNTS_SIZE, datagram.TAG_SIZE

@@ -18,8 +18,7 @@ from enum import Enum
 
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding
 from antennate.params.control import ConditioningParams, CurveParams
-from antennate.params.endurance import DriftParams
-from antennate.params.safety import SupervisorParams, TouchCheckParams
+from antennate.params.safety import DriftParams, SupervisorParams, TouchCheckParams
 from antennate.types import Contact
 
 _LONGEST = 0.1

@@ -30,7 +30,7 @@ from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import Joint
-from antennate.params.setup import JogParams
+from antennate.params.hardware import JogParams
 from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 

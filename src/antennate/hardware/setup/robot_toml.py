@@ -13,7 +13,7 @@ from tomlkit.items import InlineTable
 
 from antennate.errors import ConfigError
 from antennate.files import decoded, read_limited, write_whole
-from antennate.params.reading import LARGEST_FILE
+from antennate.params.base import LARGEST_FILE
 
 Value = str | int | float | bool | Sequence[str] | Sequence[int]
 Key = tuple[str, ...]

@@ -19,7 +19,7 @@ from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
 from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
-from antennate.params.setup import SetupParams
+from antennate.params.hardware import SetupParams
 from antennate.robots.joints import QUARTER, STRAIGHT
 from antennate.robots.spec import GroupName, RobotSpec
 from antennate.types import Ints

@@ -9,7 +9,7 @@ import numpy as np
 from antennate.errors import SceneError
 from antennate.params.scene import CorridorsParams, CylinderParams, TunnelParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.plan import Arm, Room
+from antennate.sim.scenes.geometry import Arm, Room
 from antennate.sim.scenes.scene import LEFT_BEHIND
 from antennate.sim.scenes.tunnel import Tunnel, build_along, plan_of
 

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from antennate.robots.spec import RobotSpec
-from antennate.sim import layers
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import FLOOR_BIT
 from antennate.sim.scenes import geometry
 from antennate.types import Floats
 
@@ -158,6 +158,6 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[10, 10, 0.1],
-        contype=layers.FLOOR,
+        contype=FLOOR_BIT,
         conaffinity=0,
     )

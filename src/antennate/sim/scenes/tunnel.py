@@ -19,10 +19,10 @@ import numpy as np
 from antennate.errors import SceneError
 from antennate.params.scene import CylinderParams, TunnelParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim import layers
 from antennate.sim.engine import mujoco
+from antennate.sim.parts import FLOOR_BIT, OBSTACLE_BIT
 from antennate.sim.scenes import geometry
-from antennate.sim.scenes.plan import Arm, Plan, Room
+from antennate.sim.scenes.geometry import Arm, Plan, Room
 from antennate.sim.scenes.scene import LEFT_BEHIND, TIME_LIMIT, add_floor
 from antennate.types import Floats
 
@@ -230,8 +230,8 @@ def _add_wall(
         size=[length / 2, _WALL_HALF_THICKNESS, _WALL_HEIGHT / 2],
         friction=[friction, 0, 0],
         condim=3,
-        contype=layers.OBSTACLE,
-        conaffinity=layers.OBSTACLE,
+        contype=OBSTACLE_BIT,
+        conaffinity=OBSTACLE_BIT,
     )
 
 
@@ -253,8 +253,8 @@ def _add_cylinder(spec: mujoco.MjSpec, name: str, where: Floats, params: Cylinde
         size=[params.radius, 0, 0],
         friction=[params.contact_friction, 0, 0],
         condim=3,
-        contype=layers.OBSTACLE,
-        conaffinity=layers.OBSTACLE,
+        contype=OBSTACLE_BIT,
+        conaffinity=OBSTACLE_BIT,
     )
     body.add_geom(
         name=f"{name}_foot",
@@ -265,5 +265,5 @@ def _add_cylinder(spec: mujoco.MjSpec, name: str, where: Floats, params: Cylinde
         priority=1,
         condim=4,
         contype=0,
-        conaffinity=layers.FLOOR,
+        conaffinity=FLOOR_BIT,
     )

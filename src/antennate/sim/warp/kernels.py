@@ -4,9 +4,9 @@
 # Warp reads the types of arguments as expressions.
 from __future__ import annotations
 
-from antennate.sim.warp.packages import require_warp
+from importlib import import_module
 
-wp, _ = require_warp()
+wp = import_module("warp")  # `import warp` is this folder to type checkers
 
 
 @wp.kernel
@@ -20,7 +20,7 @@ def load_friction(
     damping: wp.array[float],
     friction: wp.array2d[float],
 ):
-    """Friction of gears under load, as `antennate.sim.gears` has it; one thread a joint."""
+    """Friction of gears under load, as `antennate.sim.places` has it; one thread a joint."""
     world, i = wp.tid()
     motor = torque[world, drive[i]] - damping[i] * speed[world, dof[i]]
     friction[world, dof[i]] = dry[i] + share[i] * wp.abs(motor)

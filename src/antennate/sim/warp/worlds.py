@@ -1,7 +1,8 @@
-"""Worlds of one structure, stepped at once on a device by MuJoCo Warp.
+"""Worlds of one structure with a robot each, stepped at once on a device by MuJoCo Warp.
 
 All have the same numbers of bodies, joints and geoms. What may differ from world to world is what
-Warp holds by world: masses, springs, places, sizes, friction and so on.
+Warp holds by world: masses, springs, places, sizes, friction and so on. Friction of gears and the
+forces on obstacles are worked out on the device, too.
 """
 
 from __future__ import annotations
@@ -9,14 +10,78 @@ from __future__ import annotations
 import copy
 import warnings
 from dataclasses import dataclass, fields
+from importlib import import_module, metadata
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from antennate.errors import ConfigError, SceneError, in_one_line
+from antennate.errors import ConfigError, MissingPackageError, SceneError, in_one_line
+from antennate.messages import extra
 from antennate.sim.engine import mujoco
-from antennate.sim.warp.packages import require_device, require_warp
+from antennate.sim.world import World
 from antennate.types import Floats
+
+_MODULES = {"mujoco_warp": "mujoco-warp", "warp": "warp-lang", "absl": "absl-py", "etils": "etils"}
+
+
+def require_warp() -> tuple[Any, Any]:
+    """The modules warp and mujoco_warp.
+
+    Raises:
+        ConfigError: mujoco-warp is of another series than the engine.
+        MissingPackageError: A package is not installed.
+    """
+    missing = [package for module, package in _MODULES.items() if find_spec(module) is None]
+    if missing:
+        raise MissingPackageError(
+            f"--engine warp: expected the packages {', '.join(_MODULES.values())}, found no "
+            f"{', '.join(missing)}; install them with {extra('gpu')}"
+        )
+    engine, version = _series(mujoco.__version__), _version("mujoco-warp")
+    if version and _series(version) != engine:
+        raise ConfigError(
+            f"--engine warp: expected mujoco-warp {engine}, as the engine mujoco is "
+            f"{mujoco.__version__}, found {version}"
+        )
+    import mujoco_warp  # pyright: ignore[reportMissingImports]
+
+    warp = import_module("warp")  # type checkers take our own folder of that name for it
+    warp.config.log_level = warp.LOG_WARNING
+    return warp, mujoco_warp
+
+
+def require_device(name: str | None) -> Any:
+    """The device of a name, or a GPU.
+
+    Raises:
+        ConfigError: There is none.
+        MissingPackageError: Warp is not installed.
+    """
+    warp, _ = require_warp()
+    try:
+        device = warp.get_device(name) if name else warp.get_preferred_device()
+    except Exception as error:
+        raise ConfigError(f"--engine warp: {in_one_line(error)}") from error
+    if name is None and not (device and device.is_cuda):
+        raise ConfigError(
+            "--engine warp: expected a GPU with CUDA, found none; without one the usual engine is "
+            'much faster, and device "cpu" is there for tests'
+        )
+    return device
+
+
+def _series(version: str) -> str:
+    """The first two numbers of a version."""
+    return ".".join(version.split(".")[:2])
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
 
 _STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force")
 _STATIC = ("geom_xpos", "geom_xmat")
@@ -180,7 +245,12 @@ def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
 def _values(model: mujoco.MjModel) -> dict[str, Any]:
     """All numbers of a model by name, but those that Warp does not read: for rays and muscles."""
     owners = (("", model), ("opt.", model.opt))
-    named = ((head + n, getattr(owner, n)) for head, owner in owners for n in _names(owner))
+    named = (
+        (head + n, getattr(owner, n))
+        for head, owner in owners
+        for n in dir(owner)
+        if not n.startswith("_")
+    )
     return {
         n: value
         for n, value in named
@@ -188,10 +258,88 @@ def _values(model: mujoco.MjModel) -> dict[str, Any]:
     }
 
 
-def _names(owner: Any) -> list[str]:
-    return [name for name in dir(owner) if not name.startswith("_")]
-
-
 def same(one: Any, other: Any) -> bool:
     """Whether two numbers or arrays are equal in shape and values."""
     return bool(np.array_equal(one, other))
+
+
+class RobotWorlds(WarpWorlds):
+    """B worlds with a robot each.
+
+    Args:
+        first: A world whose structure all have.
+        batch: Number of worlds B.
+        limits: Sizes on the device.
+        device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
+
+    Raises:
+        ConfigError: There is no such device, or Warp cannot hold that model.
+        MissingPackageError: Warp is not installed.
+    """
+
+    def __init__(self, first: World, batch: int, limits: Limits, device: str | None = None) -> None:
+        self._first = first
+        super().__init__(first.model, batch, limits, device)
+
+    def _make(self, model: mujoco.MjModel) -> None:
+        super()._make(model)
+        self._hold("geom_friction")
+        places, gears = self._first.places, self._first.gears
+        self._loaded: tuple[Any, ...] = ()
+        if len(gears.dof):
+            self._hold("dof_frictionloss")
+            at = gears.drive, gears.dof
+            self._loaded = (*map(self._ints, at), *map(self._floats, _terms(self._first)))
+        self._kinds = self._ints(places.obstacles), self._ints(places.own)
+        self._force = self._wp.zeros(self._batch, dtype=float)
+
+    def put_world(self, row: int, world: World) -> None:
+        """Let a row be a world from now on, in the state that it is in.
+
+        Raises:
+            SceneError: It differs from the first in what all have in common.
+        """
+        if any(not same(*pair) for pair in zip(_terms(world), _terms(self._first), strict=True)):
+            raise SceneError(
+                "--engine warp: expected the same friction of gears under load in all worlds"
+            )
+        self.put(row, world.model, world.data)
+
+    def set_friction(self, row: int, world: World) -> None:
+        """Take the friction of all geoms from a world."""
+        self._write(self._hold("geom_friction"), row, world.model.geom_friction)
+
+    def _before_step(self) -> None:
+        from antennate.sim.warp.kernels import load_friction
+
+        if self._loaded:
+            self._wp.launch(
+                load_friction,
+                dim=(self._batch, len(self._first.gears.dof)),
+                inputs=[self._data.actuator_force, self._data.qvel, *self._loaded],
+                outputs=[self._model.dof_frictionloss],
+            )
+
+    def forces(self) -> Floats:
+        """Summed normal force between robot and obstacles in the last step [N], shape (B,)."""
+        from antennate.sim.warp.kernels import obstacle_forces
+
+        data = self._data
+        with self._wp.ScopedDevice(self._device):
+            self._force.zero_()
+            contact = data.contact
+            self._wp.launch(
+                obstacle_forces,
+                dim=data.naconmax,
+                inputs=[
+                    *(data.nacon, contact.worldid, contact.geom, contact.efc_address),
+                    *(data.efc.force, *self._kinds),
+                ],
+                outputs=[self._force],
+            )
+        return self._force.numpy().astype(float)
+
+
+def _terms(world: World) -> tuple[Floats, Floats, Floats]:
+    """What friction under load is made of."""
+    return world.gears.share, world.gears.dry, world.gears.damping

@@ -8,13 +8,12 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from antennate.control.loop import Retunable
 from antennate.control.readers import unread
-from antennate.control.retunable import Retunable
 from antennate.errors import ConfigError
 from antennate.messages import one_line
-from antennate.params.base import Params
+from antennate.params.base import Params, from_values
 from antennate.params.control import ControlParams
-from antennate.params.reading import from_values
 from antennate.telemetry.view.channel import ORDER, STATE, TEXT, Channel, read
 from antennate.types import Controller
 

@@ -1,18 +1,86 @@
-"""Drawing without a display: EGL, else OSMesa, whichever works here.
+"""What is said of the engine before it is imported: which is installed, its warnings, how it draws.
 
-A driver that does not fit may crash a process, so each is tried in a child process first.
+`mujoco` and, from 4.0 on, `mujoco-core` write the same files. The engine prints its warnings and
+writes them to `MUJOCO_LOG.TXT`; commands and their workers drop them, as worlds read the engine's
+counters instead. In a program of one's own they stay as they are. Drawing without a display goes by
+EGL, else OSMesa, whichever works; a driver that does not fit may crash a process, so each is tried
+in a child process first.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from importlib import metadata
 from importlib.util import find_spec
+from typing import Any
 
 from antennate.errors import BadInputError, MissingPackageError
 from antennate.messages import extra, shown
+
+ENGINES = ("mujoco", "mujoco-core")
+
+
+def engines() -> dict[str, str]:
+    """Versions of the installed distributions that write the engine's files, by name."""
+    versions = {}
+    for name in ENGINES:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+_only = [False]
+
+
+def describe_only(asked: bool) -> None:
+    """Say so before the engine is imported."""
+    _only[0] = asked
+
+
+def is_described() -> bool:
+    """Whether nothing is simulated."""
+    return _only[0]
+
+
+_dropping = [0]
+"""How many hold on to that they are dropped."""
+
+
+@contextlib.contextmanager
+def dropped() -> Iterator[None]:
+    """Drop them for a while, also if the engine is imported only then."""
+    engine = _engine()
+    before = engine.get_mju_user_warning() if engine is not None else None
+    _dropping[0] += 1
+    drop_if_asked()
+    try:
+        yield
+    finally:
+        _dropping[0] -= 1
+        engine = _engine()
+        if engine is not None:
+            engine.set_mju_user_warning(before)
+
+
+def drop_if_asked() -> None:
+    """Drop them within `dropped`, once the engine is imported."""
+    engine = _engine()
+    if engine is not None and _dropping[0]:
+        engine.set_mju_user_warning(lambda message: None)
+
+
+def _engine() -> Any:
+    """The engine if it is imported, and one that can be asked; None otherwise."""
+    engine = sys.modules.get("mujoco")
+    return engine if hasattr(engine, "get_mju_user_warning") else None
+
 
 BACKENDS = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
 """Ways to draw, best first, and the Debian packages of each."""
@@ -38,9 +106,9 @@ def keep_wish() -> None:
     nothing is drawn. If it says nothing, the engine loads GLFW, which starts a process. Processes
     of workers inherit the setting.
     """
-    said = os.environ.get(_NAME, "")
-    if said != _OFF:
-        _wish[0] = said
+    setting = os.environ.get(_NAME, "")
+    if setting != _OFF:
+        _wish[0] = setting
     os.environ[_NAME] = _OFF
 
 
@@ -57,17 +125,17 @@ def backend() -> str:
         raise MissingPackageError(
             f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"
         )
-    said = os.environ.get(_NAME, "")
-    wanted = (_wish[0] if said == _OFF else said).strip().lower()
+    setting = os.environ.get(_NAME, "")
+    wanted = (_wish[0] if setting == _OFF else setting).strip().lower()
     if wanted and wanted not in BACKENDS:
         raise BadInputError(f"{_NAME}: expected {' or '.join(BACKENDS)}, found {shown(wanted)}")
     names = [wanted] if wanted in BACKENDS else list(BACKENDS)
-    found = {}
+    troubles = {}
     for name in names:
-        found[name] = _trouble(name)
-        if not found[name]:
+        troubles[name] = _trouble(name)
+        if not troubles[name]:
             return name
-    reasons = ", ".join(f"{name} ({why})" for name, why in found.items())
+    reasons = ", ".join(f"{name} ({why})" for name, why in troubles.items())
     cures = " or ".join(f"`apt-get install {BACKENDS[name]}`" for name in names)
     raise BadInputError(
         f"video: expected EGL or OSMesa to draw without a display, found none that works: "

@@ -1,21 +1,120 @@
-"""The robot as a part: links with yaw and pitch joints between them, legs, antennae.
+"""The robot and its antennae as parts, and which kinds of geoms can touch.
 
-The head (link 0) carries the free joint and looks along +x; every further link hangs behind the one
-before. A link is a spine along x and a cross-beam along y that houses the two leg servos. The foot
-of a leg is a crowned ring; that of a rolling leg sits off its axle.
+An antenna is a base servo hinge and a chain of sprung links, along x, bending about z. Positive
+angles bend towards the tail once it is mounted: on the left as it is, on the right turned half
+about its own axis, which mirrors it.
+
+The head (link 0) of a robot carries the free joint and looks along +x; every further link hangs
+behind the one before. A link is a spine along x and a cross-beam along y that houses the two leg
+servos. The foot of a leg is a crowned ring; that of a rolling leg sits off its axle.
+
+Two geoms collide if the `contype` of one meets the `conaffinity` of the other. The robot never
+touches itself; only legs touch the floor; everything of the robot touches obstacles. In a scene,
+geoms with the engine's default bits (1 and 1) become obstacles, planes the floor.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
+from antennate.errors import ConfigError
+from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.servos import ServoParams
-from antennate.robots.sides import SIDE_SIGN, SIDES
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
-from antennate.sim import antenna_part as antenna
-from antennate.sim import layers
 from antennate.sim.engine import mujoco
+from antennate.types import SIDE_SIGN, SIDES
+
+FLOOR_BIT = 1
+OBSTACLE_BIT = 2
+LEG_BIT = 4
+BODY_BIT = 8
+ANTENNA_BIT = 16
+
+
+Side = Literal["left", "right"]
+STOPS: dict[str, Any] = {"limited": mujoco.mjtLimited.mjLIMITED_TRUE, "range": [-math.pi, math.pi]}
+"""Ends of a joint that does not turn without end: half a turn either way (assumed)."""
+
+
+def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, float]:
+    """How to turn the part on a body whose x is the heading, y the left and z up.
+
+    Args:
+        angle: From the heading outwards [rad].
+        side: The right antenna is the mirror image of the left one: half a turn about its own axis
+            makes its positive angles bend towards the tail too.
+
+    Returns:
+        Unit quaternion, real part first.
+
+    Raises:
+        ConfigError: The side is unknown.
+    """
+    c, s = math.cos(angle / 2), math.sin(angle / 2)
+    if side not in ("left", "right"):
+        raise ConfigError(f"side: expected left or right, found {side}")
+    return (c, 0.0, 0.0, s) if side == "left" else (0.0, c, -s, 0.0)
+
+
+def build_antenna(params: AntennaSpec, servo: ServoParams | None = None) -> mujoco.MjSpec:
+    """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`.
+
+    Args:
+        params: The antenna.
+        servo: Model of the servo that turns its base; an XL330-M288 if absent.
+    """
+    spec, drive = mujoco.MjSpec(), params.base(servo)
+    spec.compiler.degree = False
+    base = spec.worldbody.add_body(name=BASE)
+    base.add_joint(
+        name=BASE,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 0, 1],
+        damping=drive.damping,
+        armature=drive.armature,
+        **STOPS,
+    )
+    actuator = spec.add_actuator(name=BASE, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=BASE)
+    actuator.set_to_position(kp=drive.stiffness)
+    actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    actuator.forcerange = [-drive.torque, drive.torque]
+
+    parent, where = base, [0.0, 0.0, 0.0]
+    for name, k in zip(params.hinge_names, params.hinge_stiffness(), strict=True):
+        parent = parent.add_body(name=name, pos=where)
+        parent.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 0, 1],
+            stiffness=k,
+            damping=params.damping_time * k,
+            armature=params.armature,
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            range=[-params.range, params.range],
+        )
+        parent.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0, 0, 0, params.link_length, 0, 0],
+            size=[params.radius, 0, 0],
+            mass=params.link_mass,
+            friction=[params.friction, 0, 0],
+            condim=3,
+            contype=ANTENNA_BIT,
+            conaffinity=OBSTACLE_BIT,
+        )
+        where = [params.link_length, 0.0, 0.0]
+    base.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[params.radius, 0, 0],
+        mass=params.base_mass,
+        contype=0,
+        conaffinity=0,
+    )
+    return spec
+
 
 _YAW, _PITCH = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 
@@ -25,7 +124,7 @@ def axle_height(params: RobotSpec) -> float:
     return params.leg_radius + params.leg_eccentricity
 
 
-def build(params: RobotSpec) -> mujoco.MjSpec:
+def build_robot(params: RobotSpec) -> mujoco.MjSpec:
     """The part as an uncompiled spec whose first body is the head, axle height at z = 0."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -77,10 +176,10 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
     at = [params.link_pitch / 2, 0.0, 0.0]
     yaw, pitch = params.yaw_names[i - 1], params.pitch_names[i - 1]
     servo = params.servos.of(params.yaw.servo)
-    _add_hinge(link, yaw, _YAW, at, servo, **antenna.STOPS)
+    _add_hinge(link, yaw, _YAW, at, servo, **STOPS)
     _add_servo(spec, yaw, servo)
     servo = params.servos.of(params.pitch.servo)
-    more = antenna.STOPS if params.pitch_count else {"stiffness": params.pitch.stiffness}
+    more = STOPS if params.pitch_count else {"stiffness": params.pitch.stiffness}
     _add_hinge(link, pitch, _PITCH, at, servo, **more)
     if params.pitch_count:
         _add_servo(spec, pitch, servo)
@@ -99,8 +198,8 @@ def _add_link_shape(link: mujoco.MjsBody, params: RobotSpec) -> None:
             mass=params.link_mass / 2,
             friction=[params.body_friction, 0, 0],
             condim=3,
-            contype=layers.BODY,
-            conaffinity=layers.OBSTACLE,
+            contype=BODY_BIT,
+            conaffinity=OBSTACLE_BIT,
         )
 
 
@@ -123,8 +222,8 @@ def _add_leg(
         friction=[params.leg_friction, 0, 0],
         priority=1,
         condim=3,
-        contype=layers.LEG,
-        conaffinity=layers.FLOOR | layers.OBSTACLE | layers.LEG,
+        contype=LEG_BIT,
+        conaffinity=FLOOR_BIT | OBSTACLE_BIT | LEG_BIT,
     )
     _add_servo(spec, name, servo)
 
@@ -134,8 +233,8 @@ def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     servo = params.servos.of(params.antennae.servo)
     for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
         side = "left" if sign > 0 else "right"
-        turn = antenna.mounting_quaternion(params.antenna.base_angle, side)
+        turn = mounting_quaternion(params.antenna.base_angle, side)
         frame = head.add_frame(
             pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
         )
-        spec.attach(antenna.build(params.antenna, servo), frame=frame, prefix=prefix)
+        spec.attach(build_antenna(params.antenna, servo), frame=frame, prefix=prefix)

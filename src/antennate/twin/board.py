@@ -1,0 +1,296 @@
+"""The antenna board of the twin: touches of its antennae, its converter, and its frames over UDP.
+
+Only the readings of the standing twin are touched; the simulated antenna itself is not bent.
+Orders:
+
+- `left@2s` bends the left antenna for a second, 2 s after a client has begun;
+- `left:20mm@2s` holds it from then on as a ruler beside it is read: its tip pushed 20 mm aside;
+- `left:60deg@2s` likewise by the sum of its hinge angles; 0mm or 0deg lets go;
+- while the twin runs, `left`, `left:20mm` and so on, at once.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from antennate.antenna.sensor import counts
+from antennate.antenna.statics import Chain, equilibrium, shape
+from antennate.errors import BadInputError
+from antennate.hardware.esp32 import datagram, frame
+from antennate.hardware.esp32.frame import FULL_SCALE
+from antennate.robots.antenna import AntennaSpec
+from antennate.types import Floats
+
+SIDES = ("left", "right")
+_STICKY_NOISE = 9.35
+"""Noise of a converter whose codes stick [counts]: 45 readings of github.com/espressif/esp-idf
+issue 164."""
+_STICKY_SHARE = 0.8
+"""Share of its readings that go to the nearest fourth code; with chance it makes the 38 of 45."""
+_STICKY_CODE = 3
+"""The remainder of those codes by 4."""
+
+
+class Converter:
+    """Makes codes of both readings.
+
+    Args:
+        seed: Of its chance.
+        mains: Frequency of what hums [Hz].
+
+    Attributes:
+        mains: That frequency.
+        wires: What is wrong with the wire of each antenna: "open", "short", "stuck", or nothing.
+        held: Readings at which somebody holds the antennae [counts], NaN for none.
+        hum: Amplitude of the hum on both readings [counts].
+        drift: Change of both readings since it began [counts/s].
+        plateau: Highest code; below the full scale as if an attenuation were not set.
+        sticky: Noise of 9 counts, and most codes the same modulo 4.
+        radio_noise: Standard deviation of the noise while the radio sends [counts].
+        radio: Whether the board sends by radio.
+    """
+
+    def __init__(self, seed: int, mains: float) -> None:
+        self._chance, self.mains = np.random.default_rng(seed), mains
+        self.wires = ["", ""]
+        self.held = [math.nan, math.nan]
+        self.hum = self.radio_noise = self.drift = 0.0
+        self.plateau = float(FULL_SCALE)
+        self.sticky = self.radio = False
+        self._drifted = self._t = 0.0
+        self._stuck = [math.nan, math.nan]
+
+    def set(self, what: str, size: float) -> None:
+        """Begin a fault by its name, of a size [counts or counts/s]."""
+        kind, _, side = what.rpartition("_")
+        if what in SIDES:
+            self.held[SIDES.index(what)] = size
+        elif side in SIDES:
+            self.wires[SIDES.index(side)] = kind
+        else:
+            setattr(self, what, True if what == "sticky" else size)
+
+    def codes(self, t: float, readings: Floats, noise: Floats) -> tuple[int, int]:
+        """Codes at the time t [s] of exact readings (2,) and their noise (2,) [counts]."""
+        self._drifted += self.drift * (t - self._t)
+        self._t = t
+        readings = np.where(np.isnan(self.held), readings, self.held) + noise + self._drifted
+        readings = readings + self.hum * math.sin(2 * math.pi * self.mains * t + 1.0)
+        if self.radio and self.radio_noise:
+            readings = readings + self._chance.normal(0.0, self.radio_noise, 2)
+        left, right = readings.tolist()
+        return self._code(0, left), self._code(1, right)
+
+    def _code(self, place: int, counts: float) -> int:
+        wire = self.wires[place]
+        if wire == "open":
+            return int(self._chance.integers(FULL_SCALE + 1))
+        if wire == "short" or math.isnan(counts):
+            return 0
+        if self.sticky:
+            counts = self._stick(counts + self._chance.normal(0.0, _STICKY_NOISE))
+        if wire != "stuck":
+            return self._clamped(counts)
+        if math.isnan(self._stuck[place]):
+            self._stuck[place] = self._clamped(counts)
+        return self._clamped(self._stuck[place] + self._chance.integers(-1, 2))
+
+    def _clamped(self, counts: float) -> int:
+        return min(max(round(counts), 0), int(self.plateau))
+
+    def _stick(self, counts: float) -> float:
+        if self._chance.random() >= _STICKY_SHARE:
+            return counts
+        return 4 * round((counts - _STICKY_CODE) / 4) + _STICKY_CODE
+
+
+TOUCH_FLEX = 1.0
+"""Flex of a touch [rad]: more than twice what the check by touch asks for."""
+TOUCH_TIME = 1.0
+"""Time for which a touch bends an antenna [s]."""
+_TOUCH = re.compile(r"(left|right)(?::([0-9]+(?:\.[0-9]+)?)(mm|deg))?(?:@([0-9]+(?:\.[0-9]+)?)s)?")
+_LOADS = np.linspace(0.0, 0.15, 61)
+"""Loads on the tip, normal to it [N]; the default antenna moves its tip farthest at 0.12 N."""
+
+
+class TouchStimulus:
+    """Touches of antennae, at given times or as they are ordered.
+
+    Args:
+        orders: As above.
+        antenna: The antenna, for its springs and its flex sensor.
+
+    Raises:
+        BadInputError: An order has another form.
+    """
+
+    def __init__(self, orders: Sequence[str], antenna: AntennaSpec) -> None:
+        self._antenna = antenna
+        self._timed = sorted(
+            (_read_touch(text, antenna, timed=True) for text in orders),
+            key=lambda order: order[3],
+        )
+        self._fresh: deque[tuple[int, float, float]] = deque()
+        self._typed = [(0.0, -math.inf), (0.0, -math.inf)]
+        self._begun = math.inf
+
+    def order(self, text: str) -> None:
+        """Take an order, to be carried out at once.
+
+        Raises:
+            BadInputError: It has another form.
+        """
+        side, flex, length, _ = _read_touch(text, self._antenna, timed=False)
+        self._fresh.append((side, flex, length))
+
+    def change(self, t: float, begun: float) -> Floats:
+        """Change of both readings [counts] at time t [s], shape (2,).
+
+        Args:
+            t: The twin's time.
+            begun: When the present client began, inf if none has.
+        """
+        if begun != self._begun:  # touches of the last client end
+            self._begun, self._typed = begun, [(0.0, -math.inf), (0.0, -math.inf)]
+        while self._fresh:
+            side, held, length = self._fresh.popleft()
+            self._typed[side] = (held, t + length)
+        flex = np.zeros(2)
+        for side, held, length, start in self._timed:
+            if start <= t - begun:
+                flex[side] = held if t - begun < start + length else 0.0
+        for side, (held, end) in enumerate(self._typed):
+            flex[side] = held if t < end else flex[side]
+        sensor = self._antenna.sensor
+        return counts(sensor, flex) - counts(sensor, np.zeros(2))
+
+
+def _read_touch(text: str, antenna: AntennaSpec, timed: bool) -> tuple[int, float, float, float]:
+    """Side, flex [rad], for how long [s] and when [s] of an order."""
+    match = _TOUCH.fullmatch(text.strip())
+    if match is None or (match[4] is None) is timed:
+        when = "@Ts, with T in seconds" if timed else "nothing more"
+        raise BadInputError(
+            f"--touch: expected left or right, with or without :20mm or :60deg, then {when}, "
+            f"found {text!r}"
+        )
+    if match[2] is None:
+        flex, length = TOUCH_FLEX, TOUCH_TIME
+    else:
+        size, length = float(match[2]), math.inf
+        flex = math.radians(size) if match[3] == "deg" else _flex_of(1e-3 * size, antenna)
+    return SIDES.index(match[1]), flex, length, float(match[4] or 0.0)
+
+
+def _flex_of(way: float, antenna: AntennaSpec) -> float:
+    """Flex [rad] of an antenna whose tip is pushed aside by so much [m], by the statics."""
+    chain = Chain.of(antenna)
+    force = np.stack([np.zeros_like(_LOADS), _LOADS], axis=1)
+    bent = equilibrium(chain, np.full(len(_LOADS), chain.length), force, follower=True).angles
+    ways, flexes = shape(chain, bent)[:, -1, 1], bent[:, : antenna.sensed_hinges].sum(axis=1)
+    most = int(np.argmax(ways))
+    if way > ways[most]:
+        raise BadInputError(
+            f"--touch: expected at most {1e3 * ways[most]:.0f}mm for this antenna, found "
+            f"{1e3 * way:g}mm"
+        )
+    return float(np.interp(way, ways[: most + 1], flexes[: most + 1]))
+
+
+_ALIVE = 0.1
+"""A board that has been silent for longer [s], ten samples, does not answer either."""
+
+
+class UdpEndpoint:
+    """Answers requests and sends each frame in a datagram of its own.
+
+    Args:
+        host: Address to listen on; only this one.
+        port: UDP port, 0 for any that is free.
+        key: The board's.
+        now: Monotonic time [s].
+
+    Raises:
+        BadInputError: The port cannot be had.
+    """
+
+    def __init__(
+        self, host: str, port: int, key: bytes, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._now = now
+        self._signer = datagram.Signer(key)
+        self._speaker: datagram.Speaker | None = None
+        self._boot = -1
+        self._written = 0.0
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise BadInputError(
+                f"--udp: expected a free port, found {host}:{port}: {error}"
+            ) from None
+        self.path = f"udp://{host}:{self._socket.getsockname()[1]}"
+
+    def fileno(self) -> int:
+        """Of the socket."""
+        return self._socket.fileno()
+
+    def baud(self) -> int | None:
+        """There is none."""
+        return None
+
+    def read(self) -> bytes:
+        """Answer a request that has come; a board takes nothing else."""
+        try:
+            asked, sender = self._socket.recvfrom(datagram.ASK_SIZE + 1)
+        except OSError:
+            return b""
+        now = self._now()
+        if self._speaker is not None and now - self._written < _ALIVE:
+            answer = self._speaker.answer(asked, sender, round(1e3 * now))
+            if answer is not None:
+                self._send(answer, sender)
+        return b""
+
+    def write(self, data: bytes) -> None:
+        """Send whole frames; a greeting is kept for clients that ask."""
+        now = self._now()
+        self._written = now
+        for chunk in data.split(b"\0"):
+            body = frame.unstuff(chunk) if chunk else None
+            if body is None:
+                continue
+            whole = b"\0" + chunk + b"\0"
+            if body[1] == frame.HELLO:
+                self._begin(whole, struct.unpack_from(frame.HELLO_LAYOUT, body)[2])
+            elif self._speaker is not None:
+                signed = self._speaker.sign(whole, round(1e3 * now))
+                if signed is not None:
+                    self._send(signed, self._speaker.listener)
+
+    def close(self) -> None:
+        """Close the port."""
+        self._socket.close()
+
+    def _begin(self, hello: bytes, boot: int) -> None:
+        if boot != self._boot:
+            size = frame.SAMPLE_FRAME_SIZE
+            self._speaker = datagram.Speaker(self._signer, boot, hello, size)
+            self._boot = boot
+
+    def _send(self, data: bytes | bytearray, receiver: Any) -> None:
+        try:
+            self._socket.sendto(data, receiver)
+        except OSError:
+            return
