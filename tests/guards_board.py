@@ -24,7 +24,6 @@ from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
 from antennate.control import conditioning, controllers
-from antennate.experiments.reproduce.antenna_claims import contact
 from antennate.hardware.esp32 import board, clock, frame
 from antennate.hardware.esp32 import wire as decoder
 from antennate.hardware.esp32.clock import DeviceClock, SampleState

@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from antennate import __version__
+from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.messages import COMMAND_GROUPS, command_words
 
 if TYPE_CHECKING:
     from antennate.cli.help import Command
-
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
-"""Exit codes of every command."""
 
 ROBOT_COMMANDS = {
     "twin": "A simulated robot on two ports: an antenna board and a servo bus",

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic.dataclasses import dataclass
 
 from antennate.antenna.calibration import Calibration
-from antennate.cli import BAD_INPUT, OK, viewer
+from antennate.cli import viewer
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, pressed_keys, typed_keys
 from antennate.cli.options import option
 from antennate.cli.pages import PageOptions, page_of

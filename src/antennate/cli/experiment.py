@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.arguments import as_typed, parse
+from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import ViewOptions, say_by_hand, view_of
 from antennate.cli.results import ResultOptions, drawn_table, folder_for, show_result

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic.dataclasses import dataclass
 
 from antennate import experiments
-from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.pages import MODULE, FoxgloveOptions
 from antennate.cli.results import ResultOptions, log_of, show_result

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from antennate.antenna.curves import plateau_of
-from antennate.cli import OK
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.terminal import StatusLine, stop_signals

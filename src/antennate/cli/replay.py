@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import parse
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.log import arena_of, complain
 from antennate.cli.options import option
 from antennate.cli.pages import ViewOptions, page_of, say_by_hand

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import OK
 from antennate.cli.arguments import FromFile, parse
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.terminal import write

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import BAD_INPUT, OK
+from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
 from antennate.cli.options import option
 from antennate.cli.results import print_table

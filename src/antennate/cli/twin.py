@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Literal, Self
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli import OK
 from antennate.cli.arguments import as_typed
+from antennate.cli.exit_codes import OK
 from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
