@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import main
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.reading import read_file
 

@@ -22,9 +22,8 @@ from antennate.errors import ConfigError, MissingPackageError, OutputError, Simu
 from antennate.experiments.calibrate.run import CalibrateConfig, push
 from antennate.experiments.running import require_films
 from antennate.experiments.sweep import scan
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.passage import passage
-from antennate.experiments.wall.run import run
+from antennate.experiments.wall.experiment import run
+from antennate.experiments.wall.physics import WallConfig, passage
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.sweep import SweepParams
 from antennate.robots.antenna import AntennaSpec

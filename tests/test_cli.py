@@ -19,7 +19,7 @@ from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse
 from antennate.errors import ConfigError
 from antennate.experiments.gait.run import GaitStudyConfig
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import one_line
 from antennate.params.reading import read_file
 from antennate.sim.world import World

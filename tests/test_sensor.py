@@ -13,7 +13,7 @@ from antennate import simulate
 from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.control import ControlParams, CurveParams
 from antennate.params.reading import read_file

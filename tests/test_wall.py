@@ -12,19 +12,18 @@ from pydantic import ValidationError
 
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments.wall import run as wall
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.experiment import EXPERIMENT
-from antennate.experiments.wall.outcome import (
+from antennate.experiments.wall import experiment as wall
+from antennate.experiments.wall.experiment import EXPERIMENT, run
+from antennate.experiments.wall.physics import (
     Traverse,
+    WallConfig,
     WallTrial,
     classify,
     least_advance,
     longest_gap,
     longest_stick,
+    passage,
 )
-from antennate.experiments.wall.passage import passage
-from antennate.experiments.wall.run import run
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
 

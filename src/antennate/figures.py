@@ -1,24 +1,26 @@
-"""One look for every figure: fonts, colours, axes, and bytes that depend on the data alone."""
+"""One look for every figure: fonts, colours, axes, and bytes that depend on the data alone.
+
+matplotlib takes long to import, so a function imports it when it draws.
+"""
 
 from __future__ import annotations
 
 import functools
 import io
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import PlaceHolderLayoutEngine
-from matplotlib.transforms import Bbox
 
 from antennate import checks
 from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
 from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
 from antennate.colours import SERIES as SERIES
 from antennate.jackknife import ENOUGH as ENOUGH_TRIALS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -109,6 +111,8 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+        import matplotlib as mpl
+
         with mpl.rc_context(_RC):
             return draw(*args, **kwargs)
 
@@ -137,6 +141,8 @@ def font(size: int) -> Any:
 
 def canvas(width: float, height: float) -> Figure:
     """An empty figure of this size [inches] whose parts keep clear of one another."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -194,6 +200,8 @@ def render(figure: Figure) -> dict[str, bytes]:
     Raises:
         ConfigError: It is none of matplotlib.
     """
+    from matplotlib.figure import Figure
+
     checks.instance("figure", figure, Figure)
     _settle(figure)
     files = {}
@@ -218,6 +226,9 @@ def thumbnail(figure: Figure) -> bytes:
 
 def _settle(figure: Figure) -> None:
     """Lay the figure out once and round the result: the solver's last digits are not repeatable."""
+    from matplotlib.layout_engine import PlaceHolderLayoutEngine
+    from matplotlib.transforms import Bbox
+
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):
         return
     figure.draw_without_rendering()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from antennate.errors import ConfigError
-from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.bench import BenchRecorder
 from antennate.experiments.calibrate.run import CalibrateConfig, push
 from antennate.telemetry.film import Film
 

@@ -23,10 +23,10 @@ from antennate.antenna.plateau import Plateau, plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
+from antennate.experiments.bench import mean_since
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
-from antennate.experiments.reading import mean_since
 from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams

@@ -12,7 +12,7 @@ from pydantic import model_validator
 from antennate.antenna import sensor as flex_sensor
 from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
 from antennate.control.conditioning import bending_level
-from antennate.experiments import reading
+from antennate.experiments import bench
 from antennate.experiments.force.post_traverse import Traverse
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.control import ConditioningParams
@@ -168,8 +168,8 @@ def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     for k, one in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
         noise = flex_sensor.reading_noise(config.antenna.sensor, rng, (len(one.flex),))
-        counts.append(reading.recorded(config.antenna.sensor, one.flex, noise))
-        mean = reading.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
+        counts.append(bench.recorded(config.antenna.sensor, one.flex, noise))
+        mean = bench.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
         levels.append(bending_level(config.conditioning, mean))
     trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
     return Points(

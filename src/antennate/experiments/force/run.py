@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from antennate.antenna.statics import Chain, equilibrium, with_profile
+from antennate.experiments.bench import between
 from antennate.experiments.force.loads import (
     ForceConfig,
     Points,
@@ -23,7 +24,6 @@ from antennate.experiments.force.loads import (
     traverse_points,
 )
 from antennate.experiments.force.post_traverse import Traverse, drag
-from antennate.experiments.reading import between
 from antennate.sim.bench import Watch
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, gather

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.bench import BenchRecorder
 from antennate.experiments.ringdown.run import RingdownConfig, run
 from antennate.telemetry.film import Film
 

@@ -199,7 +199,7 @@ class _OfExperiment:
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
         """The same on a GPU or another device of Warp."""
-        if self._trials is None or self._trials.run_on_device is None:
+        if self._trials is None or self._trials.batch is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from antennate.antenna.statics import Profile
-from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.bench import BenchRecorder
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.run import map_cell
 from antennate.telemetry.film import Film

@@ -18,7 +18,7 @@ import numpy as np
 
 from antennate.antenna.sensor import reading_noise
 from antennate.antenna.statics import Chain, equilibrium, shape
-from antennate.experiments.reading import averaged, between, flex_of, recorded
+from antennate.experiments.bench import averaged, between, flex_of, recorded
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.scan import Trace
 from antennate.robots.antenna import AntennaSpec

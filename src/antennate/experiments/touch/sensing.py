@@ -14,7 +14,7 @@ import numpy as np
 from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import RunningMean, bending_level
 from antennate.control.contact import ContactState
-from antennate.experiments import reading
+from antennate.experiments import bench
 from antennate.experiments.touch.config import TouchConfig
 from antennate.experiments.touch.traverse import Traverse
 from antennate.params.control import ConditioningParams, RuleParams
@@ -167,7 +167,7 @@ def readings(config: TouchConfig, batch: Sequence[Traverse]) -> Floats:
         trial: reading_noise(sensor, np.random.default_rng([config.seed, trial, 1]), (ticks,))
         for trial in {t.plan.trial for t in batch}
     }
-    return reading.recorded(
+    return bench.recorded(
         sensor,
         np.stack([t.flex for t in batch], axis=1),
         np.stack([noises[t.plan.trial] for t in batch], axis=1),

@@ -14,12 +14,12 @@ from antennate.control.loop import run_loop
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import (
+from antennate.experiments.tunnel.physics import (
     Outcome,
     TrialMonitor,
     TrialPath,
     TrialResult,
+    TunnelConfig,
 )
 from antennate.sim.knowledge import Truths, require_route
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene
@@ -139,9 +139,10 @@ def cpu_bodies(config: TunnelConfig) -> MakeBodies:
     return make
 
 
-def lost_row(key: tuple[int, int, str], config: TunnelConfig, reason: str) -> TrialResult:
-    """The row of a trial, named by seed, number and controller, of which there is nothing else."""
+def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> TrialResult:
+    """The row of a trial of which there is nothing else."""
     limit = config.time_limit or TIME_LIMIT
+    key = config.seed, trial, condition
     return TrialResult(*key, "invalid", limit, limit_s=limit, reason=reason)
 
 
@@ -233,8 +234,7 @@ class _Rows:
             try:
                 return self._begin(row, trial)
             except SceneError as error:
-                key = self._config.seed, trial, self._name
-                lost = lost_row(key, self._config, str(error))
+                lost = lost_row(self._config, self._name, trial, str(error))
                 self._emit((lost, None))
         return None
 

@@ -18,8 +18,8 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 from antennate import figures as style
 from antennate.control.readings import short_names
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS
-from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
-from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.experiments.tunnel.experiment import TunnelOutcome
+from antennate.experiments.tunnel.physics import TrialPath, TrialResult
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3
