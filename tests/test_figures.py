@@ -16,7 +16,7 @@ from PIL import Image
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN, USUAL
 from antennate.experiments.gait import figure as gait
-from antennate.experiments.taper import figure as taper
+from antennate.experiments.taper import experiment as taper
 from antennate.experiments.taper.experiment import TaperConfig
 from antennate.experiments.taper.experiment import run as run_taper
 from antennate.experiments.tunnel import figure as tunnel
