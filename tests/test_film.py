@@ -22,8 +22,8 @@ from antennate.errors import AntennateError, BadInputError
 from antennate.experiments.bench import BenchRecorder
 from antennate.experiments.calibrate.run import CalibrateConfig
 from antennate.experiments.calibrate.run import push as record_push
-from antennate.experiments.force.loads import ForceConfig
-from antennate.experiments.force.run import traverse
+from antennate.experiments.force.experiment import traverse
+from antennate.experiments.force.physics import ForceConfig
 from antennate.experiments.sweep.config import SweepConfig
 from antennate.experiments.sweep.run import map_cell
 from antennate.experiments.tunnel.experiment import ending, films

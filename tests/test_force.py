@@ -15,8 +15,9 @@ from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.cli import main
 from antennate.errors import ConfigError, SimulationError
 from antennate.experiments import bench
-from antennate.experiments.force import loads, post_traverse
-from antennate.experiments.force import run as force
+from antennate.experiments.force import experiment as force
+from antennate.experiments.force import physics as loads
+from antennate.experiments.force import physics as post_traverse
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec

@@ -18,8 +18,8 @@ from servo_recordings import of_twin
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN
-from antennate.experiments.force import loads
-from antennate.experiments.force import run as force
+from antennate.experiments.force import experiment as force
+from antennate.experiments.force import physics as loads
 from antennate.experiments.reproduce import run as reproduce
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from antennate.experiments.force.experiment import MEASURES as FORCE
-from antennate.experiments.force.run import TraverseRow
+from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
 from antennate.experiments.sweep.run import SweepRow
 from antennate.experiments.touch.experiment import AVERAGING, PROFILE

@@ -14,7 +14,7 @@ import numpy as np
 
 from antennate.antenna.shapes import Shape, classify
 from antennate.errors import SimulationError
-from antennate.experiments.force.post_traverse import speed_at, way
+from antennate.experiments.force.physics import speed_at, way
 from antennate.params.bench import Solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.sweep import ShapeParams, SweepParams
