@@ -14,12 +14,11 @@ from antennate.antenna import statics as mechanics
 from antennate.cli import main
 from antennate.errors import ConfigError, SimulationError
 from antennate.experiments import bench
+from antennate.experiments.touch import experiment as touch
 from antennate.experiments.touch import figure as figures
-from antennate.experiments.touch import run as touch
 from antennate.experiments.touch import sensing
-from antennate.experiments.touch.config import TouchConfig, site
+from antennate.experiments.touch.physics import TouchConfig, plan, site
 from antennate.experiments.touch.sensing import runs
-from antennate.experiments.touch.traverse import plan
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.touch import TouchWallsParams

@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.touch.experiment import F1, ONSET, RELEASE
-from antennate.experiments.touch.run import TouchOutcome
+from antennate.experiments.touch.experiment import F1, ONSET, RELEASE, TouchOutcome
+from antennate.experiments.touch.physics import Traverse
 from antennate.experiments.touch.sensing import Comparison
-from antennate.experiments.touch.traverse import Traverse
 from antennate.params.control import RuleParams
 
 _TRUE, _SENSED = style.SERIES[5], style.INK
