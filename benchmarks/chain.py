@@ -18,8 +18,8 @@ import numpy as np
 
 from antennate.antenna.statics import PROFILES, Profile
 from antennate.experiments.calibrate.run import CalibrateConfig, push
-from antennate.experiments.sweep.config import SweepConfig
-from antennate.experiments.sweep.run import SweepRow, map_cell
+from antennate.experiments.sweep.experiment import SweepRow, map_cell
+from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.wall.experiment import run_trial
 from antennate.experiments.wall.physics import WallConfig, WallTrial
 from antennate.params.bench import Solver

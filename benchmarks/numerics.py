@@ -20,8 +20,8 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.experiments.gait import run as gait
-from antennate.experiments.gait.pace import measure
+from antennate.experiments.gait import experiment as gait
+from antennate.experiments.gait.physics import measure
 from antennate.experiments.tunnel import experiment as experiment
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import GaitParams

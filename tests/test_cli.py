@@ -18,7 +18,7 @@ import antennate
 from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse
 from antennate.errors import ConfigError
-from antennate.experiments.gait.run import GaitStudyConfig
+from antennate.experiments.gait.experiment import GaitStudyConfig
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import one_line
 from antennate.params.reading import read_file
@@ -590,7 +590,7 @@ def test_gait_runs_and_writes_its_result(capsys, tmp_path):
 
 
 def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
-    from antennate.experiments.gait import run as gait
+    from antennate.experiments.gait import experiment as gait
 
     def interrupted(*args):
         raise KeyboardInterrupt

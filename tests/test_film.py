@@ -24,8 +24,8 @@ from antennate.experiments.calibrate.run import CalibrateConfig
 from antennate.experiments.calibrate.run import push as record_push
 from antennate.experiments.force.experiment import traverse
 from antennate.experiments.force.physics import ForceConfig
-from antennate.experiments.sweep.config import SweepConfig
-from antennate.experiments.sweep.run import map_cell
+from antennate.experiments.sweep.experiment import map_cell
+from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tunnel.experiment import ending, films
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.sweep import SweepParams

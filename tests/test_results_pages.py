@@ -11,7 +11,7 @@ import pytest
 from antennate.experiments.force.experiment import MEASURES as FORCE
 from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
-from antennate.experiments.sweep.run import SweepRow
+from antennate.experiments.sweep.experiment import SweepRow
 from antennate.experiments.touch.experiment import AVERAGING, PROFILE
 from antennate.experiments.tracks.run import TrackRow
 from antennate.experiments.tunnel import measures as tunnel

@@ -24,7 +24,7 @@ import antennate
 from antennate.cli import main
 from antennate.dxl import packets
 from antennate.errors import AntennateError, LogError
-from antennate.experiments.gait.run import GaitStudyConfig, run
+from antennate.experiments.gait.experiment import GaitStudyConfig, run
 from antennate.experiments.tunnel.experiment import run as cross
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import GaitParams

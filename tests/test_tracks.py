@@ -17,9 +17,9 @@ from tracked import DWELL, NAMES, POINTS, animal, bent, classified, dwelling, wr
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
 from antennate.experiments.sweep import estimates
-from antennate.experiments.sweep import run as sweep
-from antennate.experiments.sweep.config import SweepConfig
+from antennate.experiments.sweep import experiment as sweep
 from antennate.experiments.sweep.experiment import EXPERIMENT
+from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tracks.config import TrackWallParams
 from antennate.experiments.tracks.experiment import EXPERIMENT as TRACKS
 from antennate.experiments.tracks.walls import wall_of

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.gait.pace import Walk
-from antennate.experiments.gait.run import GaitOutcome
+from antennate.experiments.gait.experiment import GaitOutcome
+from antennate.experiments.gait.physics import Walk
 from antennate.types import Maneuver
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.sweep.run import SweepOutcome
+from antennate.experiments.sweep.experiment import SweepOutcome
 
 _CUE_MARKS = {
     "flex_and_base": ("o", "#332288"),
