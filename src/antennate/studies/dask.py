@@ -18,9 +18,7 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.studies.processes import Processes
-from antennate.studies.processor import Processor
-from antennate.studies.submitted import (
+from antennate.studies.engines import (
     NO_PLACE,
     Submitted,
     folder_of,
@@ -28,7 +26,8 @@ from antennate.studies.submitted import (
     require_same,
     work_apart,
 )
-from antennate.studies.work import Emit, Fail, Packed, Part, Work
+from antennate.studies.processes import Processes
+from antennate.studies.work import Emit, Fail, Packed, Part, Processor, Work
 
 CONNECT = 10.0
 """Time within which a scheduler has to answer, or to come back [s]."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError
-from antennate.studies.codec import decoded, encoded
+from antennate.studies.formats import decoded, encoded
 from antennate.studies.processes import Processes
 from antennate.studies.store import Store, key_of
 from antennate.studies.work import Engine, Failure, Here, Work

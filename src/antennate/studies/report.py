@@ -17,7 +17,7 @@ from typing import Any
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.params.base import Params
-from antennate.studies import dates, page, terms
+from antennate.studies import page
 from antennate.studies.formats import to_toml
 from antennate.studies.measures import FEW, NONE, Table
 from antennate.studies.run_directory import RunDirectory
@@ -34,6 +34,7 @@ from antennate.studies.run_files import (
     RESULT,
     TABLE,
     VERSIONS,
+    when_run,
 )
 
 _MOST_REASONS = 20
@@ -142,8 +143,8 @@ def _command(run: RunDirectory, view: View) -> str:
 def _when(run: RunDirectory, result: Result | None) -> str:
     """When it was run, how long it took, and its seed, as far as they are known."""
     seed = (result or {}).get("seed", _table(run.text(CONFIG)).get("seed"))
-    told = dates.sentence(run.text(COMMAND))
-    return f"{told} Seed {seed}." if seed is not None else told
+    when = when_run(run.text(COMMAND))
+    return f"{when} Seed {seed}." if seed is not None else when
 
 
 def _images(run: RunDirectory, view: View) -> dict[str, str]:
@@ -195,7 +196,7 @@ def _shown(run: RunDirectory, result: Result, view: View) -> str:
     words = "".join(page.numbers(table) for table in tables if not page.is_broad(table))
     figures = [page.captioned(image, view.caption(name)) for name, image in images.items()]
     broad = "".join(page.numbers(table) for table in tables if page.is_broad(table))
-    return page.beside(figures, words + terms.explained(result)) + broad
+    return page.beside(figures, words + page.terms_explained(result)) + broad
 
 
 def _failures(run: RunDirectory) -> str:

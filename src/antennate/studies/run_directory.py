@@ -28,9 +28,8 @@ from antennate.errors import BadInputError, OutputError
 from antennate.files import writing_whole
 from antennate.params.base import Params
 from antennate.params.reading import Config, read_file
-from antennate.studies import dates, formats
+from antennate.studies import formats
 from antennate.studies.claim import Claim, claim, give_back
-from antennate.studies.processor import processor
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -44,15 +43,18 @@ from antennate.studies.run_files import (
     TABLE,
     VERSIONS,
     add_to_list,
+    begun_line,
     files_of,
     inside,
     listed,
     read_as,
     remove_described,
     remove_run,
+    with_end,
     writing,
 )
 from antennate.studies.store import Tasks
+from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -184,7 +186,7 @@ class RunDirectory:
         self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
         if command:
             resumed = self.store is not None and self.store.holds_trials
-            self._described[COMMAND] = f"{shlex.join(command)}\n{dates.begun(resumed)}"
+            self._described[COMMAND] = f"{shlex.join(command)}\n{begun_line(resumed)}"
         for name, text in self._described.items():
             self.write(name, text)
 
@@ -243,7 +245,7 @@ class RunDirectory:
             self.write(VERSIONS, self._versions())
         self.write(RESULT, formats.to_json(result))
         if text := self.text(COMMAND):
-            self.write(COMMAND, dates.ended(text))
+            self.write(COMMAND, with_end(text))
         self.keep()
         self._drop_partial()
         if not result.get("interrupted"):

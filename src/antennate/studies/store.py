@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from antennate.errors import BadInputError, OutputError
 from antennate.files import open_regular
-from antennate.studies.codec import dumped
+from antennate.studies.formats import dumped
 from antennate.studies.identity import but_trials, differences
 
 STORE = "trials.store.jsonl"

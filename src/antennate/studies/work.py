@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import pickle
+import platform
+import re
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +16,25 @@ from typing import Any, Literal, Protocol
 
 from antennate.errors import LogError, WorkerError, in_one_line
 from antennate.lookup import ADDED, NotSent
-from antennate.studies.processor import processor
+
+_CPUINFO = Path("/proc/cpuinfo")
+
+
+@functools.cache
+def processor() -> str:
+    """Its model, as the system calls it."""
+    try:
+        model = re.search(r"^model name\s*:\s*(.+)$", _CPUINFO.read_text(), re.M)
+    except OSError:
+        model = None
+    return model[1].strip() if model else platform.processor() or platform.machine()
+
+
+class Processor(str):
+    """The model of the processor that trials ran on, where it comes among their results."""
+
+    __slots__ = ()
+
 
 Emit = Callable[[int, Any], None]
 """Takes the place of a task and its result."""

@@ -32,7 +32,7 @@ from antennate.sim.bench import Watch
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.pool import Workers, gather
-from antennate.studies.regression import by_group, explained
+from antennate.studies.statistics import by_group, explained
 from antennate.types import Floats, Ints
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.files import in_units
 from antennate.messages import shortened
-from antennate.studies.codec import dumped
+from antennate.studies.formats import dumped
 
 OF_STUDY = ("point", "trial", "seed", "status", "reason")
 """Columns that a study fills itself."""
