@@ -27,20 +27,22 @@ ROOT = Path(__file__).parents[1]
 ANTENNATE = (sys.executable, "-m", "antennate")
 TRIALS = "--trials 3 --seed 5 --time-limit 30"
 ALONE = {
-    "springs": "springs",
-    "taper": "taper",
-    "sensor": "sensor",
-    "ringdown": "ringdown --cone-hinges 6 14",
+    "springs": "antenna springs",
+    "taper": "antenna taper",
+    "sensor": "antenna sensor",
+    "ringdown": "antenna ringdown --cone-hinges 6 14",
     "gait": "gait --cycles 2 --settling-cycles 1 --sweep-points 4",
     "gait_hexapod": "gait --robot hexapod --cycles 2 --settling-cycles 1 --sweep-points 4",
     "calibrate": "calibrate",
-    "force": "force --profiles stiff descending --traverses 6 --loads 6 --place-step 0.25",
+    "force": "bench force --profiles stiff descending --traverses 6 --loads 6 --place-step 0.25",
 }
 """Runs without workers, or whose trials are few."""
 POOLED = {
-    "touch": "touch --trials 1 --walls flat boulders --speeds 0.1 --profiles stiff descending",
-    "wall": "wall --trials 2",
-    "sweep": "sweep --profiles stiff --distances 0.5 --centres 1.2 --amplitudes 0.5 --sweeps 1",
+    "touch": "bench touch --trials 1 --walls flat boulders --speeds 0.1 "
+    "--profiles stiff descending",
+    "wall": "bench wall --trials 2",
+    "sweep": "bench sweep --profiles stiff --distances 0.5 --centres 1.2 --amplitudes 0.5 "
+    "--sweeps 1",
     "tunnel": f"tunnel {TRIALS}",
     "corridors": "tunnel --scene corridors --trials 2 --time-limit 20 --controllers random map",
     "links": f"tunnel --robot {ROOT / 'examples' / 'eight_links.toml'} --trials 1 --time-limit 20",
@@ -92,8 +94,8 @@ def logged(folder: Path) -> None:
     run(LOGGED, folder / "run")
     for log in sorted((folder / "run").rglob("*.mcap")):
         name = log.parent.name + "-" + log.stem if log.parent.name != "logs" else log.stem
-        antennate("replay", log, "--out", folder / f"replay-{name}")
-        antennate("replay --controller paper", log, "--out", folder / f"paper-{name}")
+        antennate("log replay", log, "--out", folder / f"replay-{name}")
+        antennate("log replay --controller paper", log, "--out", folder / f"paper-{name}")
 
 
 def take(received: dict[int, bytearray], open_ports: set[int], patience: float = 0.0) -> bool:

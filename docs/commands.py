@@ -5,11 +5,12 @@ from collections.abc import Iterator
 
 from generated import finish, heads, row
 
-from antennate.cli import ROBOT_COMMANDS, carry_out, commands
+from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, carry_out, commands
 from antennate.cli.arguments import OptionsRequest
 from antennate.cli.help import Command
 from antennate.cli.options import Option
 from antennate.experiments import is_ours
+from antennate.messages import command_words
 
 HEAD = """\
 # Commands
@@ -34,9 +35,10 @@ def command(name: str) -> Command:
 def section(page: Command) -> Iterator[str]:
     """The lines of one command."""
     free = "".join(f" {option.free}" for option in page.others if option.free)
-    yield f"## `antennate {page.name}`"
+    name = command_words(page.name)
+    yield f"## `antennate {name}`"
     yield page.description
-    yield f"```sh\nuv run antennate {page.name}{free} [OPTIONS]\n```"
+    yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
     top = [option for option in page.parameters if len(option.path) == 1]
     lines = [line(option) for option in [*page.others, *top]]
     if lines:
@@ -62,17 +64,23 @@ def line(option: Option) -> str:
     return row(f"`{head}`", f"`{default}`" if default else "", meaning)
 
 
+def is_own(name: str) -> bool:
+    """Whether a command is of this package."""
+    return name == "study merge" or is_ours(name.split()[-1])
+
+
 def index(title: str, named: dict[str, str]) -> str:
     """A table of commands."""
-    rows = (row(f"[`{n}`](#antennate-{n})", what) for n, what in named.items())
+    rows = (row(f"[`{n}`](#antennate-{n.replace(' ', '-')})", what) for n, what in named.items())
     return "\n".join([f"**{title}**\n", heads("command", "what it does"), *rows])
 
 
 def main() -> None:
     """Write the page, or compare it."""
-    named = {n: what for n, what in commands().items() if n in ROBOT_COMMANDS or is_ours(n)}
-    studies = {n: what for n, what in named.items() if n not in ROBOT_COMMANDS}
-    parts = [HEAD, index("Experiments", studies), index("Robot, twin, logs", ROBOT_COMMANDS)]
+    others = ROBOT_COMMANDS | LOG_COMMANDS
+    studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
+    named = studies | others
+    parts = [HEAD, index("Simulation and study", studies), index("Robot, twin, logs", others)]
     parts += [part for name in named for part in section(command(name))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 

@@ -48,7 +48,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         path, out = Path(folder) / "drive.mcap", Path(folder) / "replayed"
         log(path)
-        status = antennate(["replay", str(path), "--controller", "paper", "--out", str(out)])
+        status = antennate(["log", "replay", str(path), "--controller", "paper", "--out", str(out)])
         shutil.copyfile(out / "figures" / PICTURE.name, PICTURE)
     return status
 

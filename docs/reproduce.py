@@ -16,7 +16,7 @@ from typing import Any
 from generated import finish, heads, row
 
 from antennate import experiments
-from antennate.experiments.reproduce.run import (
+from antennate.experiments.reproduce.experiment import (
     CLAIMS,
     FULL,
     ReproduceConfig,

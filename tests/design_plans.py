@@ -39,7 +39,7 @@ def plan(
 
 
 def words(*more: str, out: str = "run") -> list[str]:
-    return ["design", "plan.toml", "--trust-code", "--no-figures", "--out", out, *more]
+    return ["study", "design", "plan.toml", "--trust-code", "--no-figures", "--out", out, *more]
 
 
 def design(out: str = "run", workers: int = 1, figures: bool = False) -> antennate.Result:

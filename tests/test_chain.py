@@ -24,6 +24,7 @@ from antennate.experiments.running import require_films
 from antennate.experiments.sweep import physics as scan
 from antennate.experiments.wall.experiment import run
 from antennate.experiments.wall.physics import WallConfig, passage
+from antennate.messages import command_words
 from antennate.params.scene import BenchPhysicsParams
 from antennate.params.sweep import SweepParams
 from antennate.robots.antenna import AntennaSpec
@@ -292,7 +293,7 @@ def test_without_numba_one_line_says_how_to_get_it(
     _speechless(monkeypatch, "numba", None)
     for command in ("wall", "calibrate", "sweep"):
         out = tmp_path / command
-        assert main([command, "--solver", "chain", "--out", str(out)]) == 2
+        assert main([*command_words(command).split(), "--solver", "chain", "--out", str(out)]) == 2
         said = capsys.readouterr().err.strip()
         assert "pip install './antennate[fast]'" in said
         assert "\n" not in said
@@ -315,7 +316,17 @@ def test_a_disk_without_room_for_what_is_compiled_and_a_damaged_file_are_named(
     tmp_path: Path,
 ) -> None:
     kept = tmp_path / "kept"
-    words = [sys.executable, "-m", "antennate", "wall", "--solver", "chain", "--trials", "1"]
+    words = [
+        sys.executable,
+        "-m",
+        "antennate",
+        "bench",
+        "wall",
+        "--solver",
+        "chain",
+        "--trials",
+        "1",
+    ]
     there = {**os.environ, "NUMBA_CACHE_DIR": str(kept), "PYTHONDONTWRITEBYTECODE": "1"}
 
     def refused(begin: str = "") -> str:
@@ -346,7 +357,9 @@ def test_what_the_chain_does_not_read_or_draw_is_refused() -> None:
 
 
 def test_the_chain_has_no_view(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert main(["wall", "--solver", "chain", "--view", "--out", str(tmp_path / "run")]) == 2
+    assert (
+        main(["bench", "wall", "--solver", "chain", "--view", "--out", str(tmp_path / "run")]) == 2
+    )
     assert "expected mujoco beside --view" in capsys.readouterr().err
 
 

@@ -66,8 +66,33 @@ def test_version_and_help(capsys):
     assert capsys.readouterr().out == f"antennate {antennate.__version__}\n"
     assert main(["--help"]) == 0
     shown = capsys.readouterr().out
-    assert "tunnel" in shown
     assert max(map(len, shown.splitlines())) <= 80
+    first, *sections = (part.splitlines() for part in shown.split("\n\n")[2:-1])
+    assert [line.split()[0] for line in first[1:]] == [
+        "tunnel",
+        "calibrate",
+        "study",
+        "twin",
+        "drive",
+    ]
+    listed = [line.split()[0] for lines in sections for line in lines[1:] if line[2] != " "]
+    assert len(listed) == 17
+    assert set(listed) >= {name.split()[0] for name in commands()}
+
+
+def test_a_group_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--help"]) == 0
+    page = capsys.readouterr().out
+    assert [line.split()[1] for line in page.split("\n\n")[2].splitlines()] == [
+        *("wall", "touch", "sweep", "force")
+    ]
+    assert main(["bench"]) == 2
+    assert capsys.readouterr() == (
+        page,
+        "antennate bench: error: expected a command, found none\n",
+    )
+    assert main(["setup", "--help"]) == 0
+    assert "`antennate setup zero`, `antennate setup jog`" in capsys.readouterr().out
 
 
 def test_python_runs_the_package_as_the_command():
@@ -78,16 +103,16 @@ def test_python_runs_the_package_as_the_command():
 
 @pytest.mark.parametrize("command", sorted(commands()))
 def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
-    assert main([command, "--help"]) == 0
+    assert main([*command.split(), "--help"]) == 0
     short = capsys.readouterr().out.splitlines()
     assert len(short) <= 2 * 24
     assert max(map(len, short)) <= 80
-    assert main([command, "--help-all"]) == 0
+    assert main([*command.split(), "--help-all"]) == 0
     whole = capsys.readouterr().out
     assert max(map(len, whole.splitlines())) <= 80
     flags = set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", "\n".join(short), re.MULTILINE))
     assert ("--config" in flags) == (
-        command not in ("report", "merge", "study", "design", "view")
+        command not in ("report", "study merge", "study", "study design", "log view")
     ), "these have no parameters, or take the file without a flag"
     assert flags <= set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", whole, re.MULTILINE))
 
@@ -97,13 +122,13 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
         ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm"),
-        ("wall", "--trials --seed --profiles --solver --out"),
+        ("bench wall", "--trials --seed --profiles --solver --out"),
     ],
 )
 def test_the_short_help_shows_what_the_command_is_about(capsys, monkeypatch, command, flags):
     """Also on a narrow terminal, where there is no room for everything."""
     monkeypatch.setenv("COLUMNS", "80")
-    assert main([command, "--help"]) == 0
+    assert main([*command.split(), "--help"]) == 0
     found = re.findall(r"^  (--[a-z0-9-]+)", capsys.readouterr().out, re.MULTILINE)
     assert set(flags.split()) <= set(found)
 
@@ -149,17 +174,17 @@ _REFUSED = [
     (["nonsense"], ("numpy", "antennate.params.control", *_REAL)),
     (["drive", "--nonsense"], _REAL),
     (["drive", "--esp32=/nowhere", "--bus=/nowhere2", "--robot=nobody"], _REAL),
-    (["teleop", "--config=/nowhere.toml"], _REAL),
+    (["drive", "teleop", "--config=/nowhere.toml"], _REAL),
     (["doctor", "--doctor.silence=x"], _REAL),
-    (["jog", "--joint=nobody", "--bus=/nowhere"], _REAL),
-    (["zero", "--config=/nowhere.toml"], _REAL),
+    (["setup", "jog", "--joint=nobody", "--bus=/nowhere"], _REAL),
+    (["setup", "zero", "--config=/nowhere.toml"], _REAL),
     (["setup", "--nonsense"], _REAL),
     (["record", "--marks", "x"], _REAL),
-    (["replay", "/nowhere"], _REAL),
+    (["log", "replay", "/nowhere"], _REAL),
     (["log", "info", "/nowhere"], _REAL),
     (["twin", "--servos=1:nothing"], _SIMULATED),
     (["tunnel", "--trials=x"], _SIMULATED),
-    (["touch", "--nonsense"], _SIMULATED[:3]),
+    (["bench", "touch", "--nonsense"], _SIMULATED[:3]),
 ]
 """Words, and what neither they nor those above them need."""
 
@@ -192,7 +217,7 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
             ["did you mean --tunnel.free-width or --corridors.free-width?"],
         ),
         (["tunnel", "--arms", "open"], ["did you mean --controllers?", "found '--arms'"]),
-        (["wall", "--arms", "stiff"], ["did you mean --profiles?", "found '--arms'"]),
+        (["bench", "wall", "--arms", "stiff"], ["did you mean --profiles?", "found '--arms'"]),
         (["tunnel", "--bogus"], ["expected a known flag, found '--bogus'"]),
         (["tunnel", "--json", "yes"], ["expected flags only, found 'yes'"]),
         (["tunnel", "--out", ""], ["--out: expected a path, found nothing"]),
@@ -202,6 +227,12 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         (["tunnel", "--seed", ""], ["--seed: expected a whole number, found ''"]),
         (["tunnel", "--robot", ""], ["--robot: expected ", "found nothing"]),
         ([""], ["expected a command", "found ''"]),
+        (["wall", "--trials", "5"], ["antennate: error: wall is `antennate bench wall` now"]),
+        (["zero"], ["antennate: error: zero is `antennate setup zero` now"]),
+        (
+            ["bench", "wal"],
+            ["antennate bench: error: expected a command (did you mean wall?), one"],
+        ),
         (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
         (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
         (
@@ -240,12 +271,12 @@ def test_bad_words(capsys, tmp_path, argv, parts):
 
 @pytest.mark.parametrize("flag", ["--log", "--video", "--view"])
 def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
-    line = refusal(capsys, "springs", flag)
+    line = refusal(capsys, "antenna", "springs", flag)
     assert f"expected a flag of this command, found {flag}; " in line
     told = line.partition(f"{flag}; ")[2].partition(" take it;")[0]
     having = set()
     for name in commands():
-        assert main([name, "--help-all"]) == 0
+        assert main([*name.split(), "--help-all"]) == 0
         having |= (
             {name} if re.search(rf"^  {flag}\b(?!-)", capsys.readouterr().out, re.M) else set()
         )
@@ -339,7 +370,16 @@ def test_bad_folders(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words", [("springs",), ("tracks", "--no-figures"), ("study", "a.toml"), ("doctor",)]
+    "words",
+    [
+        (
+            "antenna",
+            "springs",
+        ),
+        ("tracks", "--no-figures"),
+        ("study", "a.toml"),
+        ("doctor",),
+    ],
 )
 def test_a_path_that_is_too_long_is_one_line(capsys, tmp_path, words):
     """A name has at most 255 bytes (POSIX NAME_MAX of Linux)."""
@@ -350,7 +390,7 @@ def test_a_path_that_is_too_long_is_one_line(capsys, tmp_path, words):
 @pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])
 def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(capsys, tmp_path, words):
     """The shell's `$'bad\\xff'` comes as a lone surrogate (PEP 383), which UTF-8 cannot write."""
-    line = refusal(capsys, "springs", *words)
+    line = refusal(capsys, "antenna", "springs", *words)
     assert "--out: expected text in UTF-8, found " in line
     assert not list(tmp_path.iterdir())
 
@@ -480,7 +520,7 @@ def test_flags_override_the_file_and_the_run_says_so(capsys, tmp_path):
 
 
 def test_overwrite_leaves_nothing_old(capsys, tmp_path):
-    assert main(["springs", "--out", "run"]) == 0
+    assert main(["antenna", "springs", "--out", "run"]) == 0
     assert list((tmp_path / "run" / "figures").iterdir())
     (tmp_path / "run" / "notes.txt").write_text("mine")
     assert main([*QUICK, "--seed", "1", "--out", "run", "--overwrite"]) == 0
@@ -637,12 +677,12 @@ def test_hints_are_typed_as_the_program_was_called(
     uv: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("UV", uv)
-    assert main(["zero"]) == 2
+    assert main(["setup", "zero"]) == 2
     assert f"found none; `{said} setup` finds it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    "words", [["drive"], ["teleop"], ["record", "--marks", "0", "1"], ["doctor"]]
+    "words", [["drive"], ["drive", "teleop"], ["record", "--marks", "0", "1"], ["doctor"]]
 )
 def test_a_robot_file_in_this_folder_is_read_where_no_port_is_named(
     words: list[str],

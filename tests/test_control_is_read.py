@@ -79,7 +79,7 @@ REFUSED = [
     ("drive --control.rule.hold-time 3", ", but closed does not read it"),
     ("drive --controller open --control.escape.turn-time 3", ", but open does not read it"),
     ("drive --control.gait in_phase", ROLL),
-    ("teleop --control.gait.lift.share 0.4", ROLL),
+    ("drive teleop --control.gait.lift.share 0.4", ROLL),
     ("tunnel --robot.legs.reach 0.05", "only legs of the kind lifting have it"),
     ("drive --robot.legs.limit 1.2", "but only legs of the kind lifting have it"),
     (
@@ -119,7 +119,7 @@ WHERE = [
     ("tunnel --config tunnel.toml", "tunnel.toml: control.gait.turn_offset: "),
     ("study settings.toml", "settings: tunnel: control.gait.turn_offset: "),
     ("study vary.toml", "vary: tunnel: control.gait.turn_offset: "),
-    ("design design.toml", "evaluate.tunnel.settings: tunnel: control.gait.turn_offset: "),
+    ("study design design.toml", "evaluate.tunnel.settings: tunnel: control.gait.turn_offset: "),
 ]
 
 

@@ -82,7 +82,7 @@ def test_each_is_refused_alone(
     monkeypatch.chdir(tmp_path)
     value = {"TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(option.metavar, option.default)
     words = [option.offered, *([value] if option.metavar else [])]
-    assert main([name, *words]) == 2
+    assert main([*name.split(), *words]) == 2
     out, err = capsys.readouterr()
     needed = " or ".join(option.needs)
     assert out == ""

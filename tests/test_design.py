@@ -74,7 +74,10 @@ def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]
     import optuna
 
     quiet = optuna.logging.get_verbosity()
-    assert main(["design", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"]) == 0
+    assert (
+        main(["study", "design", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"])
+        == 0
+    )
     out, err = capsys.readouterr()
     assert "optuna" not in (out + err).lower()
     assert all(line.startswith(("trials: ", "written to ")) for line in err.splitlines())

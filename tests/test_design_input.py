@@ -102,5 +102,5 @@ def test_bad_searches_are_one_line(
     for key in ("antenna.friction", "antenna.frction", "wall.overlap", "wall.gravity"):
         quoted = quoted.replace(f"\n{key} =", f'\n"{key}" =')
     Path("bad.toml").write_text(quoted)
-    assert expected in refusal(capsys, "design", "bad.toml")
+    assert expected in refusal(capsys, "study", "design", "bad.toml")
     assert not Path("runs").exists()

@@ -154,7 +154,7 @@ def test_unknown_measures_are_one_line(
     goals: str, expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan(goals)
-    assert main(["design", "plan.toml", "--trust-code", "--workers", "1"]) == 2
+    assert main(["study", "design", "plan.toml", "--trust-code", "--workers", "1"]) == 2
     said = capsys.readouterr().err.strip().splitlines()
     assert "Traceback" not in "".join(said)
     assert expected in said[-1]
@@ -166,7 +166,7 @@ def test_successes_of_an_experiment_without_outcomes_are_refused(
     Path("plan.toml").write_text(
         '[search]\ncoil_mm = [3.0, 4.0]\n[evaluate.springs]\nminimize = ["spring_index@success"]\n'
     )
-    assert main(["design", "plan.toml", "--workers", "1"]) == 2
+    assert main(["study", "design", "plan.toml", "--workers", "1"]) == 2
     assert "found spring_index@success" in capsys.readouterr().err
 
 

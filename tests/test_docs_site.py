@@ -105,8 +105,8 @@ def test_every_page_has_its_place_in_the_navigation_by_its_own_name() -> None:
 
 def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
     begin, *sections = (DOCS / "commands.md").read_text().split("\n## ")
-    linked = re.findall(r"\[`(\w+)`\]\(#antennate-(\w+)\)", begin)
-    assert [name for name, _ in linked] == [anchor for _, anchor in linked]
+    linked = re.findall(r"\[`([\w ]+)`\]\(#antennate-([\w-]+)\)", begin)
+    assert [name.replace(" ", "-") for name, _ in linked] == [anchor for _, anchor in linked]
     assert {name for name, _ in linked} == set(commands())
     assert [f"`antennate {name}`" for name, _ in linked] == [s.splitlines()[0] for s in sections]
     assert "(commands.md)" in (DOCS / "index.md").read_text()

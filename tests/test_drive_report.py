@@ -336,7 +336,7 @@ def test_a_drive_without_a_log_says_so(
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     out = " ".join(capsys.readouterr().out.split())
     assert "No log was kept" in out
-    assert "antennate replay" not in out
+    assert "antennate log replay" not in out
     result = json.loads((tmp_path / "result.json").read_text())
     assert (result["logs"], result["log_complete"]) == ([], False)
     assert result["unlogged"] == result["pace"]["ticks"] > 0

@@ -80,7 +80,9 @@ def test_an_engine_that_is_another_one_or_broken_is_refused(
     assert found in refusal(tmp_path, *TUNNEL)
 
 
-@pytest.mark.parametrize("words", [["tunnel", "--help"], ["twin", "--help-all"], ["view", "-h"]])
+@pytest.mark.parametrize(
+    "words", [["tunnel", "--help"], ["twin", "--help-all"], ["log", "view", "-h"]]
+)
 def test_help_is_printed_beside_two_versions_or_an_old_one(
     tmp_path: Path, words: list[str]
 ) -> None:

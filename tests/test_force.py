@@ -182,7 +182,7 @@ def test_command_on_two_workers_writes_the_run_of_one(capsys, tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     small = SMALL.model_copy(update={"loads": 4, "speeds": (0.5,)})
     Path("small.toml").write_text(to_toml(small))
-    words = ["force", "--config", "small.toml"]
+    words = ["bench", "force", "--config", "small.toml"]
     assert main([*words, "--workers", "2", "--out", "run"]) == 0
     assert "Share of the force" in capsys.readouterr().out
     result = json.loads((tmp_path / "run" / "result.json").read_text())

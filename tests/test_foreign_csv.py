@@ -103,7 +103,7 @@ def test_diameters_are_told_the_same(
 ) -> None:
     file = tmp_path / "theirs.csv"
     file.write_bytes(content)
-    assert main(["taper", "--diameters", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert main(["antenna", "taper", "--diameters", str(file), "--out", str(tmp_path / "out")]) == 2
     assert f"error: {file}: {why}" in capsys.readouterr().err
 
 

@@ -296,7 +296,7 @@ def test_a_log_of_antennate_without_a_crc_is_damaged_whatever_follows_it(log: Pa
 
 @pytest.mark.parametrize(
     ("odd", "words"),
-    [("type", ["log", "info"]), ("encoding", ["log", "info"]), ("controller", ["replay"])],
+    [("type", ["log", "info"]), ("encoding", ["log", "info"]), ("controller", ["log", "replay"])],
 )
 def test_a_very_long_name_is_quoted_in_short(
     odd: str, words: list[str], log: Path, capsys: pytest.CaptureFixture[str]

@@ -202,7 +202,10 @@ def test_a_gait_that_is_named_replaces_that_of_the_file(tmp_path: Path) -> None:
 BAD = [
     (["tunnel"], "expected a robot with antennae for this controller, found one without"),
     (["drive", "--esp32", "/dev/null", "--bus", "/dev/zero"], "antennae for drive, found one"),
-    (["teleop", "--esp32", "/dev/null", "--bus", "/dev/zero"], "antennae for teleop, found one"),
+    (
+        ["drive", "teleop", "--esp32", "/dev/null", "--bus", "/dev/zero"],
+        "antennae for teleop, found one",
+    ),
     (["twin"], "expected a robot with antennae for the twin, found one without"),
     (["gait", "--gait", "b12bl0"], "(did you mean b11bl0?), found 'b12bl0'"),
     (["gait", "--gait", ""], "expected serpenoid, b11bl0, in_phase or a TOML file"),

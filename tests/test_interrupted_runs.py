@@ -17,6 +17,7 @@ import pytest
 
 from antennate.cli import main
 from antennate.errors import OutputError
+from antennate.messages import command_words
 from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
 from antennate.telemetry.reader import LogReader
@@ -232,11 +233,13 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     )
     if name == "design":
         pytest.importorskip("optuna")
-    assert main(["springs", "--out", str(run)]) == 0
+    assert main(["antenna", "springs", "--out", str(run)]) == 0
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     capsys.readouterr()
     file = [str(plan)] if name == "design" else []
-    assert main([name, *file, "--out", str(run), "--overwrite", *words]) == 2
+    assert (
+        main([*command_words(name).split(), *file, "--out", str(run), "--overwrite", *words]) == 2
+    )
     assert f"expected a known flag, found '{words[0]}'" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
@@ -265,7 +268,7 @@ def test_help_lists_no_option_that_is_always_refused(
     name: str, missing: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A search does not know its trials beforehand, so no shards can divide them."""
-    assert main([name, "--help-all"]) == 0
+    assert main([*command_words(name).split(), "--help-all"]) == 0
     listed = set(re.findall(r"^  --([a-z-]+)", capsys.readouterr().out, re.MULTILINE))
     assert OF_WORKERS - listed == missing
 
@@ -275,7 +278,7 @@ def test_walls_of_which_none_is_valid_end_with_2(
     workers: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One worker gives a trial up too, in a process of its own."""
-    words = ["wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
+    words = ["bench", "wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
     more = ["--workers", workers, "--no-figures", "--out", str(tmp_path / "run")]
     assert main([*words, *more]) == 2
     assert "no result within 0.01 s" in (tmp_path / "run" / "trials.csv").read_text()

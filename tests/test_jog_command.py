@@ -28,7 +28,7 @@ class HostTime:
 
 
 class Typist:
-    """`antennate jog` before yaw1, with keys from a function."""
+    """`antennate setup jog` before yaw1, with keys from a function."""
 
     def __init__(self, patch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self.box = Ready().box
@@ -45,7 +45,7 @@ class Typist:
             return typed()
 
         self._patch.setattr(jog, "typed_keys", lambda: contextlib.nullcontext(keys))
-        code = main(["jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud)])
+        code = main(["setup", "jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud)])
         return code, self._capsys.readouterr().err.strip().splitlines()
 
 
@@ -66,7 +66,9 @@ def test_a_servo_in_pwm_mode_is_refused_without_torque(typist: Typist) -> None:
     code, lines = typist.ran(lambda: [next(keys)])
     assert code == 2
     assert lines[0] == "yaw1: torque is off, verified"
-    assert lines[1].startswith("antennate jog: error: expected operating mode 3 of yaw1 (id 1, ")
+    assert lines[1].startswith(
+        "antennate setup jog: error: expected operating mode 3 of yaw1 (id 1, "
+    )
     assert len(lines) == 2
 
 
@@ -97,7 +99,7 @@ def test_a_bus_that_is_gone_is_no_torque_that_is_off(
     assert code == 2
     assert lines[-2:] == [
         "torque is NOT confirmed off: servos [1]; switch their supply off",
-        "antennate jog: error: the bus is gone",
+        "antennate setup jog: error: the bus is gone",
     ]
 
 

@@ -334,10 +334,10 @@ def test_a_route_that_is_no_line_is_refused(route: Any) -> None:
     [
         "drive --knows side",
         "drive --controller map",
-        "teleop --knows map",
+        "drive teleop --knows map",
         "twin --knows jam",
-        "replay --knows side log.mcap",
-        "replay --controller map log.mcap",
+        "log replay --knows side log.mcap",
+        "log replay --controller map log.mcap",
         "tunnel --knows sight",
         "tunnel --knows side side --controllers closed",
         "tunnel --knows side --controllers open closed",

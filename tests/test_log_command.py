@@ -456,7 +456,7 @@ def test_G7_logs_of_trials_are_replayed_to_the_bit(
     assert [p.name for p in logs] == [f"{c}-{n}.mcap" for c in ("closed", "paper") for n in (0, 1)]
     for path in logs:
         capsys.readouterr()
-        assert main(["replay", str(path), "--json"]) == 0
+        assert main(["log", "replay", str(path), "--json"]) == 0
         found = json.loads(capsys.readouterr().out)
         assert (found["different"], found["different_commands"], found["closed"]) == (0, 0, True)
         assert found["ticks"] >= 300

@@ -12,6 +12,7 @@ from log_ticks import HEADER, tick
 from antennate import run
 from antennate.cli import main
 from antennate.errors import OutputError
+from antennate.messages import command_words
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.writer import LogWriter
 
@@ -55,8 +56,8 @@ def test_recover_never_writes_over_a_part_of_the_log_nor_makes_one(
 @pytest.mark.parametrize(
     "words",
     [
-        ["replay", "run"],
-        ["replay", "run/logs/a.mcap"],
+        ["log", "replay", "run"],
+        ["log", "replay", "run/logs/a.mcap"],
         ["servo", "--recording", "run/drive.mcap"],
         ["calibrate", "--recording", "elsewhere/../run/recording.csv"],
     ],
@@ -102,7 +103,11 @@ def test_no_run_replaces_the_file_that_configures_it(
     text = {"springs": "coil_mm = 3.0", "study": 'experiment = "springs"\nvary.coil_mm = [3.0]'}
     file = Path("config.toml")
     file.write_text(f"# why it is so\n{text[command]}\n")
-    words = [command, *(["--config"] if command == "springs" else []), "config.toml"]
+    words = [
+        *command_words(command).split(),
+        *(["--config"] if command == "springs" else []),
+        "config.toml",
+    ]
     for more in ([], ["--overwrite"]):
         assert main([*words, "--no-figures", "--out", ".", *more]) == 2
         (line,) = capsys.readouterr().err.splitlines()

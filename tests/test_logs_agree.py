@@ -149,7 +149,7 @@ def write(source: Path, target: Path, way: Anew) -> None:
 def told(path: Path) -> tuple[list[Any], list[int], list[str]]:
     """What `info`, `export`, `replay` and the reader say, exit codes, and what is on stderr."""
     found, codes, errors = list[Any](), list[int](), list[str]()
-    for words in (["log", "info", "--json"], ["replay", "--json"], ["log", "export"]):
+    for words in (["log", "info", "--json"], ["log", "replay", "--json"], ["log", "export"]):
         with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as wrong:
             codes.append(main([*words, str(path)]))
         errors.append(wrong.getvalue())

@@ -26,7 +26,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["replay"],
+        ["log", "replay"],
         ["calibrate", "--recording"],
         ["tunnel", "--config"],
         ["tunnel", "--robot"],
@@ -53,7 +53,7 @@ def test_what_is_no_regular_file_is_refused_at_once(
     assert error.count("\n") == 1
     assert device in error
     of_folder = "expected a run with a log, found none; --log keeps those of a simulation\n"
-    known = (words, device) == (["replay"], ".")  # the folder of a run stands for its log
+    known = (words, device) == (["log", "replay"], ".")  # the folder of a run stands for its log
     assert error.endswith(of_folder if known else ": it is a folder, a pipe or a device\n")
     assert not Path("runs").exists()
 

@@ -23,7 +23,7 @@ from antennate.messages import extra
 from antennate.studies.measures import Table
 
 ROOT = Path(__file__).parents[1]
-RUN = [sys.executable, "-m", "antennate", "springs", "--out", "run"]
+RUN = [sys.executable, "-m", "antennate", "antenna", "springs", "--out", "run"]
 NO_FIGURES = ["--no-figures"]  # they take most of the time
 SHELL = ["bash", "-c"]
 
@@ -31,7 +31,7 @@ SHELL = ["bash", "-c"]
 def run(
     redirection: str, folder: Path, more: Sequence[str] = NO_FIGURES
 ) -> subprocess.CompletedProcess[str]:
-    """`antennate springs` with its streams redirected by a shell."""
+    """`antennate antenna springs` with its streams redirected by a shell."""
     words = [*SHELL, f'"$@" {redirection}', "bash", *RUN, *more]
     return subprocess.run(
         words, cwd=folder, capture_output=True, text=True, timeout=120, check=False
@@ -56,7 +56,7 @@ def test_an_output_that_cannot_be_written_costs_no_result(
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         "written to run",
-        f"antennate springs: error: standard output: expected to write, found: {reason}",
+        f"antennate antenna springs: error: standard output: expected to write, found: {reason}",
     ]
     assert is_whole(tmp_path)
 
@@ -137,7 +137,7 @@ def test_a_width_that_is_none_counts_as_not_given(
     tmp_path: Path,
 ) -> None:
     def printed() -> str:
-        words = ["springs", "--no-figures", "--out", str(tmp_path), "--overwrite"]
+        words = ["antenna", "springs", "--no-figures", "--out", str(tmp_path), "--overwrite"]
         assert main(words) == 0
         return capsys.readouterr().out
 

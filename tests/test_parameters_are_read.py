@@ -20,7 +20,8 @@ from antennate.cli import main
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
-from antennate.experiments.reproduce import run as reproduce
+from antennate.experiments.reproduce import experiment as reproduce
+from antennate.messages import command_words
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
@@ -257,9 +258,9 @@ def test_the_walk_sees_what_is_not_read() -> None:
 def test_a_flag_that_is_not_read_is_refused(
     name: str, flag: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([name, flag, *([value] if value else [])]) == 2
+    assert main([*command_words(name).split(), flag, *([value] if value else [])]) == 2
     err = capsys.readouterr().err
-    assert f"expected a parameter that {name} reads, found this one" in err
+    assert f"expected a parameter that {command_words(name)} reads, found this one" in err
     assert err.count("\n") == 1
 
 

@@ -18,6 +18,7 @@ from antennate.cli import BAD_INPUT, main
 from antennate.hardware.ports.errors import explain
 from antennate.hardware.ports.holder import holders
 from antennate.hardware.ports.serial_port import SerialPort
+from antennate.messages import command_words
 
 VISER = find_spec("viser") is not None
 
@@ -96,7 +97,7 @@ def test_every_command_says_it_and_ends_with_2(
     both = ["--esp32", path, "--bus", "/dev/another"]
     ports = both if command == "drive" else ["--bus", path]
     ports += ["--joint", "yaw1"] if command == "jog" else []
-    assert main([command, *ports]) == BAD_INPUT
+    assert main([*command_words(command).split(), *ports]) == BAD_INPUT
     told = capsys.readouterr()
     assert said in told.out + told.err
     assert "[Enter" not in told.out + told.err

@@ -107,15 +107,15 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
         assert np.array_equal(given, np.resize(own[(trial + 1) % 3], given.shape))
         with LogReader(path) as log:
             assert (log.header.controller, log.header.readings) == ("closed", "yoked")
-        assert main(["replay", str(path)]) == 0
+        assert main(["log", "replay", str(path)]) == 0
         assert "decided as recorded in all" in capsys.readouterr().out
     log, other = "one/logs/closed-0.mcap", "one/logs/closed-1.mcap"
-    words = ["replay", log, "--readings", "yoked", "--donor", other]
+    words = ["log", "replay", log, "--readings", "yoked", "--donor", other]
     assert main([*words, "--out", "again"]) == 0
     assert json.loads(Path("again/result.json").read_text())["controller"] == "closed@yoked"
     capsys.readouterr()
     shutil.copy(log, "mine.mcap")
-    mine = ["replay", "mine.mcap", *words[2:], "--out", "one", "--overwrite"]
+    mine = ["log", "replay", "mine.mcap", *words[2:], "--out", "one", "--overwrite"]
     assert main(mine) == 2
     assert f"expected another folder than that of {other}, found one" in capsys.readouterr().err
     lent = {log: "expected a log of another trial or drive, found the same"}
@@ -179,7 +179,7 @@ def test_a_replay_needs_another_log_for_yoked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = str(tmp_path / "none.mcap")
-    assert main(["replay", log, "--readings", "yoked"]) == 2
+    assert main(["log", "replay", log, "--readings", "yoked"]) == 2
     assert "expected --donor" in capsys.readouterr().err
-    assert main(["replay", log, "--donor", log]) == 2
+    assert main(["log", "replay", log, "--donor", log]) == 2
     assert "expected --readings yoked beside it" in capsys.readouterr().err

@@ -20,7 +20,17 @@ from antennate.cli import main
 from antennate.errors import ConfigError, OutputError, WorkerError
 from antennate.studies.run_directory import RunDirectory
 
-WALL = ["wall", "--trials", "2", "--profiles", "descending", "--workers", "1", "--no-figures"]
+WALL = [
+    "bench",
+    "wall",
+    "--trials",
+    "2",
+    "--profiles",
+    "descending",
+    "--workers",
+    "1",
+    "--no-figures",
+]
 SLOW = """
 import os, time
 def trial(config, seed):
@@ -116,7 +126,7 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("name", ["run", "run/", "./run", "sub/../run"])
 def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(name: str, tmp_path: Path) -> None:
     Path("sub").mkdir()
-    for words in (["springs", "--no-figures"], ["robot"], WALL):
+    for words in (["antenna", "springs", "--no-figures"], ["robot"], WALL):
         before = contents("run")
         assert main([*words, "--out", name, "--overwrite"]) == 0
         assert contents("run.old") == before
@@ -195,14 +205,14 @@ def watch(name, arguments):
             if left == 0:
                 os.kill(os.getpid(), signal.SIGKILL)
 sys.addaudithook(watch)
-sys.exit(main(["springs", "--no-figures", "--out", "run", "--overwrite"]))
+sys.exit(main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]))
 """
 
 
 @pytest.mark.parametrize("first", [1, 2, 3])
 def test_killed_at_any_change_of_a_file_the_old_run_is_whole(first: int) -> None:
     """Under one of both names; and the same command ends, whatever the killed one left."""
-    assert main(["springs", "--out", "older"]) == 0
+    assert main(["antenna", "springs", "--out", "older"]) == 0
     shutil.copytree("run", "old")
     before, seen = contents("old"), set[str]()
     for kill in range(first, 75, 9):
@@ -214,7 +224,7 @@ def test_killed_at_any_change_of_a_file_the_old_run_is_whole(first: int) -> None
         assert done.returncode in (0, -signal.SIGKILL), done.stderr
         (whole,) = (name for name in ("run", "run.old") if contents(name) == before)
         seen.add(whole)
-        assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+        assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
         assert RunDirectory.open("run").result()
         assert not [path for path in Path("run").iterdir() if path.name.startswith(".")]
     assert seen == {"run", "run.old"}
@@ -227,7 +237,7 @@ def test_a_file_system_without_room_costs_no_old_run() -> None:
 import resource, sys
 from antennate.cli import main
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-sys.exit(main(["springs", "--out", "run", "--overwrite"]))
+sys.exit(main(["antenna", "springs", "--out", "run", "--overwrite"]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
@@ -241,7 +251,7 @@ def test_a_parent_that_cannot_be_written_is_refused(capsys: pytest.CaptureFixtur
     shutil.copytree("run", "run.old")
     before = files(".")
     Path().chmod(0o555)
-    code = main(["springs", "--out", "run", "--overwrite"])
+    code = main(["antenna", "springs", "--out", "run", "--overwrite"])
     Path().chmod(0o755)
     assert code == 2
     assert capsys.readouterr().err.endswith("run, found: Permission denied\n")
@@ -255,7 +265,7 @@ def test_the_working_directory_is_not_renamed(
     Path("run/sub").mkdir()
     monkeypatch.chdir("run/sub" if place == ".." else "run")
     before = files(".")
-    assert main(["springs", "--out", place, "--overwrite"]) == 2
+    assert main(["antenna", "springs", "--out", place, "--overwrite"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"{place}: expected a folder to rename, found the working directory" in line
     assert files(".") == before
@@ -268,7 +278,7 @@ def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
     listed(Path("run"), "figures/a.svg")
     for name in [*ours, *theirs]:
         Path("run", name).write_text("half of a file")
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
     assert [name for name in [*ours, *theirs] if Path("run.old", name).exists()] == theirs
 
 
@@ -296,7 +306,7 @@ def test_what_is_read_is_not_renamed_or_removed(
         f'experiment = "{place}/code.py:trial"\nplan = "grid"\n[vary]\nx = [0.5]\n'
     )
     before = files(".")
-    for words in (["springs", "--config", f"{place}/mine.toml"], ["study", "plan.toml"]):
+    for words in (["antenna", "springs", "--config", f"{place}/mine.toml"], ["study", "plan.toml"]):
         more = ["--trust-code"] if words[0] == "study" else []
         assert main([*words, *more, "--out", "run", "--overwrite"]) == 2
         (line,) = capsys.readouterr().err.splitlines()
@@ -330,7 +340,7 @@ def test_overwrite_takes_a_run_of_ours_alone(
         shutil.copy(f"run/{name}", f"forged/{name}")
     for place in ("theirs", "link", "forged"):
         before = files(place)
-        for words in (["springs"], WALL, ["replay", "no.mcap"], ["robot"]):
+        for words in (["antenna", "springs"], WALL, ["log", "replay", "no.mcap"], ["robot"]):
             assert main([*words, "--out", place, "--overwrite"]) == 2
             (line,) = capsys.readouterr().err.splitlines()
             if words[0] != "replay":
@@ -347,7 +357,7 @@ def test_overwrite_takes_a_run_of_ours_alone(
 def test_a_link_to_a_run_is_not_renamed(capsys: pytest.CaptureFixture[str]) -> None:
     Path("link").symlink_to("run")
     before = files(".")
-    assert main(["springs", "--out", "link", "--overwrite"]) == 2
+    assert main(["antenna", "springs", "--out", "link", "--overwrite"]) == 2
     assert "expected a folder to rename, found a link" in capsys.readouterr().err
     assert files(".") == before
 
@@ -380,7 +390,7 @@ def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
         Path("run", name).parent.mkdir(exist_ok=True)
         Path("run", name).write_text("mine")
     before = contents("run")
-    words = ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    words = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
     assert main(words) == 0
     assert contents("run.old") == before
     assert Path("run.old", name).exists()
@@ -399,7 +409,10 @@ def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
 def test_a_name_old_that_is_no_old_run_is_refused(
     kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    old, words = Path("run.old"), ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    old, words = (
+        Path("run.old"),
+        ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"],
+    )
     with contextlib.ExitStack() as live:
         if kind == "file":
             old.write_text("mine")
@@ -425,7 +438,7 @@ def test_beside_a_run_only_begun_a_name_old_is_looked_at_too(there: str) -> None
     Path("run.old").mkdir()
     Path("run.old", there).write_text("mine")
     before = files("run.old")
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
+    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
     assert files("run.old") == before
 
 
@@ -437,7 +450,7 @@ def test_what_a_killed_run_has_measured_is_not_lost() -> None:
             path.unlink()
     before = files("run")
     assert any(path.suffix == ".mcap" for path in before)
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
     assert contents("run.old") == {path.relative_to("run"): data for path, data in before.items()}
 
 
@@ -451,7 +464,7 @@ def test_a_rename_that_fails_costs_neither_run(monkeypatch: pytest.MonkeyPatch) 
         return rename(path, target)
 
     monkeypatch.setattr(Path, "rename", busy)
-    assert main(["springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
+    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
     assert files(".") == before
 
 
@@ -471,7 +484,7 @@ def test_a_list_leads_to_no_file_outside_its_folder() -> None:
     Path("elsewhere/secret.txt").write_text("of somebody")
     Path("run/behind").symlink_to(Path("elsewhere").absolute())
     listed(Path("run"), "../secret.txt", str(Path("secret.txt").absolute()), "behind/secret.txt")
-    words = ["springs", "--no-figures", "--out", "run", "--overwrite"]
+    words = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
     assert main(words) == 0
     assert main(words) == 2  # the link is in the old run
     Path("run.old/behind").unlink()

@@ -1,4 +1,4 @@
-"""`antennate replay`: what it says of a log, what it leaves behind, and when it refuses."""
+"""`antennate log replay`: what it says of a log, what it leaves behind, and when it refuses."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def said(capsys: pytest.CaptureFixture[str], *argv: str) -> dict:
-    assert main(["replay", *argv, "--json"]) == 0
+    assert main(["log", "replay", *argv, "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -81,7 +81,7 @@ def test_G6_all_files_of_a_log_are_replayed_as_one(
     data = bytearray(third.read_bytes())
     data[chunks(data)[-1][1] - 1] ^= 1
     third.write_bytes(data)
-    assert main(["replay", str(first), "--json"]) == 2
+    assert main(["log", "replay", str(first), "--json"]) == 2
     out, err = capsys.readouterr()
     assert (json.loads(out)["missing"], json.loads(out)["damaged"]) == (1, 1)
     assert "of drive-3.mcap" in err
@@ -93,7 +93,7 @@ def test_another_controller_is_compared(log: Path, capsys: pytest.CaptureFixture
     assert result["shares"]["FORWARD"] == 1.0
     assert result["different"] == round(turning * TICKS) > 0
     assert result["first_difference"]["replayed"] == "FORWARD"
-    assert main(["replay", str(log), "--controller", "open"]) == 0
+    assert main(["log", "replay", str(log), "--controller", "open"]) == 0
     out = capsys.readouterr().out
     assert f"first in tick {result['first_difference']['tick']} at " in out
 
@@ -124,7 +124,7 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
     live = session(tmp_path, "closed", 1, blind=130)
     path = recorded(live, tmp_path / "log", 180)
     out = tmp_path / "out"
-    assert main(["replay", str(path), "--out", str(out)]) == 0
+    assert main(["log", "replay", str(path), "--out", str(out)]) == 0
     with (out / "ticks.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 180
@@ -141,7 +141,7 @@ def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFi
     assert {p.name for p in (out / "figures").iterdir()} == {"replay.svg", "replay.png"}
     assert json.loads((out / "result.json").read_text())["states"]["OFF"] > 0.5
     capsys.readouterr()
-    assert main(["replay", str(path), "--out", str(out)]) == 2
+    assert main(["log", "replay", str(path), "--out", str(out)]) == 2
     assert "--overwrite" in capsys.readouterr().err
 
 
@@ -176,7 +176,7 @@ def test_a_controller_that_fails_or_commands_otherwise_is_told_in_the_sentence(
         "        self.count += 1\n"
         f"        return command if self.count <= 10 else {answer}\n"
     )
-    assert main(["replay", str(path), "--controller", f"{own}:Own"]) == code
+    assert main(["log", "replay", str(path), "--controller", f"{own}:Own"]) == code
     assert said in capsys.readouterr().out.replace("\n", " ")
 
 
@@ -190,13 +190,13 @@ def test_G2_a_damaged_log_is_replayed_as_far_as_it_goes(
     data = bytearray(bad.read_bytes())
     data[chunks(data)[TICKS // 2][1] - 1] ^= 4
     bad.write_bytes(data)
-    assert main(["replay", str(bad), "--json"]) == 2
+    assert main(["log", "replay", str(bad), "--json"]) == 2
     out, err = capsys.readouterr()
     result = json.loads(out)
     assert (result["ticks"], result["missing"]) == (TICKS - 1, 1)
     assert f"ticks missing: 1; ticks read: {TICKS - 1}; first at byte " in err
     assert err.count("\n") == 1
-    assert main(["replay", str(bad)]) == 2
+    assert main(["log", "replay", str(bad)]) == 2
     out = capsys.readouterr().out
     assert "the log is damaged." in out
     assert "complete" not in out
@@ -213,7 +213,7 @@ def test_times_and_readings_may_be_anything(
             odd = dataclasses.replace(tick, t=sign, now=sign, counts=(sign, number))
             writer.write(odd)
     for words in (["odd"], ["odd", "--controller", "closed", "--out", "out"]):
-        assert main(["replay", *words]) == 0
+        assert main(["log", "replay", *words]) == 0
         assert capsys.readouterr().err == ("written to out\n" if "--out" in words else "")
     assert main(["report", "out"]) == 0
     assert f"{TICKS} ticks, - s, in odd" in Path("out/report.html").read_text()
@@ -251,7 +251,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
     own = Header(controller="this:Class", params=ControlParams())
     LogWriter(tmp_path / "own", own).close()
     LogWriter(tmp_path / "empty", Header(controller="open", params=ControlParams())).close()
-    assert main(["replay", *argv]) == 2
+    assert main(["log", "replay", *argv]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert what in err

@@ -78,12 +78,12 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["springs", "--coil-mm", "4", "--out", "run"]) == 0
+    assert main(["antenna", "springs", "--coil-mm", "4", "--out", "run"]) == 0
     sentence = capsys.readouterr().out.splitlines()[-1]
     page = Page(Path("run/report.html"))
     assert page.alone
     assert sentence in page.text
-    assert "antennate springs --coil-mm 4 --out run" in page.text
+    assert "antennate antenna springs --coil-mm 4 --out run" in page.text
     assert antennate.__version__ in page.text
     assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 1
     assert "prefers-color-scheme: dark" in page.source
@@ -130,7 +130,7 @@ def test_every_figure_has_a_sentence() -> None:
 
 
 def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sensor", "--out", "run"]) == 0
+    assert main(["antenna", "sensor", "--out", "run"]) == 0
     first = Path("run/report.html").read_bytes()
     Path("run/report.html").unlink()
     assert main(["report", "run"]) == 0
@@ -142,7 +142,7 @@ def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["springs", "--out", "run"]) == 0
+    assert main(["antenna", "springs", "--out", "run"]) == 0
     before = Path("run/result.json").read_bytes()
     for words in (["run"], ["--compare", "run", "run"]):
         said = refusal(capsys, *words, "--out", "run/result.json", "--overwrite")
@@ -151,7 +151,7 @@ def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixt
 
 
 def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["springs", "--out", "run"]) == 0
+    assert main(["antenna", "springs", "--out", "run"]) == 0
     os.mkfifo("pipe")
     Path("null").symlink_to("/dev/null")
     for name in ("pipe", "null"):
@@ -165,7 +165,7 @@ def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]
 
 
 def test_a_link_is_written_through() -> None:
-    assert main(["springs", "--out", "run"]) == 0
+    assert main(["antenna", "springs", "--out", "run"]) == 0
     Path("page.html").write_text("old")
     Path("link.html").symlink_to("page.html")
     assert main(["report", "run", "--out", "link.html", "--overwrite"]) == 0
@@ -193,7 +193,7 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
             "ours": "2 < 3",
             "verdict": "conditional",
             "reason": "why",
-            "command": "antennate wall",
+            "command": "antennate bench wall",
         }
     ]
     counts = {"reproduced": 0, "conditional": 1, "not_reproduced": 0}
@@ -211,7 +211,7 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
 
 def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
     for coil in ("3.6", "4"):
-        assert main(["springs", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
+        assert main(["antenna", "springs", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
     assert main(["report", "--compare", "coil-3.6", "coil-4"]) == 0
     page = Page(Path("comparison.html"))
     assert page.alone
@@ -224,7 +224,7 @@ def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None
     for row in stiffness:
         assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
     assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
-    main(["taper", "--no-figures", "--out", "other"])
+    main(["antenna", "taper", "--no-figures", "--out", "other"])
     told = refusal(capsys, "--compare", "coil-4", "other")
     assert "expected two runs of one command, found springs in coil-4 and taper in other" in told
 
@@ -254,7 +254,7 @@ def test_points_of_two_studies_stand_together_by_what_varies() -> None:
 
 def test_a_run_that_was_stopped_has_a_page() -> None:
     Path("run").mkdir()
-    Path("run/command.txt").write_text("antennate wall --trials 9\n")
+    Path("run/command.txt").write_text("antennate bench wall --trials 9\n")
     Path("run/trials.partial.jsonl").write_text('{"trial": 0}\n{"trial": 1}\n')
     assert main(["report", "run"]) == 0
     page = Page(Path("run/report.html"))
@@ -280,7 +280,7 @@ def test_films_stand_in_the_order_of_the_run_and_logs_are_named() -> None:
 def test_invalid_trials_and_their_reasons_are_shown() -> None:
     words = ["--wall.travel", "0.03", "--wall.start", "0.002", "--wall.speed", "0.05"]
     words += ["--trials", "1", "--profiles", "stiff", "--workers", "1", "--no-figures"]
-    assert main(["wall", *words, "--out", "run"]) == 0
+    assert main(["bench", "wall", *words, "--out", "run"]) == 0
     table = Path("run/trials.csv")
     head, row = table.read_text().splitlines()
     bad = row.replace(row.split(",")[3], "invalid") + "time stood <still>"
@@ -316,7 +316,7 @@ def test_what_cannot_be_shown_is_one_line(
 def test_a_table_that_was_cut_is_one_line(capsys: pytest.CaptureFixture[str], cut: int) -> None:
     """Its last cell is empty: without its end the last row may still have all cells."""
     Path("run").mkdir()
-    Path("run/command.txt").write_text("antennate wall --trials 2\n")
+    Path("run/command.txt").write_text("antennate bench wall --trials 2\n")
     Path("run/trials.partial.jsonl").touch()
     table = "seed,trial,reason\n0,0,\n0,1,it is a long reason that is quoted\n0,2,\n"
     Path("run/trials.csv").write_text(table[:cut])
@@ -331,7 +331,7 @@ def test_a_run_that_has_ended_without_its_result_is_one_line(
 ) -> None:
     """What says that it goes on is gone, so it has written a result."""
     Path("run").mkdir()
-    Path("run/command.txt").write_text("antennate wall --trials 2\n")
+    Path("run/command.txt").write_text("antennate bench wall --trials 2\n")
     Path("run/config.toml").touch()
     Path("run/trials.csv").write_text("seed,trial\n0,0\n")
     assert "run/result.json: expected a readable file" in refusal(capsys, "run")

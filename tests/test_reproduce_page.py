@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from antennate.experiments.reproduce.run import CLAIMS
+from antennate.experiments.reproduce.experiment import CLAIMS
 
 DOCS = Path(__file__).parents[1] / "docs"
 

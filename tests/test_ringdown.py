@@ -116,10 +116,12 @@ def test_the_quick_antenna_recovers_as_a_cockroach_does() -> None:
 def test_the_command_takes_the_quick_antenna_and_says_how_it_recovers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["ringdown", "--config", str(QUICK), "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(["antenna", "ringdown", "--config", str(QUICK), "--out", str(tmp_path / "out")]) == 0
+    )
     assert "as fast as a cockroach's" in capsys.readouterr().out
     assert (tmp_path / "out" / "figures" / "ringdown.png").exists()
-    assert main(["ringdown", "--no-figures", "--out", str(tmp_path / "slow")]) == 0
+    assert main(["antenna", "ringdown", "--no-figures", "--out", str(tmp_path / "slow")]) == 0
     assert "8.2 times a cockroach's" in capsys.readouterr().out
 
 
@@ -128,7 +130,7 @@ def test_the_quick_antenna_stands_beside_the_default_one(
 ) -> None:
     """Mongeau 2014: 20 Hz and a damping ratio above 0.344, beside one of 2.6 Hz."""
     words = ["--beside", str(QUICK), "--out", str(tmp_path / "out")]
-    assert main(["ringdown", *words]) == 0
+    assert main(["antenna", "ringdown", *words]) == 0
     assert "chain of quick antenna" in " ".join(capsys.readouterr().out.split())
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     (beside,) = result["beside"]
@@ -151,5 +153,5 @@ def test_the_quick_antenna_stands_beside_the_default_one(
     ],
 )
 def test_bad_input_is_one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["ringdown", *words]) == 2
+    assert main(["antenna", "ringdown", *words]) == 2
     assert capsys.readouterr().err.count("\n") == 1

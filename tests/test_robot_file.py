@@ -18,6 +18,7 @@ from antennate.cli import BAD_INPUT, main
 from antennate.cli.addresses import RobotOptions, parse_robot
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import command_words
 from antennate.params.reading import read_file
 from antennate.studies.formats import to_toml
 
@@ -78,7 +79,7 @@ def test_a_key_that_none_of_them_knows_is_an_error_in_all(
     name: str, text: str, said: str, file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file.write_text(text)
-    assert main([name, "--config", str(file)]) == BAD_INPUT
+    assert main([*command_words(name).split(), "--config", str(file)]) == BAD_INPUT
     told = capsys.readouterr().err
     assert f"robot.toml: {said}" in told
     assert told.count("\n") == 1
@@ -102,7 +103,7 @@ COMMANDS = {  # a word that each refuses once its file was read
 def test_every_command_of_the_robot_reads_the_file_of_its_folder_and_says_so(
     name: str, file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [name, *COMMANDS[name]]
+    words = [*command_words(name).split(), *COMMANDS[name]]
     file.write_text("[robot]\nbuad = 1\n")
     assert main(words) == BAD_INPUT
     said, why = capsys.readouterr().err.splitlines()

@@ -15,6 +15,7 @@ from antennate.cli import main
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import command_words
 from antennate.params.control import ControlParams, CurveParams
 from antennate.params.reading import read_file
 from antennate.robots.sensor import SensorParams
@@ -103,7 +104,7 @@ def test_a_curve_that_falls_as_the_antenna_bends_is_refused(
     command: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    told = [command, f"--{words}.sensor.kind", "fsr", "--out", str(out)]
+    told = [*command_words(command).split(), f"--{words}.sensor.kind", "fsr", "--out", str(out)]
     assert main(told) == 2
     found = capsys.readouterr().err
     assert "conditioning.polarity must be 1 for a fsr sensor" in found

@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from first_hour import ANTENNATE, OrderedTwin
 
+from antennate.messages import command_words
+
 SMALL = ["--robot.links", "2"]
 """Seven servos: one yaw joint, four legs, two antennae."""
 
@@ -38,10 +40,12 @@ def test_without_input_it_ends_with_one_plain_line(
 ) -> None:
     ports = ["--bus", twin.paths["bus"]] if command != "setup" else ["--among", "none/*"]
     ports += ["--esp32", twin.paths["esp32"]] if command == "teleop" else []
-    run = ran([command, *ports, *SMALL], tmp_path)
+    run = ran([*command_words(command).split(), *ports, *SMALL], tmp_path)
     assert run.returncode == 2
     *_, last = run.stderr.strip().splitlines()
-    assert re.match(rf"antennate {command}: error: expected .*found the end of the input", last)
+    assert re.match(
+        rf"antennate {command_words(command)}: error: expected .*found the end of the input", last
+    )
     assert "Traceback" not in run.stderr
     assert not (tmp_path / "robot.toml").exists()
 
@@ -69,7 +73,7 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
     file.write_text(f'# mine\n[ports]\nbus = "{twin.paths["bus"]}"\n[robot]\nlinks = 2\n')
     twin.order("push all=0deg")
     time.sleep(0.8)
-    run = ran(["zero"], tmp_path, "\nr\n")
+    run = ran(["setup", "zero"], tmp_path, "\nr\n")
     assert run.returncode == 0, run.stderr
     text = file.read_text()
     assert text.startswith("# mine\n[ports]\n")
@@ -82,7 +86,7 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
 
 def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: OrderedTwin) -> None:
     master, slave = pty.openpty()
-    words = ["jog", "--bus", twin.paths["bus"], *SMALL, "--joint", "antenna_l_base"]
+    words = ["setup", "jog", "--bus", twin.paths["bus"], *SMALL, "--joint", "antenna_l_base"]
     with subprocess.Popen(
         [*ANTENNATE, *words], stdin=slave, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as process:
@@ -106,9 +110,9 @@ def test_jog_takes_a_script_and_refuses_a_joint_that_is_none(
     twin: OrderedTwin, tmp_path: Path
 ) -> None:
     bus = ["--bus", twin.paths["bus"], *SMALL]
-    run = ran(["jog", *bus, "--joint", "antenna_r_base"], tmp_path, "+++")
+    run = ran(["setup", "jog", *bus, "--joint", "antenna_r_base"], tmp_path, "+++")
     assert run.returncode == 0
     assert re.search(r"goal    \+8\.6 deg", run.stderr)
-    run = ran(["jog", *bus, "--joint", "yaw2"], tmp_path)
+    run = ran(["setup", "jog", *bus, "--joint", "yaw2"], tmp_path)
     assert run.returncode == 2
     assert "expected a joint of the robot (did you mean yaw1?), one of yaw1, leg_l0" in run.stderr

@@ -42,7 +42,7 @@ def files() -> dict[Path, bytes]:
 
 
 def merge(*shards: str, out: str, overwrite: bool = False) -> int:
-    words = ["merge", *shards, "--out", out, "--no-figures"]
+    words = ["study", "merge", *shards, "--out", out, "--no-figures"]
     return main([*words, "--overwrite"] if overwrite else words)
 
 
@@ -152,7 +152,7 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
 
     before = files()
-    words = ["merge", "1-2", "2-2", "--out", "merged", "--no-figures"]
+    words = ["study", "merge", "1-2", "2-2", "--out", "merged", "--no-figures"]
     done = subprocess.run(
         [sys.executable, "-m", "antennate", *words],
         env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
@@ -163,7 +163,7 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
     )
     assert done.returncode == 2
     assert done.stderr == (
-        f"antennate merge: error: expected to write merged/{STORE}, found: File too large\n"
+        f"antennate study merge: error: expected to write merged/{STORE}, found: File too large\n"
     )
     assert files() == before
     assert not Path("merged").exists()
@@ -192,7 +192,7 @@ def test_a_shard_without_trials_is_merged_as_any_other(count: int) -> None:
     ],
 )
 def test_shards_are_named_anywhere_with_and_without_their_flag(words: list[str]) -> None:
-    assert main(["merge", *words, "--no-figures"]) == 0
+    assert main(["study", "merge", *words, "--no-figures"]) == 0
     assert Path("merged/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
 
 
@@ -201,6 +201,6 @@ def test_no_shard_and_an_unknown_flag_are_one_line(capsys: pytest.CaptureFixture
         (["--out", "merged"], "merge: expected the folders of all shards, found none"),
         (["1-2", "2-2", "-x"], "merge: error: -x: expected a complete shard, found no shard.json"),
     ):
-        assert main(["merge", *words]) == 2
+        assert main(["study", "merge", *words]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert told in line

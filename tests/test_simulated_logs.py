@@ -72,11 +72,11 @@ def test_each_walk_of_the_gait_leaves_a_log(
     for action in (["info"], ["export"], ["plot"]):
         assert main(["log", *action, str(logs["forward"])]) == 0
     capsys.readouterr()
-    assert main(["replay", str(logs["forward"])]) == 2
+    assert main(["log", "replay", str(logs["forward"])]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "found 'gait'" in said
-    assert main(["replay", str(logs["forward"]), "--controller", "open"]) == 0
+    assert main(["log", "replay", str(logs["forward"]), "--controller", "open"]) == 0
 
 
 def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_a_twin_logs_goals_readings_and_physics(
     ]
     assert main(["log", "info", str(log)]) == 0
     capsys.readouterr()
-    assert main(["replay", str(log)]) == 2
+    assert main(["log", "replay", str(log)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 

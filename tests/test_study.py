@@ -186,21 +186,21 @@ def test_shards_together_are_the_same_bytes(
     for number in "12":
         assert study("--shard", f"{number}/2", out=f"part{number}") == 0
         assert json.loads(Path(f"part{number}/shard.json").read_text())["trials"] == 6
-    assert "a shard is missing" in refusal(capsys, "merge", "part1", "--out", "all")
+    assert "a shard is missing" in refusal(capsys, "study", "merge", "part1", "--out", "all")
     assert not Path("all").exists()
-    assert main(["merge", "part1", "part2", "--out", "all"]) == 0
+    assert main(["study", "merge", "part1", "part2", "--out", "all"]) == 0
     for name in ("trials.csv", "result.json", "config.toml", "figures/map.svg"):
         assert Path("all", name).read_bytes() == (run / name).read_bytes()
     plan("other.toml", mode="raise")
     assert study("--shard", "2/2", out="other", file="other.toml") == 0
-    line = refusal(capsys, "merge", "part1", "other", "--out", "none")
+    line = refusal(capsys, "study", "merge", "part1", "other", "--out", "none")
     assert 'other: expected a shard of the same run as part1, found settings.mode "nan"' in line
-    assert "found no shard.json" in refusal(capsys, "merge", str(run), "--out", "none")
+    assert "found no shard.json" in refusal(capsys, "study", "merge", str(run), "--out", "none")
     for name in ("shard.json", "versions.json"):
         whole = Path("part2", name).read_bytes()
         for length in (0, 1, len(whole) // 2, len(whole.rstrip()) - 1):
             Path("part2", name).write_bytes(whole[:length])
-            line = refusal(capsys, "merge", "part1", "part2", "--out", "none")
+            line = refusal(capsys, "study", "merge", "part1", "part2", "--out", "none")
             assert f"part2/{name}: expected a whole file of this kind, found: " in line
         Path("part2", name).write_bytes(whole)
     assert not Path("none").exists()
@@ -307,7 +307,7 @@ def test_other_processors_of_shards_are_recorded() -> None:
         assert study("--shard", f"{number}/2", out=f"part{number}") == 0
     here = processor_of("part1")
     on_another_processor("part2")
-    assert main(["merge", "part1", "part2", "--out", "all", "--no-figures"]) == 0
+    assert main(["study", "merge", "part1", "part2", "--out", "all", "--no-figures"]) == 0
     assert processor_of("all") == f"{here} and Not {here}"
 
 

@@ -30,6 +30,7 @@ from antennate.cli import main
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import WorkerError
 from antennate.experiments.study.config import StudyConfig
+from antennate.messages import command_words
 from antennate.studies.engines import Submitted
 from antennate.studies.identity import environment, identity, packages_used
 from antennate.studies.slurm import Resumable
@@ -458,7 +459,7 @@ def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
 )
 def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]) -> None:
     """Half of the trials were there before; all that is written is the same."""
-    words = [name, *words, "--workers", "1"]
+    words = [*command_words(name).split(), *words, "--workers", "1"]
     assert main([*words, "--out", "whole"]) == 0
     assert main([*words, "--out", "run", "--shard", "1/2"]) == 0
     assert main([*words, "--out", "run", "--resume"]) == 0

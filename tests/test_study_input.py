@@ -9,6 +9,7 @@ from design_plans import refusal
 
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
+from antennate.messages import command_words
 from antennate.params.reading import read_file
 
 CHOICES = "expected a list of values, or a table with low and high (names with dots need quotes)"
@@ -235,5 +236,7 @@ def test_a_sensor_of_another_kind_without_its_curve_is_refused_at_any_point(
 @pytest.mark.parametrize("command", ["study", "design"])
 def test_without_a_file_one_is_asked_for(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     for words in ([], ["--out", "run"]):
-        assert "expected a FILE that says what varies" in refusal(capsys, command, *words)
+        assert "expected a FILE that says what varies" in refusal(
+            capsys, *command_words(command).split(), *words
+        )
     assert not Path("run").exists()

@@ -256,7 +256,7 @@ def test_what_cannot_be_run_is_refused(values, message):
 def test_command_writes_its_run_and_the_same_on_two_workers(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(to_toml(SMALL))
-    assert main(["sweep", "--config", "small.toml", "--workers", "2", "--out", "run"]) == 0
+    assert main(["bench", "sweep", "--config", "small.toml", "--workers", "2", "--out", "run"]) == 0
     out = capsys.readouterr().out
     assert "sweep varied, with sensor noise" in out
     assert "published for CITRAS: 7.75 % and 6.73 %" in out
@@ -271,6 +271,6 @@ def test_command_writes_its_run_and_the_same_on_two_workers(capsys, tmp_path, mo
         rows = list(csv.DictReader(file))
     assert [row["kind"] for row in rows] == ["map"] * 2 + ["estimate"] * 96
     assert (tmp_path / "run" / "figures" / "sweep.png").stat().st_size > 10_000
-    assert main(["sweep", "--distances", "0.01", "--out", "bad"]) == 2
+    assert main(["bench", "sweep", "--distances", "0.01", "--out", "bad"]) == 2
     assert "distances must exceed" in capsys.readouterr().err
     assert not (tmp_path / "bad").exists()

@@ -251,7 +251,7 @@ def test_the_command_on_two_workers_writes_the_bytes_of_one(outcome, capsys, tmp
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     Path("small.toml").write_text(to_toml(SMALL))
-    assert main(["touch", "--config", "small.toml", "--workers", "2", "--out", "run"]) == 0
+    assert main(["bench", "touch", "--config", "small.toml", "--workers", "2", "--out", "run"]) == 0
     out, err = capsys.readouterr()
     assert "onset latency [ms]" in out
     assert max(map(len, out.splitlines()[:-1])) <= 100
@@ -279,7 +279,7 @@ def test_the_command_on_two_workers_writes_the_bytes_of_one(outcome, capsys, tmp
 )
 def test_bad_words_are_one_line(capsys, tmp_path, monkeypatch, words, text):
     monkeypatch.chdir(tmp_path)
-    assert main(["touch", *words.split()]) == 2
+    assert main(["bench", "touch", *words.split()]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1

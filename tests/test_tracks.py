@@ -21,7 +21,7 @@ from antennate.experiments.sweep.experiment import EXPERIMENT
 from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tracks.config import TrackWallParams
 from antennate.experiments.tracks.experiment import EXPERIMENT as TRACKS
-from antennate.experiments.tracks.walls import wall_of
+from antennate.experiments.tracks.measures import wall_of
 from antennate.params.scene import BenchPhysicsParams
 
 ERRORS = (

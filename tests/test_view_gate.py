@@ -24,9 +24,9 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
 COMMANDS = {
     "tunnel": "tunnel --controllers open --trials 1 --view-paused --view --view-port 0",
     "gait": "gait --view-paused --view --view-port 0",
-    "wall": "wall --view-paused --view --view-port 0",
-    "replay": "replay trial.mcap --view-paused --view --view-port 0",
-    "view": "view trial.mcap --port 0",
+    "wall": "bench wall --view-paused --view --view-port 0",
+    "replay": "log replay trial.mcap --view-paused --view --view-port 0",
+    "view": "log view trial.mcap --port 0",
     "twin": "twin --duration 600 --view --view-port 0",
     "drive": "drive --duration 600 --view --view-port 0",
 }

@@ -270,7 +270,7 @@ def test_the_page_of_a_log_names_its_own_option(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = str(taken.getsockname()[1])
-        code, text = said("view", "trial.mcap", "--port", port, folder=tmp_path)
+        code, text = said("log", "view", "trial.mcap", "--port", port, folder=tmp_path)
     assert code == 2
     assert text.count("\n") == 1
     assert "with --port, 0 takes any" in text
@@ -293,17 +293,17 @@ def ended(process: int) -> bool:
 
 
 def test_a_page_whose_process_dies_ends_the_command_with_2(trial: Path) -> None:
-    with shown("view", trial.name, "--port", "0", folder=trial.parent) as view:
+    with shown("log", "view", trial.name, "--port", "0", folder=trial.parent) as view:
         assert view.link
         os.kill(child_of(view.process.pid), signal.SIGKILL)
         assert view.process.wait(30) == 2
-        assert "found that it ended with code -9" in view.said("antennate view: error: ")
+        assert "found that it ended with code -9" in view.said("antennate log view: error: ")
         assert "Traceback" not in "".join(view.lines)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_command_and_its_page(trial: Path, stop: signal.Signals) -> None:
-    with shown("view", trial.name, "--port", "0", folder=trial.parent) as view:
+    with shown("log", "view", trial.name, "--port", "0", folder=trial.parent) as view:
         assert view.link
         child = child_of(view.process.pid)
         view.process.send_signal(stop)
@@ -359,7 +359,7 @@ def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) ->
         (["tunnel", "--view", "--view-port", "65536"], "--view-port"),
         (["tunnel", "--view", "--view-speed", "-1"], "--view-speed"),
         (["tunnel", "--foxglove-port", "1"], "--foxglove-port"),
-        (["sensor", "--view"], "--view"),
+        (["antenna", "sensor", "--view"], "--view"),
     ],
 )
 def test_what_would_be_ignored_is_refused(words: list[str], flag: str, tmp_path: Path) -> None:

@@ -196,7 +196,7 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
     out = tmp_path / "run"
     flags = ["--wall.travel", "0.03", "--wall.start", "0.005", "--wall.speed", "0.02"]
     flags += ["--trials", "1", "--profiles", "descending", "--workers", "1", "--out", str(out)]
-    code = main(["wall", "--json", *flags])
+    code = main(["bench", "wall", "--json", *flags])
     assert code == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((out / "result.json").read_text())

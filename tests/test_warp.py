@@ -215,7 +215,7 @@ def test_other_experiments_have_no_batches(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = str(tmp_path / "run")
-    assert main(["touch", "--engine", "warp", "--trials", "1", "--out", out]) == 2
+    assert main(["bench", "touch", "--engine", "warp", "--trials", "1", "--out", out]) == 2
     assert "expected tunnel or a study of it" in capsys.readouterr().err
 
 

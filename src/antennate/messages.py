@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
@@ -34,13 +34,36 @@ def ended_by(status: int) -> str:
     return f"was ended by signal {-status}" if status < 0 else f"ended with exit code {status}"
 
 
-def typed(*words: str) -> str:
+COMMAND_GROUPS = {
+    "bench": ("wall", "touch", "sweep", "force"),
+    "antenna": ("springs", "taper", "sensor", "ringdown"),
+    "study": ("design", "merge"),
+    "setup": ("zero", "jog"),
+    "drive": ("teleop",),
+    "log": ("replay", "view"),
+}
+"""Commands that are typed behind the name of their group."""
+_GROUP_OF = {name: group for group, names in COMMAND_GROUPS.items() for name in names}
+
+
+def command_words(name: str) -> str:
+    """A command as it is typed: its name, behind that of its group if it has one."""
+    return f"{_GROUP_OF[name]} {name}" if name in _GROUP_OF else name
+
+
+def command_of(words: Sequence[str]) -> str:
+    """The name of the command that typed words begin with, empty if there are none."""
+    name, part = [*words, "", ""][:2]
+    return part if part in COMMAND_GROUPS.get(name, ()) else name
+
+
+def typed(command: str, *words: str) -> str:
     """The words that a person types to run a command of this program, as it was called itself.
 
     `uv run` sets the variable UV for what it runs; there the command is `uv run antennate`.
     """
     program = ["uv", "run", "antennate"] if os.environ.get("UV") else ["antennate"]
-    return shlex.join([*program, *words])
+    return shlex.join([*program, *command_words(command).split(), *words])
 
 
 def extra(name: str) -> str:

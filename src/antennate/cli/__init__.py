@@ -9,27 +9,42 @@ from __future__ import annotations
 import errno
 import importlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from antennate import __version__
 from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
+from antennate.messages import COMMAND_GROUPS, command_words
 
 ROBOT_COMMANDS = {
     "twin": "A simulated robot on two ports: an antenna board and a servo bus",
     "robot": "Joints, supply, wiring diagram and bill of materials of a robot",
     "doctor": "Examine the real robot, or its twin: what is wrong, and the cure",
     "setup": "From a box of servos to a robot, one servo at a time",
-    "zero": "Zeros and directions of the joints, by hand",
-    "jog": "Move one joint by small steps",
+    "setup zero": "Zeros and directions of the joints, by hand",
+    "setup jog": "Move one joint by small steps",
     "record": "Antenna readings to a CSV file that calibrate takes",
     "drive": "Let a controller walk the real robot, or its twin",
-    "teleop": "Walk the real robot, or its twin, by keys",
-    "log": "What a log holds; recover it, export it, plot it",
-    "replay": "Let a controller decide again upon the log of a drive",
-    "view": "A log, or that of a run, on a page of this computer",
-    "report": "A run, or two side by side, as one page to read, print and send",
-    "merge": "The shards of a run as the run that they are parts of",
+    "drive teleop": "Walk the real robot, or its twin, by keys",
 }
+LOG_COMMANDS = {
+    "log": "What a log holds; recover it, export it, plot it",
+    "log replay": "Let a controller decide again upon the log of a drive",
+    "log view": "A log, or that of a run, on a page of this computer",
+    "report": "A run, or two side by side, as one page to read, print and send",
+}
+_MERGE = {"study merge": "The shards of a run as the run that they are parts of"}
+_MODULES = {name.split()[-1] for name in (*ROBOT_COMMANDS, *LOG_COMMANDS, *_MERGE)}
+_FAMILIES = {
+    "bench": "An antenna before walls and posts",
+    "antenna": "What an antenna is made of",
+}
+"""Groups that are no command of their own."""
+_FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
+_EXPERIMENTS = (
+    *("tunnel", "gait", "calibrate", "bench", "antenna", "study"),
+    *("reproduce", "tracks", "servo"),
+)
+"""Commands and groups in the order in which they are listed; what else there is comes last."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}
 
 
@@ -50,12 +65,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     keep_wish()
     words = list(sys.argv[1:] if argv is None else argv)
     describe_only(not _HELP.isdisjoint(words))
-    name = f"antennate {words[0]}" if words and _known(words[0]) else "antennate"
+    name, words = _divided(words)
+    title = f"antennate {name}".strip()
     with dropped(), safe_streams(result_alone="--json" in words) as output:
         try:
-            code = _run(words, name)
+            code = _run(name, words, title)
         except KeyboardInterrupt:
-            sys.stderr.write(f"{name}: interrupted\n")
+            sys.stderr.write(f"{title}: interrupted\n")
             exec("")  # noqa: S102  CPython forgets that an earlier `exec` was interrupted
             return INTERRUPTED
         output.flush()
@@ -64,15 +80,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         from antennate.errors import reason
 
         why = reason(output.error)
-        sys.stderr.write(f"{name}: error: standard output: expected to write, found: {why}\n")
+        sys.stderr.write(f"{title}: error: standard output: expected to write, found: {why}\n")
         return BAD_INPUT
 
 
 def commands() -> dict[str, str]:
-    """What each command does, by name: the experiments first."""
+    """What each command does, by its name behind that of its group: the experiments first."""
     from antennate.experiments import summaries
 
-    return summaries() | ROBOT_COMMANDS
+    known = {command_words(name): text for name, text in summaries().items()} | _MERGE
+    listed = [name for entry in _EXPERIMENTS for name in (entry, *_parts(entry)) if name in known]
+    return {n: known[n] for n in listed} | known | ROBOT_COMMANDS | LOG_COMMANDS
 
 
 def carry_out(name: str, argv: Sequence[str]) -> int:
@@ -81,7 +99,8 @@ def carry_out(name: str, argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the run failed.
     """
-    if name in ROBOT_COMMANDS:
+    name = name.split()[-1]
+    if name in _MODULES:
         return importlib.import_module(f"antennate.cli.{name}").command(list(argv))
     from antennate.cli.experiment import command
     from antennate.experiments import load
@@ -89,65 +108,118 @@ def carry_out(name: str, argv: Sequence[str]) -> int:
     return command(load(name), list(argv))
 
 
-def _run(words: Sequence[str], name: str) -> int:
-    if not words or words[0] in ("-h", "--help"):
-        sys.stdout.write(_usage())
+def _divided(words: Sequence[str]) -> tuple[str, list[str]]:
+    """The name of the command, behind that of its group, and its words; empty if there is none."""
+    name = words[0] if words else ""
+    if f"{name} {''.join(words[1:2])}" in _parts(name):
+        return " ".join(words[:2]), list(words[2:])
+    if name in _FAMILIES or _is_command(name):
+        return name, list(words[1:])
+    return "", list(words)
+
+
+def _is_command(name: str) -> bool:
+    """Whether a word is a command; other packages are asked only where it is none of ours."""
+    from antennate.experiments import is_ours, names
+
+    if command_words(name) != name:
+        return False
+    return name in _MODULES or is_ours(name) or name in names()
+
+
+def _parts(name: str) -> list[str]:
+    """The commands that are typed behind a name."""
+    return [command_words(part) for part in COMMAND_GROUPS.get(name, ())]
+
+
+def _page(name: str, words: Sequence[str]) -> str:
+    """What is printed in place of a run, empty if that is wanted."""
+    word = words[0] if words else None
+    if name in _FAMILIES and word in (None, "-h", "--help", "--help-all"):
+        return _usage_of(name)
+    if not name and word in (None, "-h", "--help"):
+        return _usage()
+    return f"antennate {__version__}\n" if not name and word == "--version" else ""
+
+
+def _run(name: str, words: Sequence[str], title: str) -> int:
+    if page := _page(name, words):
+        sys.stdout.write(page)
         if words:
             return OK
-        sys.stderr.write("antennate: error: expected a command, found none\n")
+        sys.stderr.write(f"{title}: error: expected a command, found none\n")
         return BAD_INPUT
-    if words[0] == "--version":
-        sys.stdout.write(f"antennate {__version__}\n")
-        return OK
     from antennate.cli.arguments import HelpRequest
     from antennate.cli.output import write_result
     from antennate.errors import AntennateError, BadInputError, reason
-    from antennate.messages import nearest, one_line, shortened
+    from antennate.messages import one_line, shortened
 
     try:
-        if words[0] == "--completion":
+        if not name and words[0] == "--completion":
             from antennate.cli.completion import script
 
             sys.stdout.write(script(words[1:], commands(), carry_out))
             return OK
-        if not _known(words[0]):
-            known = f"{nearest(words[0], commands())}, one of {', '.join(commands())}"
-            raise BadInputError(f"expected a command{known}, found {shortened(words[0])}")
-        return carry_out(words[0], words[1:])
+        if name in ("", *_FAMILIES):
+            raise BadInputError(_unknown(name, words[0]))
+        return carry_out(name, words)
     except HelpRequest as page:
         write_result(str(page))
         return OK
     except AntennateError as error:
-        sys.stderr.write(f"{name}: error: {one_line(reason(error))}\n")
+        sys.stderr.write(f"{title}: error: {one_line(reason(error))}\n")
         return BAD_INPUT
     except OSError as error:
         if error.errno != errno.ENAMETOOLONG:
             raise
         found = shortened(str(error.filename))
-        sys.stderr.write(f"{name}: error: expected a shorter name of a file, found {found}\n")
+        sys.stderr.write(f"{title}: error: expected a shorter name of a file, found {found}\n")
         return BAD_INPUT
 
 
-def _known(word: str) -> bool:
-    """Whether it is a command; other packages are asked only where it is none of ours."""
-    from antennate.experiments import is_ours, names
+def _unknown(family: str, word: str) -> str:
+    """What is said of a word that is no command, or the old name of one."""
+    from antennate.messages import nearest, shortened, typed
 
-    return word in ROBOT_COMMANDS or is_ours(word) or word in names()
+    if command_words(word) != word:
+        return f"{word} is `{typed(word)}` now"
+    known = COMMAND_GROUPS[family] if family else [*_top()]
+    choices = f"{nearest(word, known)}, one of {', '.join(known)}"
+    return f"expected a command{choices}, found {shortened(word)}"
+
+
+def _top() -> dict[str, str]:
+    """What stands in the list of commands: those that are in no group, and the groups."""
+    known = _FAMILIES | commands()
+    listed = [*_EXPERIMENTS, *ROBOT_COMMANDS, *LOG_COMMANDS, *known]
+    return {name: known[name] for name in listed if " " not in name}
 
 
 def _usage() -> str:
-    from antennate.experiments import summaries
     from antennate.messages import typed
 
-    width = max(map(len, commands()))
+    top = _top()
+    sections = {
+        "start here": _FIRST,
+        "simulation and study": [n for n in top if n not in {**ROBOT_COMMANDS, **LOG_COMMANDS}],
+        "the robot and its twin": ROBOT_COMMANDS,
+        "logs and runs": LOG_COMMANDS,
+    }
+    width = max(map(len, top))
+    lines = ["usage: antennate COMMAND [OPTIONS]", ""]
+    lines += ["Simulate and study a pair of tactile antennae on a many-legged robot.", ""]
+    for title, names in sections.items():
+        lines += [f"{title}:"]
+        for name in (name for name in names if name in top):
+            lines += [f"  {name:<{width}}  {top[name]}"]
+            parts = COMMAND_GROUPS.get(name, ()) if title != "start here" else ()
+            lines += [f"  {'':<{width}}  {', '.join(f'{name} {part}' for part in parts)}"] * bool(
+                parts
+            )
+        lines += [""]
     return "\n".join(
         [
-            "usage: antennate COMMAND [OPTIONS]",
-            "",
-            "Simulate and study a pair of tactile antennae on a many-legged robot.",
-            "",
-            *_listed("experiments", summaries(), width),
-            *_listed("the robot and its twin", ROBOT_COMMANDS, width),
+            *lines,
             f"`{typed('COMMAND', '--help')}` shows its options, `--help-all` every one;",
             f"`{typed('--completion', 'bash')}` (zsh, fish) prints a script for the shell;",
             f"`{typed('--version')}` prints the version.",
@@ -156,5 +228,9 @@ def _usage() -> str:
     )
 
 
-def _listed(title: str, named: Mapping[str, str], width: int) -> list[str]:
-    return [f"{title}:", *(f"  {name:<{width}}  {what}" for name, what in named.items()), ""]
+def _usage_of(family: str) -> str:
+    """The page of a group that is no command of its own."""
+    known, width = commands(), max(map(len, _parts(family)))
+    lines = [f"usage: antennate {family} COMMAND [OPTIONS]", "", f"{_FAMILIES[family]}.", ""]
+    lines += [f"  {name:<{width}}  {known[name]}" for name in _parts(family)]
+    return "\n".join([*lines, ""])

@@ -26,7 +26,7 @@ from antennate.cli.options import (
     require_text,
 )
 from antennate.errors import ConfigError
-from antennate.messages import shown
+from antennate.messages import command_words, shown
 from antennate.params.base import Params, changes
 from antennate.params.faults import describe, group_of
 from antennate.params.reading import Config, put_over, read_file
@@ -93,7 +93,9 @@ def parse(
         if word in ("-h", "--help"):
             raise HelpRequest(short_page(page))
         if (name := word.partition("=")[0].replace("_", "-")) in unread:
-            raise ConfigError(f"{name}: expected a parameter that {command} reads, found this one")
+            raise ConfigError(
+                f"{name}: expected a parameter that {command_words(command)} reads, found this one"
+            )
         if word == "--help-all":
             raise HelpRequest(long_page(page))
     values = read_words(argv, [*others, *parameters])

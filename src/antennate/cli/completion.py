@@ -11,13 +11,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from antennate.cli.arguments import OptionsRequest
 from antennate.cli.options import Option
 from antennate.errors import BadInputError
-from antennate.messages import one_line
+from antennate.messages import COMMAND_GROUPS, one_line
 
 SHELLS = ("bash", "zsh", "fish")
 
 _BASH = """\
 _antennate() {
-    local command=${COMP_WORDS[1]} current=${COMP_WORDS[COMP_CWORD]} flag= i words=
+    local command=${COMP_WORDS[1]} current=${COMP_WORDS[COMP_CWORD]} flag= i words= parts=
+    case "$command" in
+%(parts)s
+    esac
+    if [ "$COMP_CWORD" -gt 2 ]; then
+        case " $parts " in
+            *" ${COMP_WORDS[2]} "*) command="$command ${COMP_WORDS[2]}"; parts=;;
+        esac
+    fi
     if [ "$COMP_CWORD" -eq 1 ]; then
         words='%(commands)s'
     else
@@ -33,6 +41,7 @@ _antennate() {
 %(flags)s
             esac
         fi
+        [ "$COMP_CWORD" -ne 2 ] || words="$parts $words"
     fi
     COMPREPLY=($(compgen -W "$words" -- "$current"))
 }
@@ -86,23 +95,38 @@ def _bash(options: Mapping[str, Sequence[Option]]) -> str:
     flags = []
     for command, own in options.items():
         every = [option.offered for option in own if not option.positional]
-        flags.append(f"                {command}) words='{' '.join([*every, *_HELP])}';;")
-    names = " ".join([*options, *_OWN])
-    return _BASH % {"commands": names, "values": "\n".join(values), "flags": "\n".join(flags)}
+        flags.append(f"                '{command}') words='{' '.join([*every, *_HELP])}';;")
+    parts = [
+        f"        {name}) parts='{' '.join(names)}';;" for name, names in COMMAND_GROUPS.items()
+    ]
+    names = " ".join([*dict.fromkeys(name.split()[0] for name in options), *_OWN])
+    lines = {"parts": parts, "values": values, "flags": flags}
+    return _BASH % {"commands": names, **{name: "\n".join(each) for name, each in lines.items()}}
 
 
 def _fish(commands: Mapping[str, str], options: Mapping[str, Sequence[Option]]) -> Iterator[str]:
-    for name, meaning in commands.items():
-        yield f"complete -c antennate -n __fish_use_subcommand -xa {name} -d {_quoted(meaning)}"
+    start = "complete -c antennate -n"
+    for name in dict.fromkeys(name.split()[0] for name in commands):
+        meaning = commands.get(name, ", ".join(COMMAND_GROUPS.get(name, ())))
+        yield f"{start} __fish_use_subcommand -xa {name} -d {_quoted(meaning)}"
     for command, own in options.items():
-        start = f"complete -c antennate -n '__fish_seen_subcommand_from {command}'"
+        group, _, part = command.partition(" ")
+        seen = f"__fish_seen_subcommand_from {group}"
+        others = " ".join(COMMAND_GROUPS.get(group, ()))
+        if part:
+            before = f"{seen}; and not __fish_seen_subcommand_from {others}"
+            yield f"{start} {_quoted(before)} -xa {part} -d {_quoted(commands[command])}"
+            seen += f"; and __fish_seen_subcommand_from {part}"
+        elif others:
+            seen += f"; and not __fish_seen_subcommand_from {others}"
         for option in own:
             known = _values(option)
             values = f" -xa {_quoted(' '.join(known))}" if known else " -r" * bool(option.metavar)
             if not option.positional:
-                yield f"{start} -l {option.offered[2:]}{values} -d {_quoted(option.meaning)}"
+                name = f"-l {option.offered[2:]}{values}"
+                yield f"{start} {_quoted(seen)} {name} -d {_quoted(option.meaning)}"
         for flag in _HELP:
-            yield f"{start} -l {flag[2:]}"
+            yield f"{start} {_quoted(seen)} -l {flag[2:]}"
 
 
 def _values(option: Option) -> list[str]:

@@ -275,7 +275,7 @@ def _end(
         raise failure
     if interrupted:
         sys.stderr.write(
-            f"antennate {experiment.name}: interrupted: kept {len(outcome.rows)} trials, all "
+            f"{experiment.view.title}: interrupted: kept {len(outcome.rows)} trials, all "
             "that had ended\n" + (f"to go on: {again}\n" if again else "")
         )
     elif _film(experiment, config, options, run):
@@ -309,7 +309,7 @@ def _film(
         with progress("% of the films") as step:
             write_films(experiment, config, trial, run, step)
     except KeyboardInterrupt:
-        sys.stderr.write(f"antennate {experiment.name}: interrupted: kept all but some films\n")
+        sys.stderr.write(f"{experiment.view.title}: interrupted: kept all but some films\n")
         return False
     return True
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from antennate.cli.options import Option, fields_of, first_line, flag_of
-from antennate.messages import typed
+from antennate.messages import COMMAND_GROUPS, command_words, typed
 from antennate.params.base import meaning
 from antennate.params.faults import group_of
 
@@ -54,7 +54,7 @@ def short_page(command: Command) -> str:
     outside = (option for option in command.parameters if len(option.path) == 1)
     top = sorted(outside, key=lambda each: (_rank(each), not each.metavar.startswith("NAME")))
     head = _usage(command, command.description.split("\n\n")[0])
-    tail = [*_groups(command.model, command.parameters), "", *_lists(command)]
+    tail = [*_groups(command.model, command.parameters), "", *_lists(command), *_parts(command)]
     tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
     room = SHORT_LINES - len(head) - len(tail)
     others = sorted(command.others, key=_rank)
@@ -94,7 +94,7 @@ def long_page(command: Command) -> str:
         by_group.setdefault(option.path[:-1], []).append(option)
     for group, options in by_group.items():
         lines += _section(_title(command.model, group), options)
-    return "\n".join([*lines, "", *_lists(command)]).rstrip() + "\n"
+    return "\n".join([*lines, "", *_lists(command), *_parts(command)]).rstrip() + "\n"
 
 
 def width() -> int:
@@ -110,7 +110,7 @@ def paragraphs(text: str) -> list[str]:
 
 def _usage(command: Command, description: str) -> list[str]:
     free = "".join(f" {option.free}" for option in command.others if option.free)
-    usage = f"usage: antennate {command.name}{free} [OPTIONS]"
+    usage = f"usage: antennate {command_words(command.name)}{free} [OPTIONS]"
     return [usage, "", *paragraphs(description)]
 
 
@@ -118,6 +118,14 @@ def _lists(command: Command) -> list[str]:
     """How a list is given, if the command takes one."""
     many = any(option.many for option in [*command.others, *command.parameters])
     return ["A list (...) is words separated by spaces."] if many else []
+
+
+def _parts(command: Command) -> list[str]:
+    """The commands that are typed behind the name of this one."""
+    names = [command_words(name) for name in COMMAND_GROUPS.get(command.name, ())]
+    return [f"Further commands: {', '.join(f'`antennate {name}`' for name in names)}."] * bool(
+        names
+    )
 
 
 def _section(title: str, options: Sequence[Option]) -> list[str]:

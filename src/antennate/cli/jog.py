@@ -1,4 +1,4 @@
-"""`antennate jog`: one joint by small steps."""
+"""`antennate setup jog`: one joint by small steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`antennate merge`: the shards of one run as the run that they are parts of."""
+"""`antennate study merge`: the shards of one run as the run that they are parts of."""
 
 from __future__ import annotations
 

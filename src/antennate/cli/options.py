@@ -311,11 +311,12 @@ def require_text(flag: str, text: str) -> None:
 
 _ELSEWHERE = {
     "--knows": "only tunnel takes it: no robot knows what a simulation does",
-    "--log": "tunnel, gait and twin take it; drive and teleop always keep a log",
-    "--video": "tunnel, gait, wall, touch, sweep, ringdown, calibrate, force and twin take it; "
+    "--log": "tunnel, gait and twin take it; drive and drive teleop always keep a log",
+    "--video": "tunnel, gait, calibrate, twin, bench wall, bench touch, bench sweep, bench force "
+    "and antenna ringdown take it; "
     "`antennate log film` makes a film of any log",
-    "--view": "tunnel, gait, wall, twin, drive, teleop and replay take it; `antennate view` shows "
-    "any log",
+    "--view": "tunnel, gait, bench wall, twin, drive, drive teleop and log replay take it; "
+    "`antennate log view` shows any log",
 }
 """Which commands have a flag that others could have, too."""
 

@@ -1,4 +1,4 @@
-"""`antennate replay`: the readings of a log decided upon again."""
+"""`antennate log replay`: the readings of a log decided upon again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from antennate.cli.results import ResultOptions, folder_for, log_of, tell
 from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
 from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
-from antennate.messages import one_line, shortened
+from antennate.messages import command_words, one_line, shortened
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View
@@ -133,7 +133,7 @@ def complain(command: str, log: LogReader) -> int:
         return OK
     place = f"; first at {_place(log.damage[0])}" if log.bad else ""
     sys.stderr.write(
-        f"antennate {command}: error: {log.path}: expected an undamaged log, found "
+        f"antennate {command_words(command)}: error: {log.path}: expected an undamaged log, found "
         f"damaged places: {log.bad}; ticks missing: {log.missing}; ticks read: {log.ticks}{place}\n"
     )
     return BAD_INPUT
@@ -143,8 +143,8 @@ def say_unguarded(command: str, log: LogReader) -> None:
     """Say on stderr that bytes of a log may have changed unnoticed."""
     if not log.guarded:
         sys.stderr.write(
-            f"antennate {command}: {log.path}: written by another program without CRCs, so damage "
-            "to its numbers is not noticed\n"
+            f"antennate {command_words(command)}: {log.path}: written by another program without "
+            "CRCs, so damage to its numbers is not noticed\n"
         )
 
 

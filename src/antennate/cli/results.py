@@ -15,6 +15,7 @@ from antennate.cli.arguments import FromFile
 from antennate.cli.options import flags_and_words, option, require_text
 from antennate.cli.output import write_result
 from antennate.errors import BadInputError
+from antennate.messages import command_words
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
@@ -76,7 +77,7 @@ def folder_for(
     require_apart(options.out, options.overwrite, config.model_dump(), [*reads, *given])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place, tasks=tasks) as folder:
-        folder.describe(config, ["antennate", command or view.name, *argv])
+        folder.describe(config, ["antennate", *command_words(command or view.name).split(), *argv])
         yield folder
         write_report(folder, view)
         told = "complete already; nothing was run:" if folder.untouched else "written to"

@@ -35,7 +35,7 @@ class RunOptions(ResultOptions):
         f"also {', '.join(BATCHED)}",
         "ENGINE",
     )
-    shard: str | None = option(None, "run one of N parts, for `antennate merge`", "I/N")
+    shard: str | None = option(None, "run one of N parts, for `antennate study merge`", "I/N")
     slurm: tuple[str, ...] = option(
         (), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE", needs=["--engine slurm"]
     )

@@ -1,4 +1,4 @@
-"""`antennate teleop`: the real robot, or its twin, by keys or a gamepad."""
+"""`antennate drive teleop`: the real robot, or its twin, by keys or a gamepad."""
 
 from __future__ import annotations
 

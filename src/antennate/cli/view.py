@@ -1,4 +1,4 @@
-"""`antennate view`: a log on a page, or that of a run."""
+"""`antennate log view`: a log on a page, or that of a run."""
 
 from __future__ import annotations
 

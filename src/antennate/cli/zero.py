@@ -1,4 +1,4 @@
-"""`antennate zero`: zeros and directions of all joints, by hand."""
+"""`antennate setup zero`: zeros and directions of all joints, by hand."""
 
 from __future__ import annotations
 

@@ -47,11 +47,11 @@ class RobotFile(DriveConfig):
         return SetupConfig(robot=self.robot, setup=self.setup)
 
     def for_zero(self) -> ZeroConfig:
-        """What `antennate zero` takes: the same."""
+        """What `antennate setup zero` takes: the same."""
         return ZeroConfig(robot=self.robot, setup=self.setup)
 
     def for_jog(self) -> JogConfig:
-        """What `antennate jog` takes: the robot, and its own table."""
+        """What `antennate setup jog` takes: the robot, and its own table."""
         return JogConfig(robot=self.robot, jog=self.jog)
 
     def _part(self, model: type[_Config]) -> _Config:

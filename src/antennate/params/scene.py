@@ -232,7 +232,11 @@ class BenchPhysicsParams(PhysicsParams):
     """Numerics of the bench: a light chain that sticks and slips on small spheres."""
 
     timestep: float = number(
-        5e-4, "s", "measured: antennate wall at half of it gives the same table", gt=1e-5, le=0.002
+        5e-4,
+        "s",
+        "measured: bench wall at half of it gives the same table",
+        gt=1e-5,
+        le=0.002,
     )
     """Physics step."""
     contact_time: float = number(

@@ -65,7 +65,7 @@ class CornerWallParams(Params):
 
 
 class TouchWallsParams(Params):
-    """The walls of `antennate touch` by kind."""
+    """The walls of `antennate bench touch` by kind."""
 
     flat: FlatWallParams = FlatWallParams()
     sinusoidal: SinusoidalWallParams = SinusoidalWallParams()

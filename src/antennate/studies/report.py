@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from antennate import messages
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.params.base import Params
@@ -68,6 +69,11 @@ class View:
     body: Body | None = None
     captions: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def title(self) -> str:
+        """The command as it is typed."""
+        return f"antennate {messages.command_words(self.name)}"
+
     def ordered(self, figures: Iterable[str]) -> list[str]:
         """Names of figures in the order of the captions, others behind: the first is the picture.
 
@@ -91,8 +97,8 @@ def command_of(run: RunDirectory) -> str:
     result = run.result() if (run.path / RESULT).exists() else {}
     words = shlex.split(run.text(COMMAND).partition("\n")[0])
     name = result.get("command") if isinstance(result, dict) else None
-    name = name or (words[1] if len(words) > 1 else None)
-    if not isinstance(name, str):
+    name = name or messages.command_of(words[1:])
+    if not name or not isinstance(name, str):
         raise BadInputError(f"{run.path}: expected a run that names its command, found none")
     return name
 
@@ -115,7 +121,7 @@ def report(run: RunDirectory, view: View) -> str:
     """
     ended = (run.path / TABLE).exists() and not (run.path / PARTIAL).exists()
     result = run.result() if ended or (run.path / RESULT).exists() else None
-    parts = [f"<h1>antennate {page.escape(view.name)}</h1>"]
+    parts = [f"<h1>{page.escape(view.title)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     parts.append(page.paragraphs(_sentence(run, result, view), "headline"))
     parts.append(page.block(run.text(BY_HAND), wrap=True))
@@ -126,7 +132,7 @@ def report(run: RunDirectory, view: View) -> str:
     parts.append(f"<h2>How it was run</h2>{page.paragraphs(_when(run, result))}")
     parts.append(page.block(_command(run, view), wrap=True))
     parts += [_logs(run), _failures(run), _settings(run, view), _versions(run)]
-    return page.page(f"antennate {view.name}", "".join(parts))
+    return page.page(view.title, "".join(parts))
 
 
 def _sentence(run: RunDirectory, result: Result | None, view: View) -> str:
@@ -274,7 +280,7 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     """
     names = _names(runs)
     results = [run.result() for run in runs]
-    parts = [f"<h1>antennate {page.escape(view.name)}: {page.escape(' and '.join(names))}</h1>"]
+    parts = [f"<h1>{page.escape(view.title)}: {page.escape(' and '.join(names))}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     told = [view.sentence(result) for result in results]
     for name, run, text in zip(names, runs, told, strict=True):
@@ -289,7 +295,7 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
         _pairs("Films", names, [_films(run) for run in runs], str, "pair"),
         _pairs("Figures", names, [_images(run, view) for run in runs], view.caption),
     ]
-    return page.page(f"antennate {view.name}", "".join(parts))
+    return page.page(view.title, "".join(parts))
 
 
 def _names(runs: Sequence[RunDirectory]) -> list[str]:

@@ -10,7 +10,7 @@ from antennate.antenna.next_push import RECORDED
 from antennate.antenna.plateau import Plateau
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
-from antennate.experiments.calibrate.readings import told
+from antennate.experiments.calibrate.readings import conversion_sentence
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
@@ -56,19 +56,20 @@ NEXT = (
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The curve, how it serves each speed, and what is known about the next push."""
-    found = result["calibration"]
-    way = "rise" if found["polarity"] > 0 else "fall"
+    curve = result["calibration"]
+    way = "rise" if curve["polarity"] > 0 else "fall"
     speeds = {
         "all" if row["speed_m_s"] is None else f"{100 * row['speed_m_s']:g} cm/s": row
-        for row in found["speeds"]
+        for row in curve["speeds"]
     }
+    over = _no_interval(curve).capitalize() or f"Intervals are over {_pushes(curve)}"
     return (
         Table.of(
             "Calibration",
-            {found["sensor_id"]: found},
+            {curve["sensor_id"]: curve},
             CURVE,
-            f"Readings {way} with flex. Readings: {found['samples']}, pushes: {found['trials']}.\n"
-            f"{_over(found)}\n{_file(result)}".rstrip(),
+            f"Readings {way} with flex. Readings: {curve['samples']}, pushes: {curve['trials']}.\n"
+            f"{over}.\n{_file(result)}".rstrip(),
         ),
         Table.of("The one curve at each speed", speeds, SPEED),
         _next_push(result),
@@ -81,7 +82,7 @@ def _file(result: Mapping[str, Any]) -> str:
     if not handled:
         return ""
     lines = [*handled.get("units", ())]  # results of older versions have none
-    lines += [told(handled["conversion"])] if handled["conversion"] else []
+    lines += [conversion_sentence(handled["conversion"])] if handled["conversion"] else []
     lines += [f"{w['clock'].capitalize()} wrapped in row {w['row']}." for w in handled["wraps"]]
     if handled["damaged"]:
         row, why = handled["damages"][0]
@@ -113,30 +114,24 @@ def _handled(result: Mapping[str, Any]) -> str:
     return (f" Of {rows} rows: {said}." if said else "") + become
 
 
-def _over(found: Mapping[str, Any]) -> str:
-    """What the intervals of the curve are over, or why there are none."""
-    why = _no_interval(found)
-    return f"{why.capitalize() or f'Intervals are over {_pushes(found)}'}."
-
-
-def _no_interval(found: Mapping[str, Any]) -> str:
+def _no_interval(curve: Mapping[str, Any]) -> str:
     """Why slope or midpoint has none, empty if both have."""
-    if found["trials"] < FEWEST_PUSHES:
-        return f"no interval: {_pushes(found)}; it takes {FEWEST_PUSHES} or more"
-    both = found["slope_95"] and found["midpoint_95"]
-    return "" if both else f"no interval: {_pushes(found)} all alike"
+    if curve["trials"] < FEWEST_PUSHES:
+        return f"no interval: {_pushes(curve)}; it takes {FEWEST_PUSHES} or more"
+    both = curve["slope_95"] and curve["midpoint_95"]
+    return "" if both else f"no interval: {_pushes(curve)} all alike"
 
 
-def _pushes(found: Mapping[str, Any]) -> str:
-    return "one push" if found["trials"] == 1 else f"{found['trials']} pushes"
+def _pushes(curve: Mapping[str, Any]) -> str:
+    return "one push" if curve["trials"] == 1 else f"{curve['trials']} pushes"
 
 
 def _next_push(result: Mapping[str, Any]) -> Table:
     """What a user meets: a push that served no fit."""
-    found, known = result["calibration"], result["assessment"]
-    ends = found["midpoint_95"] and sorted(
-        -found["slope"] * found["polarity"] * (end - found["midpoint"]) / 4
-        for end in found["midpoint_95"]
+    curve, known = result["calibration"], result["assessment"]
+    ends = curve["midpoint_95"] and sorted(
+        -curve["slope"] * curve["polarity"] * (end - curve["midpoint"]) / 4
+        for end in curve["midpoint_95"]
     )
     notes = []
     if known["new_push"] is None:
@@ -165,7 +160,7 @@ def _rival(name: str, checks: Mapping[str, Any]) -> str:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """How well one curve serves all pushes."""
-    found = result["calibration"]
+    curve = result["calibration"]
     following = result["assessment"]["new_push"]
     ahead = "nothing is known about the next push"
     if following:
@@ -173,24 +168,17 @@ def sentence(result: Mapping[str, Any]) -> str:
         ahead = f"in a new push b errs by {errors} (95 %)"
         if following["error_95"] is None:
             ahead = "two pushes say too little about the next one"
-    interval = _no_interval(found) or f"95 % interval {shown(found['slope_95'], '.1f')}"
+    interval = _no_interval(curve) or f"95 % interval {shown(curve['slope_95'], '.1f')}"
+    plateau = result.get("plateau")
+    saturated = f"; {Plateau(**plateau).text('the readings')}" if plateau else ""
     return (
-        f"One sigmoid explains R² {found['r2']:.2f} of {_pushes(found)}, with a slope of "
-        f"{found['slope']:.1f} ({interval}); {ahead}{_warning(result)}.{_handled(result)}"
+        f"One sigmoid explains R² {curve['r2']:.2f} of {_pushes(curve)}, with a slope of "
+        f"{curve['slope']:.1f} ({interval}); {ahead}{saturated}{_poor(result)}.{_handled(result)}"
     )
 
 
-def _warning(result: Mapping[str, Any]) -> str:
-    """What saturates, and what a poor fit comes from."""
-    return f"{_saturated(result)}{_poor(result)}"
-
-
-def _saturated(result: Mapping[str, Any]) -> str:
-    found = result.get("plateau")
-    return f"; {Plateau(**found).text('the readings')}" if found else ""
-
-
 def _poor(result: Mapping[str, Any]) -> str:
+    """What a poor fit comes from, empty if it is good."""
     if not result["poor"]:
         return ""
     known = result["assessment"]
@@ -216,13 +204,13 @@ def _poor(result: Mapping[str, Any]) -> str:
 
 def _relaxing(known: Mapping[str, Any]) -> str:
     """How far readings move while the bend is held, if they do beyond noise."""
-    found = known.get("relaxation")
-    if not found or not found["mean_95"] or found["mean_95"][0] * found["mean_95"][1] <= 0:
+    creep = known.get("relaxation")
+    if not creep or not creep["mean_95"] or creep["mean_95"][0] * creep["mean_95"][1] <= 0:
         return ""
-    way = "on" if found["mean"] > 0 else "back"
+    way = "on" if creep["mean"] > 0 else "back"
     return (
-        f"; it relaxes, too: held for {found['time']:.2g} s its readings move {way} by "
-        f"{100 * abs(found['mean']):.0f} % of the span"
+        f"; it relaxes, too: held for {creep['time']:.2g} s its readings move {way} by "
+        f"{100 * abs(creep['mean']):.0f} % of the span"
     )
 
 
@@ -234,11 +222,6 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     }
 
 
-CAPTIONS = {
-    "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
-    "against unloading, and rival curves.",
-}
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     calibrate.CalibrateConfig,
@@ -249,6 +232,9 @@ EXPERIMENT = Experiment.of_folder(
     files=_files,
     check=require_solver,
     parts="pushes",
-    captions=CAPTIONS,
+    captions={
+        "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
+        "against unloading, and rival curves.",
+    },
     explained="docs/results-bench.md",
 )

@@ -23,7 +23,7 @@ def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
     """Readings against bends with the curve, residuals, both directions, and rival curves."""
     result, samples = outcome.result(), outcome.recording.samples
     known = result["assessment"]
-    drawn = [part for part in ("hysteresis", "rivals") if _has(known, part)]
+    drawn = [part for part in ("hysteresis", "rivals") if known[part] and any(known[part].values())]
     heights = (5.2, 2.6 * len(drawn))[: 1 + bool(drawn)]
     figure = style.canvas(style.WIDTH, sum(heights))
     upper, *lower = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
@@ -46,50 +46,46 @@ def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
     return {"calibrate": figure}
 
 
-def _has(known: Mapping[str, Any], part: str) -> bool:
-    return any(known[part].values()) if known[part] else False
-
-
 def _draw_speeds(above: Axes, below: Axes, s: Samples, level: Floats) -> None:
     keys = np.where(np.isnan(s.speed), -1.0, s.speed)
     known = np.unique(keys).tolist()
     for key, colour in zip(known, style.series(len(known)), strict=True):
-        here = keys == key
+        rows = keys == key
         name = "all" if key < 0 else f"{100 * key:g} cm/s"
-        label = f"{name}, {here.sum()} readings"
-        _draw_bins(above, s.counts[here], s.level[here], colour, label)
-        _draw_bins(below, s.counts[here], (level - s.level)[here], colour, "")
+        label = f"{name}, {rows.sum()} readings"
+        _draw_bins(above, s.counts[rows], s.level[rows], colour, label)
+        _draw_bins(below, s.counts[rows], (level - s.level)[rows], colour, "")
 
 
-def _draw_curve(panel: Axes, found: Mapping[str, Any]) -> None:
-    low, high = found["valid_counts"]
+def _draw_curve(panel: Axes, curve: Mapping[str, Any]) -> None:
+    low, high = curve["valid_counts"]
     axis = np.linspace(low, high, 300)
-    x = (axis - found["counts_low"]) / (found["counts_high"] - found["counts_low"])
-    z = found["polarity"] * found["slope"] * (x - found["midpoint"])
+    x = (axis - curve["counts_low"]) / (curve["counts_high"] - curve["counts_low"])
+    z = curve["polarity"] * curve["slope"] * (x - curve["midpoint"])
     panel.plot(
         axis,
         1 / (1 + np.exp(-z)),
         color=style.INK,
-        label=f"one sigmoid, R² {found['r2']:.3f}",
+        label=f"one sigmoid, R² {curve['r2']:.3f}",
         zorder=3,
     )
     panel.set_ylabel("bend, 0 straight, 1 full")
     panel.set_title(
-        f"{found['sensor_id']}: {found['trials']} pushes;\nmean ± standard deviation of each bin"
+        f"{curve['sensor_id']}: {curve['trials']} pushes;\nmean ± standard deviation of each bin"
     )
     panel.legend(fontsize=8)
 
 
-def _draw_loop(panel: Axes, found: Mapping[str, Any], samples: Samples) -> None:
+def _draw_loop(panel: Axes, loop: Mapping[str, Any], samples: Samples) -> None:
     bend, *ways = branches(samples, Pushes.of(samples))
     for name, counts, colour in zip(("loading", "unloading"), ways, style.series(2), strict=True):
-        there = np.isfinite(counts).any(axis=0)
-        panel.plot(bend[there], np.nanmean(counts[:, there], axis=0), color=colour, label=name)
-    panel.axvline(found["at_bend"], color=style.MUTED, linewidth=0.8)
+        known = np.isfinite(counts).any(axis=0)
+        panel.plot(bend[known], np.nanmean(counts[:, known], axis=0), color=colour, label=name)
+    panel.axvline(loop["at_bend"], color=style.MUTED, linewidth=0.8)
     panel.set(xlabel="bend", ylabel="mean reading [counts]")
     panel.set_title(
-        f"Hysteresis: mean {100 * abs(found['mean']):.1f} %,\nlargest "
-        f"{100 * abs(found['largest']):.1f} % of the span"
+        f"Hysteresis: mean {100 * abs(loop['mean']):.1f} %,\nlargest "
+        f"{100 * abs(loop['largest']):.1f} % of the span"
     )
     panel.legend()
 
@@ -124,11 +120,11 @@ def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
 def _draw_bins(panel: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:
     edges = np.linspace(x.min(), x.max(), _BINS + 1)
     place = np.clip(np.digitize(x, edges) - 1, 0, _BINS - 1)
-    held = [b for b in range(_BINS) if (place == b).sum() >= 2]
+    bins = [b for b in range(_BINS) if (place == b).sum() >= 2]
     panel.errorbar(
-        [float(x[place == b].mean()) for b in held],
-        [float(y[place == b].mean()) for b in held],
-        [float(y[place == b].std()) for b in held],
+        [float(x[place == b].mean()) for b in bins],
+        [float(y[place == b].mean()) for b in bins],
+        [float(y[place == b].std()) for b in bins],
         color=colour,
         marker="o",
         markersize=4,

@@ -1,4 +1,4 @@
-"""Readings of a recording: ohms and volts as the counts that a robot's board would read of them.
+"""Columns of a recording, their units, and ohms and volts as counts of a robot's board.
 
 A robot reads counts. A resistance becomes a voltage by the divider and a voltage becomes counts by
 the converter, both of `antenna.sensor`: what the simulated antenna has.
@@ -6,20 +6,29 @@ the converter, both of `antenna.sensor`: what the simulated antenna has.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from antennate.antenna.curves import Samples
 from antennate.antenna.sensor import FULL_SCALE, divider, transfer_curve
 from antennate.errors import CalibrationError
-from antennate.params.base import meaning
+from antennate.params.base import Params, meaning, number
 from antennate.robots.sensor import SensorParams
 from antennate.types import Bools, Floats, Ints
 
+TRIAL, SPEED, TIME, READING, BEND = range(5)
+"""Columns of a recording as it is read."""
+BEND_UNITS = {"1": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
+SPEED_UNITS = {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001}
+_LARGEST_BEND = {"1": 1.05, "rad": 2 * math.pi, "deg": 360.0, "m": 1.0, "mm": 1000.0}
+"""Beyond these a value was hardly meant in its unit."""
+_LARGEST_SPEED = 1.0
+"""Beyond it a speed was hardly meant in its unit [m/s]: nobody pushes an antenna faster."""
 READING_UNITS = {"counts": 1.0, "ohm": 1.0, "kohm": 1e3, "V": 1.0, "mV": 1e-3}
 _SAME = {"ω": "ohm", "ohms": "ohm", "kω": "kohm", "kohms": "kohm", "volt": "V", "volts": "V"}
 """Other names of units, in small letters; the sign for ohm is a small omega in these."""
@@ -37,6 +46,41 @@ _FAR, _FAR_OVER_NOISE = 0.3, 8.0
 _FEWEST_COUNTS = 200.0
 """Numbers that are not whole and all below this are no counts."""
 _BINS = 20
+
+
+class RecordingParams(Params):
+    """Columns and units of a recording."""
+
+    time_column: str = number("time", "1", "assumed: plain")
+    """Column of time."""
+    time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI")
+    """Its unit."""
+    counts_column: str = number("counts", "1", "assumed: plain")
+    """Column of readings."""
+    reading_unit: Literal["counts", "ohm", "kohm", "V", "mV"] = number(
+        "counts", "1", "assumed: what the board sends"
+    )
+    """Its unit; others become counts by the divider and converter of antenna.sensor."""
+    bend_column: str = number("bend", "1", "assumed: plain")
+    """Column of bend or position."""
+    bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
+        "1", "1", "assumed: 0 straight, 1 full"
+    )
+    """Its unit."""
+    bend_zero: float | None = number(None, "unit of bend", "assumed: its smallest value")
+    """Value when straight."""
+    bend_full: float | None = number(None, "unit of bend", "assumed: its largest value")
+    """Value when fully bent."""
+    trial_column: str = number("trial", "1", "assumed: plain")
+    """Column that numbers pushes, if any."""
+    speed_column: str = number("speed_m_s", "1", "assumed: plain")
+    """Column of pushing speed, if any."""
+    speed_unit: Literal["m/s", "cm/s", "mm/s"] = number("m/s", "1", "assumed: SI")
+    """Its unit."""
+    most_lost: float = number(
+        0.02, "1", "assumed: far more than the serial logs we have seen", ge=0, le=0.5
+    )
+    """Share of damaged rows, and of outliers, up to which they are left out and counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +119,26 @@ def parameters_of(unit: str) -> tuple[str, ...]:
     return _READ["ohm"] if unit in ("ohm", "kohm") else _READ["V"] if unit in ("V", "mV") else ()
 
 
-def impossible(unit: str, value: float) -> str:
-    """Why a reading in this unit cannot be one, empty if it can."""
+def expectation(place: int, value: float, name: str, params: RecordingParams) -> str:
+    """What was expected of a number that its unit hardly allows, empty if it does."""
+    unit, flag, wanted = params.reading_unit, "reading-unit", ""
+    if place == READING:
+        wanted = _reading_range(unit, value)
+    elif place == SPEED:
+        unit, flag = params.speed_unit, "speed-unit"
+        if abs(value) * SPEED_UNITS[unit] > _LARGEST_SPEED:
+            wanted = f"speeds up to {_LARGEST_SPEED:g} m/s in {name}"
+    elif place == BEND:
+        unit, flag = params.bend_unit, "bend-unit"
+        if abs(value) > _LARGEST_BEND[unit]:
+            wanted = f"at most {_LARGEST_BEND[unit]:g} in {name}"
+    if not wanted:
+        return ""
+    return f"expected {wanted}, found {value:g}; is {unit} the right --columns.{flag}?"
+
+
+def _reading_range(unit: str, value: float) -> str:
+    """The readings that a unit allows, if this one is none of them; else empty."""
     if unit == "counts":
         return "" if 0 <= value <= FULL_SCALE else f"0 to {FULL_SCALE} counts"
     if unit in ("ohm", "kohm"):
@@ -97,16 +159,7 @@ def to_counts(
         return values, None
     si = READING_UNITS[unit] * values
     corners, readings = transfer_curve(sensor)
-    used = {
-        name: (
-            float(getattr(sensor, name)),
-            str(_about(name, "unit")),
-            str(_about(name, "source"))
-            if getattr(sensor, name) == SensorParams.model_fields[name].default
-            else "given",
-        )
-        for name in parameters_of(unit)
-    }
+    used = {name: _parameter(sensor, name) for name in parameters_of(unit)}
     volts = divider(sensor, si) if unit in ("ohm", "kohm") else si
     steps = volts / _STEP
     if unit == "V" and len(np.unique(volts)) > _WINDOW:
@@ -130,12 +183,14 @@ def to_counts(
     return counts, Conversion(unit, how, used)
 
 
-def _about(name: str, what: str) -> object:
-    extra = SensorParams.model_fields[name].json_schema_extra
-    return extra[what] if isinstance(extra, dict) else ""
+def _parameter(sensor: SensorParams, name: str) -> tuple[float, str, str]:
+    """Value, unit and source of a number of the sensor; the source is `given` if a user set it."""
+    field, value = SensorParams.model_fields[name], float(getattr(sensor, name))
+    extra: Any = field.json_schema_extra
+    return value, str(extra["unit"]), str(extra["source"]) if value == field.default else "given"
 
 
-def told(conversion: Mapping[str, Any]) -> str:
+def conversion_sentence(conversion: Mapping[str, Any]) -> str:
     """How readings became counts, in a sentence; the conversion as result.json has it."""
     if not conversion["values"]:
         return f"Readings in {conversion['unit']} come in {conversion['how']}."
@@ -173,23 +228,23 @@ def outliers(samples: Samples) -> Bools:
 
 
 def _running_median(counts: Floats, trial: Ints) -> Floats:
-    found = counts.copy()
-    for number in np.unique(trial):
-        rows = np.flatnonzero(trial == number)
+    medians = counts.copy()
+    for push in np.unique(trial):
+        rows = np.flatnonzero(trial == push)
         if len(rows) < _WINDOW:
             continue
         windows = np.lib.stride_tricks.sliding_window_view(counts[rows], _WINDOW)
         half = _WINDOW // 2
         middle = np.median(windows, axis=1)
-        found[rows] = np.concatenate([np.repeat(middle[0], half), middle, [middle[-1]] * half])
-    return found
+        medians[rows] = np.concatenate([np.repeat(middle[0], half), middle, [middle[-1]] * half])
+    return medians
 
 
 def usual(samples: Samples) -> Floats:
     """Median of the readings at nearly the same bend, for each reading, shape (n,)."""
     edges = np.quantile(samples.level, np.linspace(0, 1, _BINS + 1)[1:-1])
     place = np.digitize(samples.level, edges)
-    found = np.zeros_like(samples.counts)
+    medians = np.zeros_like(samples.counts)
     for part in np.unique(place):
-        found[place == part] = np.median(samples.counts[place == part])
-    return found
+        medians[place == part] = np.median(samples.counts[place == part])
+    return medians

@@ -1,4 +1,9 @@
-"""Recordings of a pushed antenna: CSV with declared columns and units, in and out."""
+"""Recordings of a pushed antenna: CSV with declared columns and units, in and out.
+
+Clocks that wrap are unwrapped, and rows out of place are left out. A board counts micro- or
+milliseconds in 30 bits (MicroPython's ticks) or 32 (Arduino's micros and millis, this project's own
+board) and begins at 0 again.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +11,9 @@ import csv
 import hashlib
 import io
 import math
-from collections.abc import Sequence
+import re
 from dataclasses import dataclass, fields
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -15,23 +21,19 @@ import numpy as np
 from antennate.antenna.curves import Samples
 from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit_of
 from antennate.errors import CalibrationError
-from antennate.experiments.calibrate.clock import TIME_UNITS, Wrap, out_of_place, seconds, unwrapped
-from antennate.experiments.calibrate.clock import check as check_time
-from antennate.experiments.calibrate.columns import (
+from antennate.experiments.calibrate.readings import (
     BEND,
     BEND_UNITS,
     READING,
+    READING_UNITS,
     SPEED,
     SPEED_UNITS,
     TIME,
     TRIAL,
-    RecordingParams,
-    impossible,
-)
-from antennate.experiments.calibrate.readings import (
-    READING_UNITS,
     Conversion,
     Outlier,
+    RecordingParams,
+    expectation,
     outliers,
     to_counts,
     unit_named,
@@ -39,14 +41,37 @@ from antennate.experiments.calibrate.readings import (
 )
 from antennate.files import read_limited
 from antennate.robots.sensor import SensorParams
-from antennate.types import Floats, Ints
+from antennate.types import Bools, Floats, Ints
 
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+DAY = 86400.0
+_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)")
+_WRAPS = {
+    f"a clock of {bits} bits in {unit}": 2.0**bits * TIME_UNITS[unit]
+    for bits in (30, 32)
+    for unit in ("us", "ms")
+} | {"a clock that begins anew at midnight": DAY}
+"""After what time clocks begin at 0 again [s]."""
+_LONGEST_GAP = 10.0
+"""Longest time between two readings of which a wrap is believed [s]."""
+_LONGEST_PERIOD = 1.0
+"""Readings lie closer together in time [s]; 100 Hz in ms that is declared as s lies 10 s apart."""
+_FEW = 0.02
+"""Share of the rows at which time goes back from which on they are in no order."""
 _MOST_SPEEDS = 12
 """More different speeds than this were measured and not commanded."""
 _LARGEST_FILE = 50_000_000
 _NAMED = 20
 """Most rows that are named one by one."""
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
+
+
+@dataclass(frozen=True, slots=True)
+class Wrap:
+    """A clock that began at 0 again in this row of the file, and its kind."""
+
+    row: int
+    clock: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,14 +139,14 @@ def read(
     total = len(table) + len(damages)
     trial = _numbered(path, table[:, TRIAL], lines, params.trial_column)
     if rate is None:
-        t, wraps = unwrapped(table[:, TIME] * TIME_UNITS[params.time_unit], trial, lines)
-        astray = out_of_place(t, trial)
+        t, wraps = _unwrapped(table[:, TIME] * TIME_UNITS[params.time_unit], trial, lines)
+        astray = _out_of_place(t, trial)
         if astray.mean() <= params.most_lost:
             why = f"expected time to rise within a push, found {params.time_column} out of place"
             damages = sorted([*damages, *((int(line), why) for line in lines[astray])])
             table, t = table[~astray], t[~astray]
             lines, trial = lines[~astray], trial[~astray]
-        check_time(path, t, trial, lines, params.time_unit)
+        _check_time(path, t, trial, lines, params.time_unit)
     else:
         t, wraps = _counted(trial) / rate, []
     _check_share(path, damages, total, params.most_lost)
@@ -130,9 +155,16 @@ def read(
         path, params.reading_unit, readings, lines, sensor or SensorParams()
     )
     speed = _of_pushes(np.abs(table[:, SPEED]) * SPEED_UNITS[params.speed_unit], trial)
-    samples, t, far, kept = _without_outliers(Samples(counts, bend, trial, speed, lines), t, params)
+    samples = Samples(counts, bend, trial, speed, lines)
+    far, off = outliers(samples), usual(samples)
+    rows = zip(lines[far].tolist(), counts[far].tolist(), off[far].tolist(), strict=True)
+    many = bool(far.mean() > params.most_lost)
+    if not many:
+        samples = Samples(*(getattr(samples, field.name)[~far] for field in fields(Samples)))
+        t = t[~far]
     handled = Handled(
-        total, len(damages), tuple(damages[:_NAMED]), far, kept, tuple(wraps), conversion, units
+        *(total, len(damages), tuple(damages[:_NAMED]), tuple(Outlier(*row) for row in rows)),
+        *(many, tuple(wraps), conversion, units),
     )
     return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
 
@@ -141,27 +173,10 @@ def _of_pushes(speed: Floats, trial: Ints) -> Floats:
     """Speeds [m/s], shape (n,); measured ones as the median of their trial, by two digits."""
     if len(np.unique(speed[np.isfinite(speed)])) <= _MOST_SPEEDS:
         return speed
-    found = np.zeros_like(speed)
+    medians = np.zeros_like(speed)
     for push in np.unique(trial):
-        found[trial == push] = float(f"{np.median(speed[trial == push]):.2g}")
-    return found
-
-
-def _without_outliers(
-    samples: Samples, t: Floats, params: RecordingParams
-) -> tuple[Samples, Floats, tuple[Outlier, ...], bool]:
-    """Readings and times without outliers, these, and whether they are kept as there are many."""
-    far = outliers(samples)
-    found = tuple(
-        Outlier(int(row), float(value), float(other))
-        for row, value, other in zip(
-            samples.row[far], samples.counts[far], usual(samples)[far], strict=True
-        )
-    )
-    if far.mean() > params.most_lost:
-        return samples, t, found, True
-    used = Samples(*(getattr(samples, field.name)[~far] for field in fields(Samples)))
-    return used, t[~far], found, False
+        medians[trial == push] = float(f"{np.median(speed[trial == push]):.2g}")
+    return medians
 
 
 def _numbered(path: Path, trial: Floats, lines: Ints, name: str) -> Ints:
@@ -181,8 +196,8 @@ def _counted(trial: Ints) -> Ints:
     """How many readings of the same push came before each, shape (n,)."""
     before = np.zeros_like(trial)
     for push in np.unique(trial):
-        here = trial == push
-        before[here] = np.arange(here.sum())
+        readings = trial == push
+        before[readings] = np.arange(readings.sum())
     return before
 
 
@@ -206,7 +221,10 @@ def _rows(
             "leave out --rate"
         )
     names = (params.trial_column, params.speed_column, params.time_column, *needed[-2:])
-    places = _places(path, header, names)
+    for name in names:
+        if header.count(name) > 1:
+            raise CalibrationError(f"{path}: row 1: expected one column {name}, found several")
+    places = [column(header, name) for name in names]
     units = _units(path, header, places, params)
     rows, numbers, damages = list[list[float]](), list[int](), list[tuple[int, str]]()
     for line, cells in lines:
@@ -231,40 +249,33 @@ def _check_share(path: Path, damages: list[tuple[int, str]], rows: int, most: fl
     raise CalibrationError(f"{path}: row {line}: {why}{more}")
 
 
-def _places(path: Path, header: list[str], names: Sequence[str]) -> list[int | None]:
-    for name in names:
-        if header.count(name) > 1:
-            raise CalibrationError(f"{path}: row 1: expected one column {name}, found several")
-    return [column(header, name) for name in names]
-
-
 def _units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
 ) -> tuple[str, ...]:
-    """Where a unit is declared against that in the name of its column: it is taken, and told."""
+    """Sentences on units that are declared against those in the names of their columns."""
     columns = (
         (places[1], SPEED_UNITS, "speed_unit"),
         (places[2], TIME_UNITS, "time_unit"),
         (places[3], (*READING_UNITS, "%"), "reading_unit"),
         (places[4], BEND_UNITS, "bend_unit"),
     )
-    told = list[str]()
+    sentences = list[str]()
     for place, known, field in columns:
         if place is None:
             continue
-        named, taken = unit_of(header[place], known), getattr(params, field)
+        named, declared = unit_of(header[place], known), getattr(params, field)
         plain = unit_named(named) if field == "reading_unit" else named
-        if plain not in known or plain == taken:
+        if plain not in known or plain == declared:
             continue
         if field not in params.model_fields_set:
             raise CalibrationError(
-                f"{path}: row 1: expected {header[place]} in {taken} unless declared, found "
+                f"{path}: row 1: expected {header[place]} in {declared} unless declared, found "
                 f"{named}; declare its unit with --columns.{field.replace('_', '-')}"
             )
-        told.append(
-            f"{header[place]} is taken in {taken} as declared, though its name says {named}."
+        sentences.append(
+            f"{header[place]} is taken in {declared} as declared, though its name says {named}."
         )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def _values(
@@ -284,16 +295,16 @@ def _values(
             values.append(math.nan)
             continue
         cell = cells[place]
-        found = f"in {header[place]}, found {cell[:40]!r}"
+        where = f"in {header[place]}, found {cell[:40]!r}"
         try:
             value = number_of(cell)
         except ValueError as error:
-            return f"expected {error} {found}"
-        if i == TIME and (clock := seconds(cell)) is not None:
+            return f"expected {error} {where}"
+        if i == TIME and (clock := _seconds(cell)) is not None:
             value = clock / TIME_UNITS[params.time_unit]
         if not math.isfinite(value):
-            return f"expected a finite number {found}; delete the row"
-        if why := impossible(i, value, header[place], params):
+            return f"expected a finite number {where}; delete the row"
+        if why := expectation(i, value, header[place], params):
             return why
         values.append(value)
     return values
@@ -313,19 +324,81 @@ def _normalised(path: Path, lines: Ints, raw: Floats, params: RecordingParams) -
     return (raw - zero) / (full - zero)
 
 
+def _seconds(cell: str) -> float | None:
+    """The seconds of a time of day such as 13:08:29.5, with or without a date; None if it is none.
+
+    With a date they count from its calendar's beginning, else from midnight.
+    """
+    clock = _CLOCK.fullmatch(cell.strip())
+    if clock is None:
+        return None
+    day, hour, minute, second = clock.groups()
+    try:
+        days = date.fromisoformat(day).toordinal() if day else 0
+    except ValueError:
+        return None
+    return DAY * days + 3600 * int(hour) + 60 * int(minute) + float(second)
+
+
+def _unwrapped(t: Floats, trial: Ints, rows: Ints) -> tuple[Floats, list[Wrap]]:
+    """Times [s] of a clock that wraps, made to rise within each trial, and where it wrapped."""
+    added, wraps = np.zeros_like(t), list[Wrap]()
+    falls = np.flatnonzero((np.diff(t) < 0) & (np.diff(trial) == 0)) + 1
+    for at in falls.tolist():
+        for clock, span in _WRAPS.items():
+            gap = float(t[at] + span - t[at - 1])
+            if t[at - 1] <= span and t[at] >= 0 and 0 < gap < _LONGEST_GAP:
+                later = np.arange(len(t)) >= at
+                added[later & (trial == trial[at])] += span
+                wraps.append(Wrap(int(rows[at]), clock))
+                break
+    return t + added, wraps
+
+
+def _out_of_place(t: Floats, trial: Ints) -> Bools:
+    """Rows whose time alone is out of order: both neighbours are in order without it, (n,)."""
+    astray = np.zeros(len(t), bool)
+    if len(t) > 2:
+        same_push = (trial[:-2] == trial[1:-1]) & (trial[1:-1] == trial[2:])
+        between = (t[:-2] < t[1:-1]) & (t[1:-1] < t[2:])
+        astray[1:-1] = same_push & (t[:-2] < t[2:]) & ~between
+        astray[1:-1] &= ~astray[:-2]
+    return astray
+
+
+def _check_time(path: Path, t: Floats, trial: Ints, rows: Ints, unit: str) -> None:
+    """Refuse times that do not rise within a push, or lie too far apart."""
+    same = np.diff(trial) == 0
+    steps, at = np.diff(t)[same], rows[1:][same]
+    if (steps <= 0).any():
+        first = int(np.argmax(steps <= 0))
+        before = t[:-1][same][first]
+        if steps[first] == 0:
+            why = f"standing at {before:g} s; write finer times, or leave them out and give --rate"
+        elif (steps < 0).mean() > _FEW:
+            why = "going up and down; sort the rows of each push"
+        else:
+            why = (
+                f"going back from {before:g} to {before + steps[first]:g} s: another recording, or "
+                "a board that began anew; number pushes in a column trial"
+            )
+        raise CalibrationError(
+            f"{path}: row {at[first]}: expected time to rise within a push, found it {why}"
+        )
+    if len(steps) and np.median(steps) > _LONGEST_PERIOD:
+        raise CalibrationError(
+            f"{path}: row {at[0]}: expected readings less than {_LONGEST_PERIOD:g} s apart, found "
+            f"{np.median(steps):g} s; is {unit} the right --columns.time-unit?"
+        )
+
+
 def write(recording: Recording) -> str:
     """A recording as CSV with the default columns and units."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
     s = recording.samples
-    for trial, speed, t, counts, bend in zip(
-        s.trial.tolist(),
-        s.speed.tolist(),
-        recording.t.tolist(),
-        s.counts.tolist(),
-        s.level.tolist(),
-        strict=True,
-    ):
+    columns = (s.trial, s.speed, recording.t, s.counts, s.level)
+    for trial, speed, t, counts, bend in zip(*(c.tolist() for c in columns), strict=True):
         writer.writerow([trial, repr(speed), f"{t:.6f}", f"{counts:g}", repr(bend)])
     return file.getvalue()

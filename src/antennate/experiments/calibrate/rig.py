@@ -70,8 +70,8 @@ class Push:
             SimulationError: The physics became invalid.
         """
         t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
-        told = self._told(t)
-        flex, y = self._on_chain(told) if solver == "chain" else self._on_engine(told, watch)
+        rod = self._commands(t)
+        flex, y = self._on_chain(rod) if solver == "chain" else self._on_engine(rod, watch)
         return t, flex, y + self._touch
 
     @property
@@ -84,7 +84,7 @@ class Push:
         """Physics steps of a command."""
         return round(_COMMAND_PERIOD / self.physics.timestep)
 
-    def _told(self, t: Floats) -> Floats:
+    def _commands(self, t: Floats) -> Floats:
         """Places [m] and speeds [m/s] commanded to the rod along y, shape (ticks, commands, 2)."""
         count = round(1.0 / self.antenna.sensor.rate / _COMMAND_PERIOD)
         way = self.speed * (t[:, None] + np.arange(1, count + 1) * _COMMAND_PERIOD)
@@ -93,7 +93,7 @@ class Push:
         y = -self._touch - self.gap + np.where(back, 2 * whole - way, way)
         return np.stack([y, np.where(back, -self.speed, self.speed)], axis=-1)
 
-    def _on_engine(self, told: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
+    def _on_engine(self, places: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
         """Flex [rad] and place of the rod [m] before the commands of each tick."""
         model = compile_bench(self.physics, self.antenna, probe_radius=self.rig.rod_radius)
         for i, factor in enumerate(self.factors):
@@ -103,7 +103,7 @@ class Push:
         bench.place(0.0, 0.0, 0.0)
         rod.place(self.rig.place, -self._touch - self.gap)
         rows: list[tuple[float, float]] = []
-        for commands in told.tolist():
+        for commands in places.tolist():
             rows.append((bench.flex(), float(rod.position[1])))
             for y, speed in commands:
                 rod.command(self.rig.place, y, 0.0, speed)
@@ -111,18 +111,18 @@ class Push:
         flex, y = np.array(rows).T
         return flex, y
 
-    def _on_chain(self, told: Floats) -> tuple[Floats, Floats]:
+    def _on_chain(self, places: Floats) -> tuple[Floats, Floats]:
         """As `_on_engine`, all commands at once."""
         bench = ChainBench(
             self.physics, self.antenna, (), (0.0, 0.0), self.rig.rod_radius, self.factors
         )
         start = -self._touch - self.gap
         bench.place_probe(self.rig.place, start)
-        y, speed = told[:-1].reshape(-1, 2).T
+        y, speed = places[:-1].reshape(-1, 2).T
         still = np.zeros((len(y), 2))
         rod = np.column_stack([np.full_like(y, self.rig.place), y])
         speeds = np.column_stack([np.zeros_like(y), speed])
         whole = bench.drive(bench.commands(still, still, 0.0, rod, speeds), self._steps)
-        seen = whole[told.shape[1] - 1 :: told.shape[1]]
-        flex = seen.hinges[:, : self.antenna.sensed_hinges].sum(axis=1)
-        return np.append(0.0, flex), np.append(start, seen.probe[:, 1])
+        ticks = whole[places.shape[1] - 1 :: places.shape[1]]
+        flex = ticks.hinges[:, : self.antenna.sensed_hinges].sum(axis=1)
+        return np.append(0.0, flex), np.append(start, ticks.probe[:, 1])

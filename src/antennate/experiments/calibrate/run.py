@@ -19,7 +19,7 @@ from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
 from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
-from antennate.antenna.plateau import Plateau, plateau_of, white_noise
+from antennate.antenna.plateau import plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
@@ -141,6 +141,8 @@ class CalibrateOutcome(Outcome):
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
+        samples = self.raw.samples
+        plateau = plateau_of(samples.counts, samples.level)
         return {
             "schema": 1,
             "command": "calibrate",
@@ -149,7 +151,7 @@ class CalibrateOutcome(Outcome):
             "poor": self.calibration.r2 < self.config.good_r2,
             "hysteretic": self._hysteretic(),
             "recording": None if self.raw.handled is None else asdict(self.raw.handled),
-            "plateau": None if (found := self._plateau()) is None else asdict(found),
+            "plateau": None if plateau is None else asdict(plateau),
             "calibration": self.calibration.model_dump(mode="json"),
             "assessment": asdict(self.assessment),
         }
@@ -159,16 +161,11 @@ class CalibrateOutcome(Outcome):
 
         That is: each well, or with half the variance left or less.
         """
-        found, good, r2 = self.assessment.hysteresis, self.config.good_r2, self.calibration.r2
-        if found is None or r2 >= good:
+        loop, good, r2 = self.assessment.hysteresis, self.config.good_r2, self.calibration.r2
+        if loop is None or r2 >= good:
             return False
-        alone = min(found.one_way_r2)
+        alone = min(loop.one_way_r2)
         return alone >= good or 1.0 - alone <= (1.0 - r2) / 2.0
-
-    def _plateau(self) -> Plateau | None:
-        """Readings that stand at their highest, too few to refuse them."""
-        samples = self.raw.samples
-        return plateau_of(samples.counts, samples.level)
 
     def levels(self) -> Floats:
         """Bending levels that the calibration gives its own data, shape (n,)."""
@@ -176,9 +173,9 @@ class CalibrateOutcome(Outcome):
 
     def conditioning_toml(self) -> str:
         """The curve as keys of a configuration file, with the kind of a simulated fsr sensor."""
-        found = self.calibration.conditioning()
+        curve = self.calibration.conditioning()
         keys = ("midpoint", "slope", "polarity", "counts_low", "counts_high")
-        lines = [f"{key} = {getattr(found, key)!r}" for key in keys]
+        lines = [f"{key} = {getattr(curve, key)!r}" for key in keys]
         kind = self.config.antenna.sensor.kind
         if self.config.recording is None and kind != SensorParams().kind:
             lines += ["", "[robot.antenna.sensor]", f'kind = "{kind}"']
@@ -250,12 +247,6 @@ def averaged(recording: Recording, averaging_time: float) -> Recording:
     return replace(recording, samples=replace(s, counts=counts))
 
 
-def _noise(samples: Samples) -> float | None:
-    """Noise of single readings [counts], None if it cannot be told."""
-    noise = white_noise(samples.counts, samples.trial)
-    return float(noise) if np.isfinite(noise) else None
-
-
 def run(
     config: CalibrateConfig,
     workers: int | Workers = 1,
@@ -275,20 +266,21 @@ def run(
     used = averaged(raw, config.averaging_time)
     pushes = Pushes.of(used.samples)
     used = replace(used, samples=replace(used.samples, trial=pushes.number))
+    noise = float(white_noise(raw.samples.counts, raw.samples.trial))
     try:
-        found = fitting.fit(
+        calibration = fitting.fit(
             used.samples,
             config.sensor_id or ("unnamed" if config.recording else "simulated"),
             raw.sha256,
             config.threshold,
             config.full_scale,
             config.least_r2,
-            _noise(raw.samples),
+            noise if np.isfinite(noise) else None,
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""
         raise CalibrationError(f"{where}{error}{_hysteresis(used.samples, pushes)}") from None
-    return CalibrateOutcome(config, used, raw, found)
+    return CalibrateOutcome(config, used, raw, calibration)
 
 
 def _hysteresis(samples: Samples, pushes: Pushes) -> str:

@@ -1,4 +1,4 @@
-"""What `antennate design` is told."""
+"""What `study design` is told."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Evaluation(Strict):
 
 
 class DesignConfig(Params):
-    """Everything that decides the outcome of `antennate design`."""
+    """Everything that decides the outcome of `study design`."""
 
     proposals: int = number(
         40, "1", "assumed: four times what is drawn before the sampler learns", ge=1, le=100000

@@ -1,4 +1,4 @@
-"""The figure of `antennate design`: every two objectives against one another."""
+"""The figure of `study design`: every two objectives against one another."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def _place(joints: Floats, post: Ball) -> float:
 
 
 class ForceConfig(Params):
-    """Everything that decides the outcome of `antennate force`."""
+    """Everything that decides the outcome of `bench force`."""
 
     unread: ClassVar[tuple[str, ...]] = ("antenna.base_angle", "antenna.base_spacing")
     seed: int = number(0, "1", "assumed: any", ge=0)

@@ -1,16 +1,171 @@
-"""The experiment `reproduce`."""
+"""Run the experiments that the claims need, one after the other, and judge every claim.
+
+In the report the claims stand each with its criterion, its numbers and its figure.
+"""
 
 from __future__ import annotations
 
+import shlex
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from html import escape
 from typing import Any
 
-from antennate.experiments.reproduce.page import body
-from antennate.experiments.reproduce.run import CLAIMS, ReproduceConfig, run
-from antennate.experiments.reproduce.verdict import VERDICTS
-from antennate.studies.experiment import Experiment
+from antennate import experiments
+from antennate.experiments.reproduce.antenna_claims import ANTENNA
+from antennate.experiments.reproduce.robot_claims import ROBOT
+from antennate.experiments.reproduce.verdict import (
+    MEANINGS,
+    VERDICTS,
+    Claim,
+    Finding,
+    Row,
+    verdict,
+)
+from antennate.messages import command_words
+from antennate.params.base import Params, number
+from antennate.params.control import ConditioningParams
+from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.measures import Table
+from antennate.studies.pool import Workers, workers_from
 from antennate.studies.run_files import REPORT
+
+CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)
+"""All claims, in the order of the page."""
+_CALIBRATE = {"averaging_time": ConditioningParams().averaging_time}
+"""The paper averages readings; a controller of ours does it over this time by default."""
+QUICK: Mapping[str, Mapping[str, Any]] = {
+    "springs": {},
+    "taper": {},
+    "calibrate": _CALIBRATE,
+    "force": {"profiles": ("descending",), "traverses": 6},
+    "touch": {"profiles": ("descending",), "speeds": (0.1,), "trials": 2},
+    "sweep": {"profiles": ("descending",)},
+    "gait": {"cycles": 2, "settling_cycles": 1, "sweep_points": 8},
+    "wall": {"trials": 6},
+    "tunnel": {"trials": 10},
+}
+"""Settings of each experiment with `quick`."""
+FULL: Mapping[str, Mapping[str, Any]] = {
+    **{name: {} for name in QUICK},
+    "calibrate": _CALIBRATE,
+    "tunnel": {"trials": 100},
+}
+"""Its settings otherwise: its defaults, and more tunnels."""
+_WITHOUT_CHANCE = {"gait"}
+"""Takes a seed only for draws of what is not known, and draws nothing here."""
+_PARTS = 100
+_LOOK = {
+    "reproduced": "good",
+    "conditional": "fair",
+    "fitted": "muted",
+    "not_reproduced": "bad",
+    "undecided": "muted",
+}
+
+
+class ReproduceConfig(Params):
+    """Everything that decides the outcome of `antennate reproduce`."""
+
+    quick: bool = number(False, "1", "assumed: all trials")
+    """Few trials: minutes in place of half an hour, and wider intervals."""
+    seed: int = number(7, "1", "assumed: any; nothing was chosen on it", ge=0)
+    """Seed of all chance, in every experiment."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReproduceOutcome:
+    """All claims that could be judged, with what was found."""
+
+    config: ReproduceConfig
+    judged: tuple[tuple[Claim, Finding], ...]
+    interrupted: bool
+
+    @property
+    def rows(self) -> list[Row]:
+        """One row a claim."""
+        return [
+            Row(
+                *(c.claim, c.criterion, c.rival, c.paper, f.ours, verdict(f.holds, c.best)),
+                *(f.reason, command(c.experiment, self.config)),
+            )
+            for c, f in self.judged
+        ]
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        counts = Counter(row.verdict for row in self.rows)
+        return {
+            "schema": 1,
+            "command": "reproduce",
+            "quick": self.config.quick,
+            "seed": self.config.seed,
+            "interrupted": self.interrupted,
+            "verdicts": {name: counts[name] for name in VERDICTS},
+            "claims": [asdict(row) for row in self.rows],
+        }
+
+
+def settings(name: str, config: ReproduceConfig) -> dict[str, Any]:
+    """Settings of an experiment."""
+    values = dict((QUICK if config.quick else FULL)[name])
+    fields = experiments.load(name).config.model_fields
+    chance = "seed" in fields and name not in _WITHOUT_CHANCE
+    return values | ({"seed": config.seed} if chance else {})
+
+
+def command(name: str, config: ReproduceConfig) -> str:
+    """The command that runs this part alone."""
+    return shlex.join(["antennate", *command_words(name).split(), *_flags(settings(name, config))])
+
+
+def _flags(values: Mapping[str, Any], prefix: str = "--") -> list[str]:
+    words: list[str] = []
+    for key, value in values.items():
+        name = prefix + key.replace("_", "-")
+        if isinstance(value, Mapping):
+            words += _flags(value, f"{name}.")
+        elif isinstance(value, tuple):
+            words += [name, *map(str, value)]
+        else:
+            words += [name, str(value)]
+    return words
+
+
+def run(
+    config: ReproduceConfig,
+    workers: int | Workers = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+) -> ReproduceOutcome:
+    """Run everything and judge it. What was judged before an interruption is kept.
+
+    Raises:
+        AntennateError: An experiment failed.
+    """
+    judged: list[tuple[Claim, Finding]] = []
+    names = list(QUICK)
+    for i, name in enumerate(names):
+        experiment = experiments.load(name)
+
+        def step(done: int, total: int, before: int = _PARTS * i) -> None:
+            on_step(before + _PARTS * done // total, _PARTS * len(names))
+
+        configured = experiment.config.model_validate(settings(name, config))
+        try:
+            result = experiment.run(configured, workers_from(workers), step, no_row).result()
+        except KeyboardInterrupt:
+            result = {"interrupted": True}
+        if result.get("interrupted"):
+            return ReproduceOutcome(config, tuple(judged), interrupted=True)
+        step(1, 1)
+        new = [(claim, claim.judge(result)) for claim in CLAIMS if claim.experiment == name]
+        judged += new
+        for row in ReproduceOutcome(config, tuple(new), interrupted=False).rows:
+            on_row(row)
+    judged.sort(key=lambda pair: CLAIMS.index(pair[0]))
+    return ReproduceOutcome(config, tuple(judged), interrupted=False)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -28,13 +183,74 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def sentence(result: Mapping[str, Any]) -> str:
     """How many claims hold."""
-    found = ", ".join(
-        f"{result['verdicts'].get(name, 0)} {text}" for name, text in VERDICTS.items()
-    )
     few = " With --quick the intervals are wide." if result["quick"] else ""
     unjudged = len(CLAIMS) - len(result["claims"])
     left = f", {unjudged} not judged" if unjudged else ""
-    return f"Of {len(CLAIMS)} claims: {found}{left}.{few}"
+    return f"Of {len(CLAIMS)} claims: {_counts(result)}{left}.{few}"
+
+
+def _counts(result: Mapping[str, Any]) -> str:
+    """How many claims have each verdict."""
+    return ", ".join(f"{result['verdicts'].get(n, 0)} {text}" for n, text in VERDICTS.items())
+
+
+def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
+    """HTML of a result, with the figure of each claim by its name."""
+    summary = _counts(result)
+    how = "few trials (--quick)" if result["quick"] else "all trials"
+    names = {claim.claim: claim for claim in CLAIMS}
+    words = "".join(f"<dt>{VERDICTS[name]}</dt><dd>{MEANINGS[name]}</dd>" for name in VERDICTS)
+    rows = [(row, names.get(row["claim"])) for row in result["claims"]]
+    index = "".join(_line(row, claim.name if claim else "") for row, claim in rows)
+    sections = "".join(
+        _section(row, claim.name, claim.rule, figures.get(claim.name, ""))
+        for row, claim in rows
+        if claim is not None
+    )
+    return (
+        "<h2>The paper, claim by claim</h2>"
+        "<p>A Robust Antenna Provides Tactile Feedback in a Multi-legged Robot, "
+        "arXiv:2603.07795, beside what antennate finds in simulation. Claims are in our words.</p>"
+        f"<p><strong>{summary}.</strong></p>"
+        f'<p class="muted">{how}, seed {result["seed"]}. '
+        f"Intervals are 95 %.</p><dl>{words}</dl>"
+        "<table><thead><tr><th>claim</th><th class=wide>criterion</th><th class=wide>paper</th>"
+        "<th class=wide>ours</th>"
+        f"<th>verdict</th></tr></thead><tbody>{index}</tbody></table>{sections}"
+    )
+
+
+def _verdict(row: Mapping[str, Any]) -> str:
+    """A verdict in its colour."""
+    verdict = row["verdict"]
+    return f'<span class="{_LOOK[verdict]}">{VERDICTS[verdict]}</span>'
+
+
+def _line(row: Mapping[str, Any], name: str) -> str:
+    """A line of the table, which leads to the claim's section."""
+    return (
+        f'<tr><td><a href="#{name}">{escape(row["claim"])}</a></td>'
+        f"<td class=wide>{escape(row.get('criterion', ''))}</td>"
+        f"<td class=wide>{escape(row['paper'])}</td><td class=wide>{escape(row['ours'])}</td>"
+        f"<td>{_verdict(row)}</td></tr>"
+    )
+
+
+def _section(row: Mapping[str, Any], name: str, rule: str, figure: str) -> str:
+    """All that is said of a claim, with its figure."""
+    facts = {
+        "criterion": escape(rule),
+        "paper": escape(row["paper"]),
+        "ours": escape(row["ours"]),
+        "verdict": _verdict(row),
+        "why": escape(row["reason"]),
+    }
+    words = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in facts.items())
+    return (
+        f'<section id="{name}"><h2>{escape(row["claim"])}</h2>'
+        f"<dl>{words}</dl>"
+        f"<div>{figure}<p><code>{escape(row['command'])}</code></p></div></section>"
+    )
 
 
 EXPERIMENT = Experiment.of_folder(

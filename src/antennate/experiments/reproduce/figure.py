@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from antennate.experiments.reproduce.run import ReproduceOutcome
+from antennate.experiments.reproduce.experiment import ReproduceOutcome
 from antennate.experiments.reproduce.verdict import Claim, Finding
 from antennate.figures import INK, SERIES, canvas, styled
 

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.experiments.servo.checks import FEWEST, check_course
-from antennate.experiments.servo.config import ServoConfig
-from antennate.experiments.servo.recording import Recording
+from antennate.experiments.servo.recording import FEWEST, Recording, ServoConfig, check_course
 from antennate.files import open_regular
 from antennate.messages import nearest, shown
 from antennate.robots.spec import RobotSpec
@@ -58,7 +56,11 @@ def read(path: Path, config: ServoConfig) -> Recording:
     with LogReader(path) as log:
         robot = log.header.robot
         place = _place(path, robot, config)
-        ticks = [tick for tick in log if tick.positions and _finite(tick, place)]
+        ticks = [
+            tick
+            for tick in log
+            if tick.positions and math.isfinite(tick.angles[place] + tick.positions[place])
+        ]
     if len(ticks) < FEWEST:
         raise BadInputError(
             f"{path}: expected at least {FEWEST} ticks with a measured position of {config.joint}, "
@@ -91,10 +93,10 @@ def _place(path: Path, robot: RobotSpec, config: ServoConfig) -> int:
     rolling = set(robot.leg_names if robot.legs.kind == "rolling" else ())
     names = [name for name in robot.joint_names if name not in rolling]
     if config.joint not in names:
-        found = "none" if config.joint is None else shown(config.joint)
+        joint = "none" if config.joint is None else shown(config.joint)
         raise BadInputError(
             f"{path}: a log needs --joint, one of {', '.join(names)}"
-            f"{nearest(config.joint or '', names)}, found {found}"
+            f"{nearest(config.joint or '', names)}, found {joint}"
         )
     place = robot.joint_names.index(config.joint)
     servo = robot.servo_names[place]
@@ -103,11 +105,6 @@ def _place(path: Path, robot: RobotSpec, config: ServoConfig) -> int:
             f"{path}: expected --servo {servo}, the servo of {config.joint}, found {config.servo}"
         )
     return place
-
-
-def _finite(tick: Tick, place: int) -> bool:
-    """Whether goal and position of a joint are known."""
-    return math.isfinite(tick.angles[place] + tick.positions[place])
 
 
 def _goals(ticks: list[Tick], place: int) -> Floats:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments.servo import run as servo
-from antennate.experiments.servo.config import ServoConfig
-from antennate.experiments.servo.stalls import SEEN
+from antennate.experiments.servo.recording import ServoConfig
+from antennate.experiments.servo.run import SEEN, run
 from antennate.robots.servo_model import NAMES
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
@@ -41,18 +40,18 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     title = f"Models of {result['servo']}: {ERROR.title}"
     compared = Table(title, ["all", *left], rows, _note(result))
-    each = _recordings(result)
+    recordings = _recordings(result)
     sheet = result["models"][0]
     columns: dict[str, Any] = {sheet["name"]: sheet}
     if not result["fitted"]:
         columns[whole["name"]] = whole
-        return compared, each, Table.of("Parameters", columns, PARAMETERS)
+        return compared, recordings, Table.of("Parameters", columns, PARAMETERS)
     for model in result["models"][-2:]:
         columns[model["name"]] = model
         ends = {name: model["interval_95"].get(name) for name in NAMES}
         columns[f"{model['name']}, 95 %"] = ends
     note = f"Intervals are over {result['interval_over']}."
-    return compared, each, Table.of("Parameters", columns, PARAMETERS, note)
+    return compared, recordings, Table.of("Parameters", columns, PARAMETERS, note)
 
 
 def _recordings(result: Mapping[str, Any]) -> Table:
@@ -66,8 +65,7 @@ def _recordings(result: Mapping[str, Any]) -> Table:
 
 def _stalls(result: Mapping[str, Any]) -> list[str]:
     """What is told of recordings in which a real servo stands still at full drive."""
-    found = [row for row in result["recordings"] if (row["stalled"] or 0.0) >= SEEN]
-    return [_stall(row) for row in found]
+    return [_stall(row) for row in result["recordings"] if (row["stalled"] or 0.0) >= SEEN]
 
 
 def _stall(row: Mapping[str, Any]) -> str:
@@ -89,10 +87,12 @@ def _stall(row: Mapping[str, Any]) -> str:
 
 
 def _note(result: Mapping[str, Any]) -> str:
-    told = [row["gain_divisor"] for row in result["recordings"] if row["gain_divisor"] is not None]
+    """How many recordings, and what they tell of gain and supply."""
+    known = [row["gain_divisor"] for row in result["recordings"] if row["gain_divisor"] is not None]
     drive = (
-        f"Drive over position error at rest tells a divisor of {min(told):.1f} to {max(told):.1f}."
-        if told
+        f"Drive over position error at rest tells a divisor of {min(known):.1f} to "
+        f"{max(known):.1f}."
+        if known
         else "No recording tells the drive at rest: the divisor of the gain is the one given."
     )
     unknown = any(row["supply_v"] is None for row in result["recordings"])
@@ -126,7 +126,7 @@ def _sentence(result: Mapping[str, Any]) -> str:
             "average; --fit identifies it."
         )
     text = f"The whole model misses the measured position by {model['error_deg']:.1f}° where it was"
-    known = {name: each for name, each in model["held_out_deg"].items() if each is not None}
+    known = {name: error for name, error in model["held_out_deg"].items() if error is not None}
     if not known:
         return (
             f"{text} fitted; of no part of the recordings an error could be found with a fit to "
@@ -136,20 +136,18 @@ def _sentence(result: Mapping[str, Any]) -> str:
     return f"{text} fitted and, fitted on the rest, by {held}."
 
 
-CAPTIONS = {
-    "servo": "Goals and measured positions of each recording, with those of two models; shaded: "
-    "full drive while the shaft rests.",
-    "recordings": "Mean error of each recording with the last model, while it stalls and else.",
-}
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     ServoConfig,
-    lambda config, workers, on_step, _: servo.run(config, on_step),
+    lambda config, workers, on_step, _: run(config, on_step),
     tables,
     sentence,
     parts="fits",
-    captions=CAPTIONS,
+    captions={
+        "servo": "Goals and measured positions of each recording, with those of two models; "
+        "shaded: full drive while the shaft rests.",
+        "recordings": "Mean error of each recording with the last model, while it stalls and else.",
+    },
     explained="docs/results-bench.md",
     on_workers=False,
 )

@@ -7,8 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.servo.run import SHOWN, ServoOutcome
-from antennate.experiments.servo.stalls import stalled
+from antennate.experiments.servo.run import SHOWN, ServoOutcome, stalled
 from antennate.robots.servo_model import STEP
 from antennate.types import Floats
 
@@ -27,11 +26,11 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
         _draw(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    return {"servo": figure, "recordings": by_recording(outcome)}
+    return {"servo": figure, "recordings": _by_recording(outcome)}
 
 
 @style.styled
-def by_recording(outcome: ServoOutcome) -> Figure:
+def _by_recording(outcome: ServoOutcome) -> Figure:
     """The error of each recording: over all, while the shaft stalls, and else."""
     rows = outcome.rows
     figure = style.canvas(style.WIDTH, 1.2 + 0.3 * len(rows))

@@ -1,4 +1,4 @@
-"""Identify servo models from recordings: many fits at once.
+"""Servo models, and their fits to recordings: many at once.
 
 Each fit minimises a robust error of the positions (soft L1, 3°) by Levenberg-Marquardt, for its own
 free parameters and its own weights of the pieces of the recordings. Sizes are searched on a
@@ -7,12 +7,14 @@ logarithmic scale, frictions on a linear one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from antennate.experiments.servo.recording import GRAVITY, Recording, ServoConfig
 from antennate.jackknife import jackknife95
-from antennate.robots.servo_model import NAMES, STEP, Course, replay
+from antennate.robots.servo_model import NAMES, STEP, Course, replay, values_of
 from antennate.types import Bools, Floats, Ints
 
 EVERY = 5
@@ -36,6 +38,14 @@ _STUCK = 1e4
 """It is done, too, when no shorter step than that of this damping improves it."""
 _CHUNK = 24
 """Fits that are simulated together; more would need more memory."""
+_SMOOTHING = 0.05
+"""Speeds are means over this time [s]."""
+_MANUAL = 128.0
+"""Divisor of the gain in the block diagram of the manual of X servos."""
+_START = {"gain_divisor": 180.0, "armature": 0.001, "friction": 0.01, "load_friction": 0.2}
+"""Where fits begin, whatever the parameters say; torque and speed begin at the data sheet's."""
+_LINE = ("stall_torque", "no_load_speed")
+_FRICTION = ("friction", "load_friction")
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,132 @@ class Data:
         return np.array(
             [self.known[::EVERY][piece == k].any(axis=0) for k in range(piece[-1] + 1)]
         ).T
+
+
+def data_of(recordings: list[Recording], voltage: float, inertia: float) -> Data:
+    """All recordings as one course, each ends in times that do not count.
+
+    Args:
+        recordings: F recordings.
+        voltage: Nominal voltage of the servo [V]; taken where a supply is not known.
+        inertia: Inertia of the loads beside that of their masses [kg·m²].
+    """
+    longest = max(r.t[-1] for r in recordings)
+    grid = np.arange(math.floor(longest / STEP + 1e-9) + 1) * STEP
+    indices = [
+        np.clip(np.searchsorted(r.t, grid + STEP / 2, "right") - 1, 0, None) for r in recordings
+    ]
+    pairs = list(zip(recordings, indices, strict=True))
+    position = np.array([np.interp(grid, r.t, r.position) for r in recordings]).T
+    course = Course(
+        goal=np.array([r.goal[i] for r, i in pairs]).T,
+        torque=np.array([r.torque[i] for r, i in pairs]).T,
+        supply=np.array([np.nan_to_num(r.supply[i] / voltage, nan=1.0) for r, i in pairs]).T,
+        position=position,
+        speed=_smoothed_speed(position),
+        p_gain=np.array([r.p_gain for r in recordings]),
+        inertia=np.array([r.mass * r.length**2 + inertia for r in recordings]),
+        gravity=np.array([r.mass * GRAVITY * r.length for r in recordings]),
+    )
+    return Data(course, np.array([r.known[i] & (grid <= r.t[-1]) for r, i in pairs]).T)
+
+
+def _smoothed_speed(position: Floats) -> Floats:
+    """Speeds [rad/s] of positions (T, F), smoothed."""
+    width = round(_SMOOTHING / STEP)
+    kernel = np.ones(width) / width
+    slopes = np.gradient(position, STEP, axis=0)
+    return np.array([np.convolve(column, kernel, "same") for column in slopes.T]).T
+
+
+@dataclass(frozen=True)
+class Model:
+    """A servo model: where its parameters begin, and which of them are fitted.
+
+    Attributes:
+        values: Parameters, shape (6,).
+        free: Names of those that are fitted.
+    """
+
+    name: str
+    values: Floats
+    free: tuple[str, ...] = ()
+
+    @property
+    def mask(self) -> Bools:
+        """Which parameters are fitted, shape (6,)."""
+        return np.array([name in self.free for name in NAMES])
+
+
+Held = tuple[str, Bools]
+"""A part that a fit did not see: what was left out, and its pieces, shape (F, K)."""
+
+
+def measured_divisor(recordings: list[Recording]) -> float | None:
+    """Divisor of the gain as the drive of recordings tells it; None if none does."""
+    divisors = [d for recording in recordings if (d := recording.divisor()) is not None]
+    return float(np.median(divisors)) if divisors else None
+
+
+def models(config: ServoConfig, measured: float | None, loaded: bool) -> list[Model]:
+    """Models of a table, simple ones first; the last is the whole one.
+
+    Args:
+        config: What was asked.
+        measured: Divisor of the gain as the recordings tell it; if they do not, it is fitted.
+        loaded: Whether a known weight hangs on the servo. Without one only the inertia in
+            proportion to the stall torque shows, so that this stays as in the data sheet.
+    """
+    given = values_of(config.given)
+    divisor = config.given.gain_divisor
+    if config.fit and measured is not None:
+        divisor = measured
+    sheet = np.array([divisor, *config.given.datasheet, config.given.armature, 0.0, 0.0])
+    manual = np.array([_MANUAL, *sheet[1:]])
+    rows = [Model("data sheet, /128", manual)] if abs(divisor / _MANUAL - 1.0) > 0.02 else []
+    rows.append(Model(f"data sheet, /{divisor:.0f}", sheet))
+    if not config.fit:
+        bare = np.array([*given[:4], 0.0, 0.0])
+        return [*rows, Model("as given, no friction", bare), Model("as given", given)]
+    gain = ("gain_divisor",) if measured is None else ()
+    line = (*gain, *(_LINE if loaded else _LINE[1:]), "armature")
+    fits = {
+        "line fitted": line,
+        "+ constant friction": (*line, "friction"),
+        "data sheet + friction": (*gain, "armature", *_FRICTION),
+        "whole model": (*line, *_FRICTION),
+    }
+    start = dict(zip(_LINE, config.given.datasheet, strict=True)) | _START
+    start |= {} if measured is None else {"gain_divisor": measured}
+    rows.append(Model("as given", given))
+    for name, free in fits.items():  # friction that is not fitted is none
+        values = start | {friction: 0.0 for friction in _FRICTION if friction not in free}
+        rows.append(Model(name, np.array([values[parameter] for parameter in NAMES]), free))
+    return rows
+
+
+def splits(recordings: list[Recording], parts: Bools) -> list[Held]:
+    """What to leave out in turn: each gain, else each recording, else each half of the only one.
+
+    Nothing if that lasts no longer than a piece.
+    """
+    gains = np.array([recording.p_gain for recording in recordings])
+    if len(np.unique(gains)) > 1:
+        return [(f"gain {gain:g}", parts & (gains == gain)[:, None]) for gain in np.unique(gains)]
+    if len(recordings) > 1:
+        own = np.eye(len(recordings), dtype=bool)
+        return [(r.name, parts & own[i][:, None]) for i, r in enumerate(recordings)]
+    if parts.sum() < 2:
+        return []
+    late = np.arange(parts.shape[1]) >= parts.sum() / 2
+    return [("first half", parts & ~late), ("second half", parts & late)]
+
+
+def with_divisor(model: Model, measured: float | None) -> Model:
+    """A model with the divisor that a part of the recordings tells."""
+    if not model.free or measured is None:
+        return model
+    return replace(model, values=np.array([measured, *model.values[1:]]))
 
 
 def errors(data: Data, values: Floats, parts: Floats) -> Floats:
@@ -111,11 +247,12 @@ def _fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
         new_cost, new_slope, new_bend = _normal(data, trial, free[on], weight[:, on])
         better, small = new_cost < cost[on], cost[on] - new_cost < _ENOUGH * cost[on]
         done[on] = np.where(better, small & (damping[on] < _HARDLY), damping[on] > _STUCK)
-        found = on[better]
-        x[found], cost[found] = trial[better], new_cost[better]
-        slope[found], bend[found] = new_slope[better], new_bend[better]
+        ahead = on[better]
+        x[ahead], cost[ahead] = trial[better], new_cost[better]
+        slope[ahead], bend[ahead] = new_slope[better], new_bend[better]
         damping[on] = np.clip(np.where(better, damping[on] / 5, damping[on] * 5), 1e-6, 1e6)
-    return _plain(x, start, free)
+    # parameters that are not free stay to the last bit
+    return np.where(free, _values(x), start)
 
 
 def _step(x: Floats, slope: Floats, bend: Floats, damping: Floats) -> Floats:
@@ -130,23 +267,23 @@ def _step(x: Floats, slope: Floats, bend: Floats, damping: Floats) -> Floats:
     return np.asarray(np.linalg.solve(damped, slope[..., None])[..., 0])
 
 
-def _plain(x: Floats, start: Floats, free: Bools) -> Floats:
-    """Parameters from where they are searched; those not free stay to the last bit."""
-    return np.where(free, np.where(_LOG, np.exp(np.where(_LOG, x, 0.0)), x), start)
+def _values(x: Floats) -> Floats:
+    """Parameters from where they are searched."""
+    return np.where(_LOG, np.exp(np.where(_LOG, x, 0.0)), x)
 
 
 def _normal(data: Data, x: Floats, free: Bools, weight: Floats) -> tuple[Floats, Floats, Floats]:
     """Cost (B,), its slope (B, 6) and its curvature after Gauss and Newton (B, 6, 6)."""
     size = len(NAMES)
     tried = x[:, None] + np.vstack([np.zeros(size), np.diag(_NUDGE)])
-    values = np.where(_LOG, np.exp(np.where(_LOG, tried, 0.0)), tried).reshape(-1, size)
-    found = replay(values, data.course, EVERY)
-    found = found.reshape(len(found), len(x), size + 1, -1)
-    away = found[:, :, 0] - data.course.position[::EVERY, None]
+    values = _values(tried).reshape(-1, size)
+    positions = replay(values, data.course, EVERY)
+    positions = positions.reshape(len(positions), len(x), size + 1, -1)
+    away = positions[:, :, 0] - data.course.position[::EVERY, None]
     root = np.sqrt(1.0 + (away / _ROBUST) ** 2)
     cost = (weight * 2.0 * _ROBUST**2 * (root - 1.0)).sum(axis=(0, 2))
     grown = np.sqrt(weight / root)
-    change = (found[:, :, 1:] - found[:, :, :1]) / _NUDGE[:, None] * grown[:, :, None]
+    change = (positions[:, :, 1:] - positions[:, :, :1]) / _NUDGE[:, None] * grown[:, :, None]
     change = np.where(free[:, :, None], change, 0.0)
     flat = change.transpose(1, 2, 0, 3).reshape(len(x), size, -1)
     left = (away * grown).transpose(1, 0, 2).reshape(len(x), -1)
@@ -159,8 +296,8 @@ def _normal(data: Data, x: Floats, free: Bools, weight: Floats) -> tuple[Floats,
 
 def _spread(data: Data, parts: Floats) -> Floats:
     """Weights of pieces (B, F, K) as weights of times, shape (S, B, F)."""
-    found = np.moveaxis(parts, 2, 0)
-    return np.array([found[k] for k in data.pieces], np.float64)
+    pieces = np.moveaxis(parts, 2, 0)
+    return np.array([pieces[k] for k in data.pieces], np.float64)
 
 
 def left_out(parts: Bools, by_file: bool) -> Floats:
@@ -178,16 +315,15 @@ def left_out(parts: Bools, by_file: bool) -> Floats:
     return np.array([parts & (number != group) for group in groups], np.float64)
 
 
-def interval95(found: Floats, left: Floats) -> Floats:
+def interval95(best: Floats, left: Floats) -> Floats:
     """Ends of the 95 % interval of each parameter, by jackknife on the scale of the search.
 
     Args:
-        found: Fitted to all, shape (6,).
+        best: Fitted to all, shape (6,).
         left: Fitted without each group, shape (groups, 6).
 
     Returns:
         Both ends within the bounds of the search, shape (2, 6).
     """
-    x = np.where(_LOG, np.log(np.where(_LOG, [found, *left], 1.0)), [found, *left])
-    ends = np.clip(jackknife95(x[0], x[1:]), _LOW, _HIGH)
-    return np.where(_LOG, np.exp(np.where(_LOG, ends, 0.0)), ends)
+    x = np.where(_LOG, np.log(np.where(_LOG, [best, *left], 1.0)), [best, *left])
+    return _values(np.clip(jackknife95(x[0], x[1:]), _LOW, _HIGH))

@@ -1,4 +1,7 @@
-"""Recordings of a servo that follows goals: JSON of Rhoban/bam."""
+"""Recordings of a servo that follows goals: JSON of Rhoban/bam, and what they must be to serve.
+
+Most of what is refused has units that are not SI.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +11,82 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import model_validator
 
 from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT
 from antennate.errors import BadInputError
-from antennate.experiments.servo.checks import FEWEST, GRAVITY, check_course
-from antennate.experiments.servo.fitting import Data
 from antennate.files import decoded, read_limited
 from antennate.messages import shown
-from antennate.robots.servo_model import STEP, Course
-from antennate.robots.servos import ServoParams
+from antennate.params.base import Params, number, require_default
+from antennate.robots.servos import ServoName, ServoParams, ServosParams
 from antennate.types import Bools, Floats
 
+GRAVITY = 9.80665
+FEWEST = 50
+"""Fewest samples of a recording."""
+_COARSEST = 0.02
+"""A slow shaft is seen to move in finer steps than this [rad]: 4096 a turn make 0.0015."""
+_SLOW_STEPS = 0.1
+"""The share of all steps that a shaft makes when it is slow."""
+_FASTEST = 5.0
+"""No shaft is faster [no-load speeds]; a weight or twice the supply make less."""
+_AT_LEAST = 0.05
+"""Speeds are means over this time [s], so that jitter of the clock makes none."""
+_LARGEST_GAP = 0.5
+"""Samples lie closer together in time [s]."""
+_SUPPLIES = (0.5, 2.0)
+"""A supply lies between these [nominal voltages]."""
+_HEAVIEST = 3.0
+"""No weight pulls more [stall torques]."""
+_SHORTEST = 1.0
+"""Torque is on for longer [s]."""
 _LARGEST_FILE = 100_000_000
-_SLOW = 0.05
+SLOW = 0.05
 """A slower shaft rests [rad/s]."""
-_SMOOTHING = 0.05
-"""Speeds are means over this time [s]."""
 _LARGEST_NUMBER = 1e9
 """Nothing that is measured is larger."""
 _NUMBERS = ("timestamp", "position", "goal_position")
 _UNUSABLE = 65_536
 """A negative drive is told as one less than this many counts."""
+
+
+class ServoConfig(Params):
+    """Everything that decides the outcome of `antennate servo`."""
+
+    unread: ClassVar[tuple[str, ...]] = tuple(
+        f"servos.{name}.p_gain" for name in ServosParams.model_fields
+    )
+    recording: tuple[str, ...] = number((), "1", "assumed: has to be named", metavar="FILE")
+    """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""
+    joint: str | None = number(None, "1", "assumed: has to be named if a recording is a log")
+    """Joint of a log."""
+    servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")
+    """Model of the servo."""
+    servos: ServosParams = ServosParams()
+    mass: float | None = number(None, "kg", "assumed: as the recording says", ge=0)
+    """Mass at the end of the arm; as the recording says if not given."""
+    length: float | None = number(None, "m", "assumed: as the recording says", ge=0)
+    """Length of the arm, which hangs down at 0 rad; as the recording says if not given."""
+    inertia: float = number(0.0, "kg·m²", "assumed: only the mass and the servo", ge=0)
+    """Inertia of the load beside that of the mass."""
+    supply: float | None = number(None, "V", "assumed: as the recording says", gt=0)
+    """Supply where a recording tells none, as no log does; nominal in a replay if not given."""
+    fit: bool = number(False, "1", "assumed: a replay alone")
+    """Identify the model from the recordings."""
+
+    @property
+    def given(self) -> ServoParams:
+        """Parameters of the servo's model."""
+        return self.servos.of(self.servo)
+
+    @model_validator(mode="after")
+    def _agree(self) -> ServoConfig:
+        others = (f"servos.{name}" for name in ServosParams.model_fields if name != self.servo)
+        require_default(self, f"the servo is {self.servo}", *others)
+        return self
 
 
 @dataclass(frozen=True)
@@ -73,7 +128,7 @@ class Recording:
         error = (self.goal - self.position) / POSITION_UNIT
         size = abs(self.drive)
         useful = self.torque & (size > 0.05 * FULL_DRIVE) & (size < 0.9 * FULL_DRIVE)
-        useful &= abs(np.gradient(self.position, self.t)) < _SLOW
+        useful &= abs(np.gradient(self.position, self.t)) < SLOW
         if useful.sum() < FEWEST // 2:
             return None
         return float(np.median(self.p_gain * error[useful] / self.drive[useful]))
@@ -106,10 +161,10 @@ def read(
     if not isinstance(table, dict):
         kind = type(table).__name__
         raise BadInputError(f"{path}: expected an object with a list `entries`, found a {kind}")
-    if not isinstance(table.get("entries"), list):
-        kind = type(table["entries"]).__name__ if "entries" in table else "none"
+    entries = table.get("entries")
+    if not isinstance(entries, list):
+        kind = type(entries).__name__ if "entries" in table else "none"
         raise BadInputError(f"{path}: expected a list `entries`, found {kind}")
-    entries = table["entries"]
     if len(entries) < FEWEST:
         raise BadInputError(
             f"{path}: entries: expected at least {FEWEST}, found {len(entries)}; record longer"
@@ -120,9 +175,9 @@ def read(
     return Recording(
         path.name,
         hashlib.sha256(data).hexdigest(),
-        _of_table(path, table, "kp"),
-        _of_table(path, table, "mass") if mass is None else mass,
-        _of_table(path, table, "length") if length is None else length,
+        _header(path, table, "kp"),
+        _header(path, table, "mass") if mass is None else mass,
+        _header(path, table, "length") if length is None else length,
         t - t[0],
         position,
         goal,
@@ -133,11 +188,12 @@ def read(
     )
 
 
-def _of_table(path: Path, table: Mapping[str, Any], name: str) -> float:
+def _header(path: Path, table: Mapping[str, Any], name: str) -> float:
+    """A number beside the entries."""
     value = _number(table.get(name))
     if value is None or value < 0:
         raise BadInputError(
-            f"{path}: expected a number {name} beside entries, found {_found(table.get(name))}"
+            f"{path}: expected a number {name} beside entries, found {_shown(table.get(name))}"
         )
     return value
 
@@ -149,68 +205,131 @@ def _number(value: Any) -> float | None:
     return float(value) if abs(value) < _LARGEST_NUMBER else None
 
 
-def _found(value: Any) -> str:
+def _shown(value: Any) -> str:
     return "none" if value is None else shown(value)
 
 
 def _column(path: Path, entries: list[Any], name: str, missing: float | None = None) -> Floats:
     """Numbers of all entries; `missing` where there is none."""
-    found: list[float] = []
+    numbers: list[float] = []
     for i, entry in enumerate(entries):
         cell = entry.get(name) if isinstance(entry, dict) else None
         value = missing if cell is None else _number(cell)
         if value is None:
             raise BadInputError(
-                f"{path}: entry {i}: expected a finite number {name}, found {_found(cell)}"
+                f"{path}: entry {i}: expected a finite number {name}, found {_shown(cell)}"
             )
-        found.append(value)
-    return np.array(found, float)
+        numbers.append(value)
+    return np.array(numbers, float)
 
 
 def _torque(path: Path, entries: list[Any]) -> Bools:
+    """Whether torque was on at each entry."""
     for i, entry in enumerate(entries):
         if entry.get("torque_enable") not in (True, False):
             raise BadInputError(
                 f"{path}: entry {i}: expected torque_enable, true or false, found "
                 f"{shown(entry.get('torque_enable'))}; without it nobody knows when goals counted"
             )
-    found = np.array([bool(entry["torque_enable"]) for entry in entries])
-    if not found.any():
+    torque = np.array([bool(entry["torque_enable"]) for entry in entries])
+    if not torque.any():
         raise BadInputError(f"{path}: expected torque_enable to be true once, found it nowhere")
-    return found
+    return torque
 
 
-def data_of(recordings: list[Recording], voltage: float, inertia: float) -> Data:
-    """All recordings as one course, each ends in times that do not count.
+def check_course(path: Path, t: Floats, position: Floats, goal: Floats, servo: ServoParams) -> None:
+    """Refuse times that do not rise or have gaps, and angles that cannot be radians.
 
-    Args:
-        recordings: F recordings.
-        voltage: Nominal voltage of the servo [V]; taken where a supply is not known.
-        inertia: Inertia of the loads beside that of their masses [kg·m²].
+    Raises:
+        BadInputError: Says where and why.
     """
-    longest = max(r.t[-1] for r in recordings)
-    grid = np.arange(math.floor(longest / STEP + 1e-9) + 1) * STEP
-    held = [
-        np.clip(np.searchsorted(r.t, grid + STEP / 2, "right") - 1, 0, None) for r in recordings
-    ]
-    pairs = list(zip(recordings, held, strict=True))
-    position = np.array([np.interp(grid, r.t, r.position) for r in recordings]).T
-    course = Course(
-        goal=np.array([r.goal[i] for r, i in pairs]).T,
-        torque=np.array([r.torque[i] for r, i in pairs]).T,
-        supply=np.array([np.nan_to_num(r.supply[i] / voltage, nan=1.0) for r, i in pairs]).T,
-        position=position,
-        speed=_speed(position),
-        p_gain=np.array([r.p_gain for r in recordings]),
-        inertia=np.array([r.mass * r.length**2 + inertia for r in recordings]),
-        gravity=np.array([r.mass * GRAVITY * r.length for r in recordings]),
-    )
-    return Data(course, np.array([r.known[i] & (grid <= r.t[-1]) for r, i in pairs]).T)
+    steps = np.diff(t)
+    if (steps <= 0).any():
+        i = int(np.argmax(steps <= 0)) + 1
+        cure = "keep one of the two" if steps[i - 1] == 0 else "sort the entries"
+        raise BadInputError(
+            f"{path}: entry {i}: expected timestamp to rise, found {t[i]:g} after {t[i - 1]:g}; "
+            f"{cure}"
+        )
+    if steps.max() > _LARGEST_GAP:
+        i = int(np.argmax(steps)) + 1
+        raise BadInputError(
+            f"{path}: entry {i}: expected samples less than {_LARGEST_GAP:g} s apart, found "
+            f"{steps[i - 1]:g}; are times in seconds?"
+        )
+    moved = abs(np.diff(position))
+    if not moved.any():
+        raise BadInputError(f"{path}: expected a shaft that moves, found it at {position[0]:g}")
+    slow = float(np.quantile(moved[moved > 0.0], _SLOW_STEPS))
+    if slow > _COARSEST:
+        raise BadInputError(
+            f"{path}: expected positions in radians, whose smallest step is "
+            f"{POSITION_UNIT:.4f}, found steps of {slow:.4g}; are these degrees or "
+            "ticks?"
+        )
+    speed, most = _peak_speed(t, position), _FASTEST * servo.no_load_speed
+    if speed > most:
+        raise BadInputError(
+            f"{path}: expected positions in radians of a shaft slower than {most:.3g} rad/s, "
+            f"{_FASTEST:g} times the no-load speed, found {speed:.3g}; are these degrees or ticks?"
+        )
+    away = float(np.median(abs(goal - position)))
+    if away > 2 * math.pi:
+        raise BadInputError(
+            f"{path}: expected goal_position in radians within a turn of position, found "
+            f"{away:.4g} between them; are goals in degrees or ticks?"
+        )
 
 
-def _speed(position: Floats) -> Floats:
-    """Speeds [rad/s] of positions (T, F), smoothed."""
-    width = round(_SMOOTHING / STEP)
-    kernel = np.ones(width) / width
-    slopes = np.gradient(position, STEP, axis=0)
-    return np.array([np.convolve(column, kernel, "same") for column in slopes.T]).T
+def _peak_speed(t: Floats, position: Floats) -> float:
+    """Highest mean speed over a short time [rad/s]."""
+    ahead = np.minimum(np.searchsorted(t, t + _AT_LEAST), len(t) - 1)
+    return float(np.max(abs(position[ahead] - position) / np.maximum(t[ahead] - t, _AT_LEAST)))
+
+
+def check_load(path: Path, p_gain: float, weight: float, servo: ServoParams) -> None:
+    """Refuse a gain that moves nothing, and a weight [N·m] that no such servo could move.
+
+    Raises:
+        BadInputError: Says what was found.
+    """
+    if not p_gain > 0.0:
+        raise BadInputError(
+            f"{path}: expected a gain kp above 0, found {p_gain:g}; a servo without it follows "
+            "nothing"
+        )
+    most = _HEAVIEST * servo.stall_torque
+    if weight > most:
+        raise BadInputError(
+            f"{path}: expected a weight that pulls less than {most:.3g} N·m, {_HEAVIEST:g} times "
+            f"the stall torque, found {weight:.3g}; is the mass in grams or the length in "
+            "millimetres?"
+        )
+
+
+def check_supply(what: str, supply: Floats, servo: ServoParams) -> None:
+    """Refuse a supply [V] that such a servo does not run on; NaN is not known.
+
+    Raises:
+        BadInputError: Says of what, and why.
+    """
+    low, high = (share * servo.voltage for share in _SUPPLIES)
+    wrong = np.isfinite(supply) & ~((supply >= low) & (supply <= high))
+    if wrong.any():
+        raise BadInputError(
+            f"{what}: expected {low:.3g} to {high:.3g} V, found {supply[np.argmax(wrong)]:g}; is "
+            "it in tenths of a volt or in millivolts?"
+        )
+
+
+def check_torque(path: Path, t: Floats, torque: Bools) -> None:
+    """Refuse a recording with hardly any torque.
+
+    Raises:
+        BadInputError: Says how long it was on.
+    """
+    on = float(np.diff(t)[torque[:-1]].sum())
+    if on < _SHORTEST:
+        raise BadInputError(
+            f"{path}: expected torque for {_SHORTEST:g} s or longer, found it for {on:.3g} s"
+        )

@@ -1,34 +1,96 @@
-"""Replay recordings through servo models, fit them, judge them on what they were not fitted on."""
+"""Replay recordings through servo models, fit them, judge them on what they were not fitted on.
+
+The model's motor pulls in proportion to drive and supply, so it does not stall where a real servo
+did: at full drive with the shaft at rest. A recording in which that happens misses the model by far
+more than the others.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from antennate.dxl.model import FULL_DRIVE
 from antennate.errors import BadInputError
-from antennate.experiments.servo import drive_log, fitting, stalls
-from antennate.experiments.servo.checks import GRAVITY, check_load, check_supply, check_torque
-from antennate.experiments.servo.config import ServoConfig
-from antennate.experiments.servo.fitting import Data
-from antennate.experiments.servo.models import Held, Model, models, splits, told_divisor, with_told
-from antennate.experiments.servo.recording import Recording, data_of, read
-from antennate.experiments.servo.stalls import RecordingRow
+from antennate.experiments.servo import drive_log, fitting
+from antennate.experiments.servo.fitting import (
+    EVERY,
+    Data,
+    Held,
+    Model,
+    data_of,
+    measured_divisor,
+    models,
+    splits,
+    with_divisor,
+)
+from antennate.experiments.servo.recording import (
+    GRAVITY,
+    SLOW,
+    Recording,
+    ServoConfig,
+    check_load,
+    check_supply,
+    check_torque,
+    read,
+)
 from antennate.robots import servo_model
-from antennate.robots.servo_model import NAMES
-from antennate.studies.experiment import OnStep, Outcome, no_step
+from antennate.robots.servo_model import NAMES, STEP
+from antennate.studies.experiment import OnStep, no_step
 from antennate.types import Bools, Floats
 
 _JUDGED = 2
 """The last models of a fit, with both frictions, get intervals; the first of them is shown."""
 SHOWN = 10
 """A figure shows every so many times of the replay."""
+_FULL = 0.99
+"""Share of full drive from which it is full: registers are whole counts."""
+_OVER = 0.1
+"""Speeds are means over this time [s]: a tick of position is 0.0015 rad."""
+_BELOW = 0.9
+"""Share of full drive under which a weight is held with drive to spare."""
+SEEN = 0.02
+"""A recording that stalls for this share of its time with torque, or longer, is named."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingRow:
+    """One recording, a row of trials.csv.
+
+    Attributes:
+        name: Name of the recording.
+        p_gain: Gain of the position loop.
+        error_deg: Mean error of position of the last model while torque is on [deg].
+        error_max_deg: The largest.
+        full_drive: Share of that time at full drive; NaN where the recording tells no drive.
+        stalled: Share of that time at full drive in which the shaft rests, likewise.
+        error_stalled_deg: Mean error while it stalls [deg], NaN if it never does.
+        error_else_deg: Mean error in the rest of the time [deg].
+        supply_stalled_v: Mean supply while it stalls [V].
+        weight_stalled_n_m: Mean torque of the weight while it stalls [N·m].
+        lifted_n_m: Largest torque of the weight [N·m] that the servo held at rest with drive to
+            spare, in any recording.
+    """
+
+    name: str
+    p_gain: float
+    error_deg: float
+    error_max_deg: float
+    full_drive: float
+    stalled: float
+    error_stalled_deg: float
+    error_else_deg: float
+    supply_stalled_v: float
+    weight_stalled_n_m: float
+    lifted_n_m: float
 
 
 @dataclass(frozen=True)
-class ServoOutcome(Outcome):
+class ServoOutcome:
     """What the models made of the recordings.
 
     Attributes:
@@ -39,7 +101,7 @@ class ServoOutcome(Outcome):
         held: What was left out in turn.
         held_errors: Error of each on what its fit did not see [rad], shape (M, H).
         interval: Ends of their 95 % intervals, shape (M, 2, 6); NaN where there is none.
-        by_recording: The error of each recording, with the last model.
+        rows: A row for each recording: its error with the last model.
     """
 
     config: ServoConfig
@@ -51,12 +113,7 @@ class ServoOutcome(Outcome):
     held: list[Held]
     held_errors: Floats
     interval: Floats
-    by_recording: list[RecordingRow]
-
-    @property
-    def rows(self) -> list[RecordingRow]:
-        """A row for each recording."""
-        return self.by_recording
+    rows: list[RecordingRow]
 
     @property
     def shown(self) -> int:
@@ -71,31 +128,28 @@ class ServoOutcome(Outcome):
             "servo": self.config.servo,
             "fitted": self.config.fit,
             "recordings": [
-                _recording(each) | asdict(row)
-                for each, row in zip(self.recordings, self.rows, strict=True)
+                _about(recording) | asdict(row)
+                for recording, row in zip(self.recordings, self.rows, strict=True)
             ],
             "interval_over": self._interval_over(),
-            "models": [
-                {
-                    "name": model.name,
-                    "free": list(model.free),
-                    **dict(zip(NAMES, self.fitted[i].tolist(), strict=True)),
-                    "error_deg": float(np.degrees(self.errors[i])),
-                    "held_out_deg": dict(
-                        zip(
-                            [name for name, _ in self.held],
-                            np.degrees(self.held_errors[i]).tolist(),
-                            strict=True,
-                        )
-                    ),
-                    "interval_95": {
-                        name: self.interval[i, :, k].tolist()
-                        for k, name in enumerate(NAMES)
-                        if name in model.free and np.isfinite(self.interval[i, :, k]).all()
-                    },
-                }
-                for i, model in enumerate(self.models)
-            ],
+            "models": [self._model(i, model) for i, model in enumerate(self.models)],
+        }
+
+    def _model(self, i: int, model: Model) -> dict[str, Any]:
+        """What result.json says of a model."""
+        ends = dict(zip(NAMES, np.moveaxis(self.interval[i], 1, 0), strict=True))
+        names = [name for name, _ in self.held]
+        return {
+            "name": model.name,
+            "free": list(model.free),
+            **dict(zip(NAMES, self.fitted[i].tolist(), strict=True)),
+            "error_deg": float(np.degrees(self.errors[i])),
+            "held_out_deg": dict(zip(names, np.degrees(self.held_errors[i]).tolist(), strict=True)),
+            "interval_95": {
+                name: pair.tolist()
+                for name, pair in ends.items()
+                if name in model.free and np.isfinite(pair).all()
+            },
         }
 
     def _interval_over(self) -> str:
@@ -108,16 +162,18 @@ class ServoOutcome(Outcome):
         return servo_model.replay(self.fitted, self.data.course, SHOWN)
 
 
-def _recording(each: Recording) -> dict[str, Any]:
+def _about(recording: Recording) -> dict[str, Any]:
+    """What result.json says of a recording itself."""
+    supply = recording.supply
     return {
-        "name": each.name,
-        "sha256": each.sha256,
-        "p_gain": each.p_gain,
-        "gain_divisor": each.divisor(),
-        "seconds": float(each.t[-1]),
-        "samples": len(each.t),
-        "torque_share": float(each.torque.mean()),
-        "supply_v": float(np.mean(each.supply)) if np.isfinite(each.supply).all() else None,
+        "name": recording.name,
+        "sha256": recording.sha256,
+        "p_gain": recording.p_gain,
+        "gain_divisor": recording.divisor(),
+        "seconds": float(recording.t[-1]),
+        "samples": len(recording.t),
+        "torque_share": float(recording.torque.mean()),
+        "supply_v": float(np.mean(supply)) if np.isfinite(supply).all() else None,
     }
 
 
@@ -137,21 +193,20 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     recordings = [_read(Path(name), config) for name in config.recording]
     if config.joint is not None and not any(drive_log.is_log(Path(n)) for n in config.recording):
         raise BadInputError("--joint: expected a log among the recordings, found none")
-    if config.supply is not None and all(np.isfinite(each.supply).all() for each in recordings):
+    if config.supply is not None and all(np.isfinite(r.supply).all() for r in recordings):
         raise BadInputError("--supply: expected a recording that tells none, found that all do")
-    recordings = [_supplied(each, config) for each in recordings]
+    recordings = [_supplied(recording, config) for recording in recordings]
     data = data_of(recordings, config.given.voltage, config.inertia)
-    parts, loaded = data.parts(), any(each.mass * each.length > 0 for each in recordings)
-    rows = models(config, told_divisor(recordings), loaded)
+    parts, loaded = data.parts(), any(r.mass * r.length > 0 for r in recordings)
+    rows = models(config, measured_divisor(recordings), loaded)
     held = splits(recordings, parts) if config.fit else []
     seen = [parts, *(parts & ~out for _, out in held)]
     total = len(seen) + bool(held)
     fits: list[Floats] = []
     for done, part in enumerate(seen):
         on_step(done, total)
-        known = [recordings[i] for i in np.flatnonzero(part.any(axis=1))]
-        told = told_divisor(known)
-        fits.append(_fitted(data, [with_told(row, told) for row in rows], part))
+        divisor = measured_divisor([recordings[i] for i in np.flatnonzero(part.any(axis=1))])
+        fits.append(_fitted(data, [with_divisor(row, divisor) for row in rows], part))
     interval = np.full((len(rows), 2, len(NAMES)), np.nan)
     if config.fit:
         on_step(len(seen), total)
@@ -162,55 +217,55 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         fitting.errors(data, fits[i], _same(out, len(rows)))
         for i, (_, out) in enumerate(held, start=1)
     ]
-    every = fitting.errors(data, fits[0], _same(parts, len(rows)))
+    errors = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
-    last = servo_model.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
+    replayed = servo_model.replay(fits[0][-1:], data.course, EVERY)[:, 0]
     return ServoOutcome(
-        *(config, recordings, data, rows, fits[0], every, held, held_errors, interval),
-        by_recording=stalls.rows(recordings, data, last),
+        *(config, recordings, data, rows, fits[0], errors, held, held_errors, interval),
+        rows=_recording_rows(recordings, data, replayed),
     )
 
 
 def _read(path: Path, config: ServoConfig) -> Recording:
     """A recording of either form that can serve."""
     if drive_log.is_log(path):
-        found = drive_log.read(path, config)
+        recording = drive_log.read(path, config)
     else:
-        found = read(path, config.given, config.mass, config.length)
-    check_load(path, found.p_gain, found.mass * GRAVITY * found.length, config.given)
-    check_supply(f"{path}: input_volts", found.supply, config.given)
-    check_torque(path, found.t, found.torque)
-    return found
+        recording = read(path, config.given, config.mass, config.length)
+    weight = recording.mass * GRAVITY * recording.length
+    check_load(path, recording.p_gain, weight, config.given)
+    check_supply(f"{path}: input_volts", recording.supply, config.given)
+    check_torque(path, recording.t, recording.torque)
+    return recording
 
 
-def _supplied(each: Recording, config: ServoConfig) -> Recording:
+def _supplied(recording: Recording, config: ServoConfig) -> Recording:
     """A recording with the supply that the configuration gives where it tells none."""
-    unknown = ~np.isfinite(each.supply)
-    if not unknown.any():
-        return each
+    unknown = ~np.isfinite(recording.supply)
+    if not unknown.any() or (config.supply is None and not config.fit):
+        return recording
     if config.supply is None:
-        if config.fit:
-            raise BadInputError(
-                f"{each.name}: a fit needs the supply, as torque and speed follow it: expected it "
-                "in the recording or as --supply, found neither"
-            )
-        return each
+        raise BadInputError(
+            f"{recording.name}: a fit needs the supply, as torque and speed follow it: expected it "
+            "in the recording or as --supply, found neither"
+        )
     check_supply("--supply", np.array([config.supply]), config.given)
-    return replace(each, supply=np.where(unknown, config.supply, each.supply))
+    return replace(recording, supply=np.where(unknown, config.supply, recording.supply))
 
 
 def _same(parts: Bools, count: int) -> Floats:
+    """Pieces as weights, the same for each of so many fits."""
     return np.repeat(parts[None].astype(float), count, axis=0)
 
 
 def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
     """Parameters of all models from some pieces; those without free ones as they were."""
     start, free = np.array([row.values for row in rows]), np.array([row.mask for row in rows])
-    found = start.copy()
+    values = start.copy()
     if (open_ := free.any(axis=1)).any():
         weight = _same(parts, int(open_.sum()))
-        found[open_] = fitting.fit(data, start[open_], free[open_], weight)
-    return found
+        values[open_] = fitting.fit(data, start[open_], free[open_], weight)
+    return values
 
 
 def _intervals(recordings: list[Recording], data: Data, best: Floats, rows: list[Model]) -> Floats:
@@ -219,7 +274,83 @@ def _intervals(recordings: list[Recording], data: Data, best: Floats, rows: list
     mask = np.array([row.mask for row in rows])
     start = np.repeat(best, len(weights), axis=0)
     free = np.repeat(mask, len(weights), axis=0)
-    found = fitting.fit(data, start, free, np.concatenate([weights] * len(rows)))
-    left = found.reshape(len(rows), len(weights), -1)
-    ends = np.array([fitting.interval95(*each) for each in zip(best, left, strict=True)])
+    left = fitting.fit(data, start, free, np.concatenate([weights] * len(rows)))
+    pairs = zip(best, left.reshape(len(rows), len(weights), -1), strict=True)
+    ends = np.array([fitting.interval95(*pair) for pair in pairs])
     return np.where(mask[:, None], ends, np.nan)
+
+
+def _recording_rows(
+    recordings: list[Recording], data: Data, positions: Floats
+) -> list[RecordingRow]:
+    """A row for each recording.
+
+    Args:
+        recordings: F recordings.
+        data: The same on one grid of times.
+        positions: What the model gives at every `EVERY`-th of them [rad], shape (S, F).
+    """
+    away = np.degrees(abs(positions - data.course.position[::EVERY]))
+    counts = (data.known & data.course.torque)[::EVERY]
+    lifted = max(map(_lifted, recordings))
+    return [
+        _row(recording, away[:, i], counts[:, i], lifted, STEP * EVERY)
+        for i, recording in enumerate(recordings)
+    ]
+
+
+def _row(
+    recording: Recording, away: Floats, counts: Bools, lifted: float, step: float
+) -> RecordingRow:
+    """The row of one recording, with errors (S,) [deg] that count at some times, `step` [s]."""
+    held = np.searchsorted(recording.t, step * np.arange(len(away)) + STEP / 2, "right") - 1
+    full, stalls = _full_drive(recording)[held] & counts, stalled(recording)[held] & counts
+    has_drive = bool(np.isfinite(recording.drive).all())
+    time = counts.sum()
+    weight = abs(_weight(recording))
+    return RecordingRow(
+        name=recording.name,
+        p_gain=recording.p_gain,
+        error_deg=_mean(away[counts]),
+        error_max_deg=float(away[counts].max()) if time else math.nan,
+        full_drive=float(full.sum() / time) if has_drive and time else math.nan,
+        stalled=float(stalls.sum() / time) if has_drive and time else math.nan,
+        error_stalled_deg=_mean(away[stalls]),
+        error_else_deg=_mean(away[counts & ~stalls]),
+        supply_stalled_v=_mean(recording.supply[held][stalls]),
+        weight_stalled_n_m=_mean(weight[held][stalls]),
+        lifted_n_m=lifted,
+    )
+
+
+def _full_drive(recording: Recording) -> Bools:
+    """Whether the drive is full, shape (n,); nowhere where it is not known."""
+    return recording.torque & (abs(recording.drive) >= _FULL * FULL_DRIVE)
+
+
+def stalled(recording: Recording) -> Bools:
+    """Whether the drive is full and the shaft rests, shape (n,)."""
+    return _full_drive(recording) & _rests(recording)
+
+
+def _rests(recording: Recording) -> Bools:
+    """Whether the shaft rests, shape (n,)."""
+    t, position = recording.t, recording.position
+    before, after = (np.interp(t + way, t, position) for way in (-_OVER / 2, _OVER / 2))
+    return abs(after - before) / _OVER < SLOW
+
+
+def _weight(recording: Recording) -> Floats:
+    """Torque of the weight at the shaft [N·m], shape (n,)."""
+    return recording.mass * GRAVITY * recording.length * np.sin(recording.position)
+
+
+def _lifted(recording: Recording) -> float:
+    """Largest torque of the weight that is held at rest with drive to spare [N·m]."""
+    spare = recording.torque & (abs(recording.drive) < _BELOW * FULL_DRIVE) & _rests(recording)
+    return float(abs(_weight(recording))[spare].max(initial=0.0))
+
+
+def _mean(values: Floats) -> float:
+    """Mean, NaN of nothing."""
+    return float(values.mean()) if len(values) else math.nan

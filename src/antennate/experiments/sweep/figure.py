@@ -1,4 +1,4 @@
-"""Figure of `antennate sweep`: shapes over the map, and errors of the estimates by cue."""
+"""Figure of `bench sweep`: shapes over the map, and errors of the estimates by cue."""
 
 from __future__ import annotations
 

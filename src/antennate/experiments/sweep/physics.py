@@ -33,7 +33,7 @@ from antennate.types import Bools, Floats
 
 
 class SweepConfig(Params):
-    """Everything that decides the outcome of `antennate sweep`."""
+    """Everything that decides the outcome of `bench sweep`."""
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_angle",

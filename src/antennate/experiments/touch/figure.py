@@ -1,4 +1,4 @@
-"""Figures of `antennate touch`: how well contact is sensed, the ROC, and one traverse in detail."""
+"""Figures of `bench touch`: how well contact is sensed, the ROC, and one traverse in detail."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def site(antenna: AntennaSpec, overlap: float, length: float, phase: float) -> S
 
 
 class TouchConfig(Params):
-    """Everything that decides the outcome of `antennate touch`."""
+    """Everything that decides the outcome of `bench touch`."""
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_spacing",

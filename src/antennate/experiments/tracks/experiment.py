@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.experiments.tracks import run as tracks
 from antennate.experiments.tracks.config import TracksConfig
-from antennate.experiments.tracks.measures import SHAPES
-from antennate.experiments.tracks.walls import MOST_BEYOND
+from antennate.experiments.tracks.measures import MOST_BEYOND, SHAPES
+from antennate.experiments.tracks.run import run
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import NONE, Table, few, shown
 
@@ -37,7 +36,7 @@ UNITS = {
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The shapes, what depends on each criterion, and what was wrong with the tracks."""
-    found, trials = result["frames"], result["trials_in_contact"]
+    frames, trials = result["frames"], result["trials_in_contact"]
     many = "one trial" if trials == 1 else f"the mean over {trials} trials"
     notes = [f"Shares of the frames in contact, {many}."]
     if result["classified_by"] == "direction":
@@ -71,7 +70,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         "What was found in the tracks",
         ["number"],
         [
-            *((f"frames {name}", [str(found[name])]) for name in ("contact", "free", "unknown")),
+            *((f"frames {name}", [str(frames[name])]) for name in ("contact", "free", "unknown")),
             ("animals", [str(result["animals"])]),
             ("animals known in too few frames, left out", [str(result["skipped"])]),
             *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
@@ -140,34 +139,32 @@ def _beyond(result: Mapping[str, Any]) -> str:
 
 def _unseen(result: Mapping[str, Any]) -> str:
     """Which antennae were hardly ever seen."""
-    found = result.get("unseen")
-    if not found:
+    antennae = result.get("unseen")
+    if not antennae:
         return ""
-    one = found[0]
-    empty = f", as {', '.join(one['empty'])} never has a value" if one["empty"] else ""
-    others = f"; {len(found) - 1} more in result.json" if len(found) > 1 else ""
-    of = f" of {one['animal']}" if one["animal"] else ""
+    first = antennae[0]
+    empty = f", as {', '.join(first['empty'])} never has a value" if first["empty"] else ""
+    others = f"; {len(antennae) - 1} more in result.json" if len(antennae) > 1 else ""
+    of = f" of {first['animal']}" if first["animal"] else ""
     return (
-        f" The {one['side']} antenna{of} in {one['file']} is known in {one['known']} of "
-        f"{one['frames']} frames{empty}{others}."
+        f" The {first['side']} antenna{of} in {first['file']} is known in {first['known']} of "
+        f"{first['frames']} frames{empty}{others}."
     )
 
-
-CAPTIONS = {
-    "tracks": "Shares of the shapes in each trial and over all, outlines of each "
-    "shape, an angle over time, and what other criteria change.",
-}
 
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TracksConfig,
-    tracks.run,
+    run,
     tables,
     sentence,
     files=lambda outcome: {"frames.csv": outcome.frames_csv()},
     failed=lambda result: not result["trials_in_contact"],
     parts="files",
-    captions=CAPTIONS,
+    captions={
+        "tracks": "Shares of the shapes in each trial and over all, outlines of each shape, an "
+        "angle over time, and what other criteria change.",
+    },
     explained="docs/tracks.md",
     on_workers=False,
 )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.experiments.tracks import measures
-from antennate.experiments.tracks.measures import FREE, NAMES, SHAPES, UNKNOWN, Seen
+from antennate.experiments.tracks.measures import FREE, NAMES, SHAPES, UNKNOWN, Antenna
 from antennate.experiments.tracks.run import TracksOutcome
 from antennate.types import Ints
 
@@ -30,10 +30,10 @@ def figures(outcome: TracksOutcome) -> dict[str, Figure]:
     """Shares by trial and over trials, outlines of each shape, an angle over time, sensitivity."""
     figure, result = style.canvas(style.WIDTH, 13.0), outcome.result()
     shares, outlines, angle, change = figure.subplots(4, 1, height_ratios=(1.2, 1.4, 0.9, 1.5))
-    shapes = [measures.shapes_of(outcome.config.criteria, one) for one in outcome.antennae]
+    shapes = [measures.shapes_of(outcome.config.criteria, a) for a in outcome.antennae]
     _draw_shares(shares, outcome, result)
     _draw_outlines(outlines, outcome, shapes)
-    contact = [int((found >= 0).sum()) for found in shapes]
+    contact = [int((frames >= 0).sum()) for frames in shapes]
     most = int(np.argmax(contact))
     _draw_angle(angle, outcome.antennae[most], shapes[most])
     _draw_change(change, result)
@@ -82,11 +82,11 @@ def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any])
 def _draw_outlines(panel: Axes, outcome: TracksOutcome, shapes: list[Ints]) -> None:
     """Antennae as seen from above the body, ahead upwards, of one side each."""
     rng = np.random.default_rng(0)
-    points = np.concatenate([one.points for one in outcome.antennae])
+    points = np.concatenate([antenna.points for antenna in outcome.antennae])
     joined = np.concatenate(shapes)
     for value, name in enumerate(SHAPES):
-        found = np.flatnonzero(joined == value)
-        for i in rng.permutation(found)[:_OUTLINES]:
+        frames = np.flatnonzero(joined == value)
+        for i in rng.permutation(frames)[:_OUTLINES]:
             relative = points[i] - points[i, 0]
             panel.plot(
                 relative[:, 1], relative[:, 0], color=style.SHAPE_COLOURS[name], linewidth=0.7
@@ -97,22 +97,25 @@ def _draw_outlines(panel: Axes, outcome: TracksOutcome, shapes: list[Ints]) -> N
     panel.set_title(f"Antennae in contact, up to {_OUTLINES} of each shape")
 
 
-def _draw_angle(panel: Axes, one: Seen, shapes: Ints) -> None:
+def _draw_angle(panel: Axes, antenna: Antenna, shapes: Ints) -> None:
     """Direction from base to tip over the time with most contact, coloured by shape."""
-    count = min(len(shapes), round(_LONGEST * one.rate))
+    count = min(len(shapes), round(_LONGEST * antenna.rate))
     touched = np.concatenate([[0], np.cumsum(shapes >= 0)])
     start = int(np.argmax(touched[count:] - touched[: len(touched) - count]))
     at = slice(start, start + count)
-    t, angle = np.arange(start, start + count) / one.rate, np.degrees(one.outline.direction[at])
+    t, angle = (
+        np.arange(start, start + count) / antenna.rate,
+        np.degrees(antenna.outline.direction[at]),
+    )
     panel.plot(t, angle, color=style.FAINT, linewidth=0.8, zorder=1)
     for value, name in NAMES.items():
-        found = shapes[at] == value
+        frames = shapes[at] == value
         if value != UNKNOWN:
             colour, size = style.SHAPE_COLOURS[name], 3 if value == FREE else 7
-            panel.scatter(t[found], angle[found], size, colour, zorder=2, linewidths=0)
+            panel.scatter(t[frames], angle[frames], size, colour, zorder=2, linewidths=0)
     panel.set_xlabel("time [s]")
     panel.set_ylabel("base to tip [deg]")
-    panel.set_title(f"Angle from the body axis, trial {one.trial + 1}, {one.side} antenna")
+    panel.set_title(f"Angle from the body axis, trial {antenna.trial + 1}, {antenna.side} antenna")
 
 
 def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:

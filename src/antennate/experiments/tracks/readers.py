@@ -1,32 +1,34 @@
-"""Files of tracking software as tracks: plain CSV, DeepLabCut CSV and TRex npz; HDF5 beside it."""
+"""Files of tracking software as tracks: CSV, HDF5 of SLEAP and DeepLabCut, npz of TRex."""
 
 from __future__ import annotations
 
+import io
+import json
 import math
+import pickle
 import zipfile
 import zlib
-from array import array
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from antennate.csv_files import MISSING, Row, column, csv_rows, number_of
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, MissingPackageError
 from antennate.experiments.tracks.config import ColumnsParams
 from antennate.experiments.tracks.track import (
     LARGEST,
     Track,
     from_columns,
     numbered,
+    read_csv,
     refuse_labels,
     require_points,
     require_room_for,
 )
 from antennate.files import read_limited
-from antennate.messages import nearest, shortened
-from antennate.types import Floats, Ints
+from antennate.messages import extra, shortened
+from antennate.types import Floats
 
 SUFFIXES = (".csv", ".h5", ".hdf5", ".slp", ".npz")
 _DAMAGES = (
@@ -42,6 +44,9 @@ _DAMAGES = (
 _TREX = "an npz file of TRex with poseX0, poseY0 and so on"
 _LONGEST_HEADER = 1 << 14
 """More than NumPy takes of an array's header [byte]; one may say of itself that it has 4 GB."""
+_SLEAP_CUTOFF = 0.2
+"""Height of a peak below which SLEAP's inference leaves a point out by default."""
+_SLEAP_AXES = ("track", "xy", "node", "frame")
 
 
 def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
@@ -58,205 +63,239 @@ def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track
     """
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        return _csv(path, names, columns)
+        return read_csv(path, names, columns)
     if suffix == ".npz":
         return _trex(path, names)
     if suffix in SUFFIXES:
-        from antennate.experiments.tracks import hdf5
-
-        return hdf5.read(path, names)
+        return _hdf5(path, names)
     raise BadInputError(
         f"{path}: expected a file in {', '.join(SUFFIXES)}, found {suffix or 'none'}"
     )
 
 
-def _csv(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
-    rows = csv_rows(path, read_limited(path, LARGEST), (), BadInputError, ended=True)
-    _, header = next(rows)
-    if not header:
-        raise BadInputError(f"{path}: row 1: expected the names of the columns, found a blank line")
-    if header[0] == "scorer":
-        return _deeplabcut(path, header, rows, names)
-    return _plain(path, header, rows, names, columns)
+def _hdf5(path: Path, names: Sequence[str]) -> list[Track]:
+    """The animals of a file of SLEAP or DeepLabCut.
 
-
-def _numbers(
-    path: Path, line: int, header: Sequence[str], cells: list[str], places: Sequence[int]
-) -> list[float]:
-    """Numbers of a row, NaN for a cell that says of itself that it has none."""
-    if len(cells) != len(header):
-        why = "; are there decimal commas? write points"
-        if len(cells) < len(header):
-            why = " (truncated); delete the row"
-        elif any("." in cell for cell in cells):
-            why = (
-                "; does row 1 lack the name of a column? R writes none above its row names: write "
-                "one there, and name the column of frames with --columns.frame"
-            )
+    It is read by h5py alone: sleap-io and pandas with PyTables would read it too, but bring dozens
+    of packages for a few arrays.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise MissingPackageError(
+            f"{path}: expected h5py to read HDF5, found none; install it with {extra('tracks')}"
+        ) from None
+    data = read_limited(path, LARGEST)
+    try:
+        with h5py.File(io.BytesIO(data), "r") as file:
+            if "tracks" in file and "node_names" in file:
+                return _sleap_analysis(path, file, names)
+            if "instances" in file and "metadata" in file:
+                return _sleap_labels(path, file, names)
+            for group in file.values():
+                if "pandas_type" in group.attrs:
+                    return _pandas_table(path, group, names)
+            groups = ", ".join(file) or "nothing"
+    except (OSError, RuntimeError, KeyError, IndexError, TypeError, UnicodeError) as error:
         raise BadInputError(
-            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
+            f"{path}: expected a whole HDF5 file of SLEAP or DeepLabCut, found: {error}"
+        ) from None
+    raise BadInputError(
+        f"{path}: expected HDF5 of SLEAP (tracks, node_names) or DeepLabCut (df_with_missing), "
+        f"found {groups}"
+    )
+
+
+def _texts(values: Any) -> list[str]:
+    return [v.decode() if isinstance(v, bytes) else str(v) for v in np.asarray(values).tolist()]
+
+
+def _sleap_analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
+    """SLEAP writes (track, xy, node, frame); some write it reversed, or name the axes."""
+    nodes, tracks = _texts(file["node_names"]), file["tracks"]
+    require_points(path, names, nodes)
+    where, shape = _axes(path, file, len(nodes)), tracks.shape
+    wanted = [nodes.index(name) for name in names]
+    _require_room(path, tracks, len(wanted) / max(1, len(nodes)))
+    points = np.moveaxis(_picked(tracks, wanted, where[2]), where, (0, 3, 2, 1))
+    scores = None
+    if "point_scores" in file:
+        held = file["point_scores"]
+        kept = [axis for axis in np.argsort(where) if axis != 1]  # those of tracks without xy
+        order = [kept.index(axis) for axis in (0, 2, 3)]
+        if held.shape == tuple(np.delete(shape, where[1])):
+            _require_room(path, held, len(wanted) / max(1, len(nodes)))
+            scores = np.moveaxis(_picked(held, wanted, order[1]), order, (0, 2, 1))
+    titles = _texts(file["track_names"]) if "track_names" in file else []
+    titles = titles if len(titles) == len(points) else [str(i) for i in range(len(points))]
+    titles = titles if len(points) > 1 else [""]
+    return [
+        Track(
+            str(path),
+            title,
+            np.arange(points.shape[1]),
+            None,
+            {n: points[i, :, k] for k, n in enumerate(names)},
+            {} if scores is None else {n: scores[i, :, k] for k, n in enumerate(names)},
+            _SLEAP_CUTOFF,
         )
-    values: list[float] = []
-    for place in places:
-        cell = cells[place].strip()
-        try:
-            value = number_of(cell)
-        except ValueError as error:
-            raise BadInputError(f"{path}: row {line}: expected {error}, found {cell!r}") from None
-        if math.isnan(value) and cell.lower() not in MISSING:
-            raise BadInputError(
-                f"{path}: row {line}: expected a number or nothing in {header[place]}, found "
-                f"{shortened(cell)}"
+        for i, title in enumerate(titles)
+    ]
+
+
+def _require_room(path: Path, held: Any, share: float = 1.0) -> None:
+    """Refuse an array, before it is unpacked, of which a share, or a single chunk, is too large."""
+    size = max(8, held.dtype.itemsize)
+    require_room_for(path, round(share * held.size * size))
+    require_room_for(path, math.prod(held.chunks or (1,)) * size)
+
+
+def _picked(held: Any, places: Sequence[int], axis: int) -> Floats:
+    """Some places along an axis of an array of a file, in this order."""
+    before = (slice(None),) * axis
+    return np.stack([np.asarray(held[(*before, i)], np.float64) for i in places], axis)
+
+
+def _axes(path: Path, file: Any, nodes: int) -> tuple[int, ...]:
+    """Where track, xy, node and frame stand among the axes of `tracks`."""
+    tracks = file["tracks"]
+    dims = tracks.attrs.get("dims")
+    if dims is not None:
+        listed = json.loads(dims) if isinstance(dims, str | bytes) else _texts(dims)
+        if sorted(listed) == sorted(_SLEAP_AXES):
+            return tuple(listed.index(name) for name in _SLEAP_AXES)
+    for order in ((0, 1, 2, 3), (3, 2, 1, 0)):
+        if tracks.ndim == 4 and (tracks.shape[order[1]], tracks.shape[order[2]]) == (2, nodes):
+            return order
+    raise BadInputError(
+        f"{path}: expected tracks of shape (tracks, 2, {nodes}, frames), found {tracks.shape}"
+    )
+
+
+def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
+    """SLEAP's own file: frames, their instances, and the points of each in the skeleton's order."""
+    try:
+        about = json.loads(file["metadata"].attrs["json"])
+        order = [node["id"] for node in about["skeletons"][0]["nodes"]]
+        nodes = [about["nodes"][i]["name"] for i in order]
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadInputError(f"{path}: expected a skeleton of SLEAP, found: {error}") from None
+    require_points(path, names, nodes)
+    for key in ("frames", "instances", "points", "pred_points"):
+        _require_room(path, file[key])
+    frames, instances = file["frames"][()], file["instances"][()]
+    if len(set(frames["video"].tolist())) > 1:
+        raise BadInputError(f"{path}: expected one video, found several; save each on its own")
+    held = (file["points"][()], file["pred_points"][()])
+    shift = 0.5 if float(file["metadata"].attrs.get("format_id", 1.2)) < 1.1 else 0.0
+    last = int(frames["frame_idx"].max()) + 1 if len(frames) else 0
+    tracks: dict[int, tuple[Floats, Floats]] = {}
+    for frame in frames:
+        for one in instances[int(frame["instance_id_start"]) : int(frame["instance_id_end"])]:
+            source = held[int(one["instance_type"])]
+            part = source[int(one["point_id_start"]) : int(one["point_id_end"])]
+            number, at, seen = int(one["track"]), int(frame["frame_idx"]), part["visible"]
+            if number not in tracks:
+                require_room_for(path, (len(tracks) + 1) * last * len(nodes) * 3 * 8)
+                tracks[number] = (
+                    np.full((last, len(nodes), 2), np.nan),
+                    np.zeros((last, len(nodes))),
+                )
+            points, scores = tracks[number]
+            if number < 0 and scores[at].any():
+                raise BadInputError(
+                    f"{path}: expected tracked animals, found several without a track in frame "
+                    f"{at}; track them in SLEAP"
+                )
+            points[at, seen, 0], points[at, seen, 1] = (
+                part["x"][seen] - shift,
+                part["y"][seen] - shift,
             )
-        values.append(value)
-    return values
+            scores[at, seen] = part["score"][seen] if "score" in part.dtype.names else 1.0
+    return [
+        Track(
+            str(path),
+            str(number) if len(tracks) > 1 else "",
+            np.arange(last),
+            None,
+            {n: points[:, nodes.index(n)] for n in names},
+            {n: scores[:, nodes.index(n)] for n in names},
+            _SLEAP_CUTOFF,
+        )
+        for number, (points, scores) in sorted(tracks.items())
+    ]
 
 
-def _table(
-    path: Path, rows: Iterator[Row], header: Sequence[str], places: Sequence[int]
-) -> tuple[Floats, list[str]]:
-    """Numbers of some columns, a row for each frame, and the texts of the last place, if any."""
-    numbers, texts = array("d"), list[str]()
-    *places, text = places
-    for line, cells in rows:
-        numbers.extend(_numbers(path, line, header, cells, places))
-        texts.append(cells[text].strip() if text >= 0 else "")
-    if not texts:
-        raise BadInputError(f"{path}: expected rows of frames, found none")
-    return np.array(numbers).reshape(len(texts), -1), texts
+class _Plain(pickle.Unpickler):
+    """Reads lists, tuples, texts and numbers; whatever would run code is refused."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        raise pickle.UnpicklingError(f"{module}.{name} where names of columns should be")
 
 
-def _deeplabcut(
-    path: Path, first: list[str], rows: Iterator[Row], names: Sequence[str]
-) -> list[Track]:
-    """Columns named by scorer, (individuals,) bodyparts and coords, a row for each frame."""
-    levels = {"scorer": first}
-    while "coords" not in levels:
-        _, cells = next(rows, (0, []))
-        key = cells[0].strip() if cells else ""
-        if key not in ("individuals", "bodyparts", "coords") or len(cells) != len(first):
-            raise BadInputError(
-                f"{path}: row {len(levels) + 1}: expected DeepLabCut's row of bodyparts or coords, "
-                f"found {shortened(key) if cells else 'the end (truncated)'}"
+def _plain(pickled: Any) -> Any:
+    data = pickled.encode("latin-1") if isinstance(pickled, str) else bytes(pickled)
+    return _Plain(io.BytesIO(data)).load()
+
+
+def _pandas_table(path: Path, group: Any, names: Sequence[str]) -> list[Track]:
+    """A pandas table: in format `table` with pickled names of columns, or in format `fixed`."""
+    try:
+        if "table" in group:
+            table = group["table"]
+            _require_room(path, table)
+            blocks = [name for name in table.dtype.names if name.startswith("values_block_")]
+            index, values = table["index"], np.hstack([table[name] for name in blocks])
+            kinds = [table.attrs[f"{name}_kind"] for name in blocks]
+            columns = [key for kind in kinds for key in _plain(kind)]
+        else:
+            _require_room(path, group["block0_values"])
+            count, index = int(group.attrs["axis0_nlevels"]), group["axis1"][()]
+            values = np.asarray(group["block0_values"][()], np.float64)
+            levels = [_texts(group[f"block0_items_level{i}"]) for i in range(count)]
+            codes = [group[f"block0_items_label{i}"][()] for i in range(count)]
+            columns = list(
+                zip(
+                    *([k[c] for c in code] for k, code in zip(levels, codes, strict=True)),
+                    strict=True,
+                )
             )
-        levels[key] = [cell.strip() for cell in cells]
-    if "bodyparts" not in levels:
-        raise BadInputError(f"{path}: row 2: expected DeepLabCut's row of bodyparts, found none")
-    begin = next((i for i, name in enumerate(levels["coords"]) if name in ("x", "y")), 1)
-    body = _without_images(path, rows)
-    if begin > 1:
-        refuse_labels(path, "/".join(next(body, (0, [""]))[1][:begin]))
-    animals = levels.get("individuals", [""] * len(first))
-    columns = {
-        (animals[i], levels["bodyparts"][i], levels["coords"][i]): i
-        for i in range(1, len(first))
-        if levels["bodyparts"][i] in names
+    except BadInputError:
+        raise
+    except (pickle.UnpicklingError, KeyError, ValueError, EOFError, AttributeError) as error:
+        raise BadInputError(
+            f"{path}: expected a table of DeepLabCut, found: {error}; save it as CSV"
+        ) from None
+    if index.dtype.kind not in "iuf":
+        refuse_labels(path, _texts(index)[0] if len(index) and index.dtype.kind in "SO" else "")
+    by_name = {
+        (key[1] if len(key) == 4 else "", str(key[-2]), str(key[-1])): values[:, i].astype(float)
+        for i, key in enumerate(columns)
     }
-    require_points(path, names, levels["bodyparts"][1:])
-    table, _ = _table(path, body, levels["bodyparts"], [0, *columns.values(), -1])
-    values = dict(zip(columns, table.T[1:], strict=True))
-    return from_columns(path, table[:, 0], values, names)
-
-
-def _without_images(path: Path, rows: Iterator[Row]) -> Iterator[Row]:
-    for line, cells in rows:
-        if "/" in cells[0] or "\\" in cells[0] or cells[0].lower().endswith(".png"):
-            refuse_labels(path, cells[0])
-        yield line, cells
-
-
-def _plain(
-    path: Path,
-    header: list[str],
-    rows: Iterator[Row],
-    names: Sequence[str],
-    columns: ColumnsParams,
-) -> list[Track]:
-    wanted = {(n, c): getattr(columns, c).format(n) for n in names for c in "xy"}
-    scores = {n: columns.likelihood.format(n) for n in names}
-    touch = {side: columns.contact.format(side) for side in ("left", "right")}
-    extra = {columns.frame, columns.time, *scores.values(), *touch.values()}
-    places = {
-        name: place
-        for name in (*wanted.values(), *sorted(extra))
-        if (place := column(header, name)) is not None
-    }
-    for (_, coordinate), name in wanted.items():
-        if name not in places:
-            raise BadInputError(
-                f"{path}: row 1: expected a column {name}{nearest(name, header)}, found "
-                f"{shortened(', '.join(header))}; name points with --points.* and columns with "
-                f"--columns.{coordinate}"
-            )
-    split = column(header, columns.trial)
-    _require_named(path, header, columns, {**places, columns.trial: split}, (scores, touch))
-    table, trials = _table(path, rows, header, [*places.values(), -1 if split is None else split])
-    values = dict(zip(places, table.T, strict=True))
-    tracks = []
-    order = {trial: number for number, trial in enumerate(dict.fromkeys(trials))}
-    number = np.array([order[trial] for trial in trials])
-    for trial, place in order.items():
-        at = number == place
-        part = {name: value[at] for name, value in values.items()}
-        numbers = numbered(path, part.get(columns.frame, np.arange(float(at.sum()))))
-        points = {n: np.stack([part[wanted[n, c]] for c in "xy"], axis=1) for n in names}
-        likely = {n: part[name] for n, name in scores.items() if name in part}
-        rate = _rate(path, numbers, part[columns.time]) if columns.time in part else None
-        contact = {side: part[name] for side, name in touch.items() if name in part}
-        tracks.append(Track(str(path), trial, numbers, rate, points, likely, contact=contact))
-    return tracks
-
-
-def _require_named(
-    path: Path,
-    header: list[str],
-    columns: ColumnsParams,
-    places: Mapping[str, int | None],
-    several: Sequence[Mapping[str, str]],
-) -> None:
-    """Refuse a column that was named and is not there; by their defaults columns may be absent."""
-    of = {"frame": [columns.frame], "time": [columns.time], "trial": [columns.trial]}
-    of |= {key: list(m.values()) for key, m in zip(("likelihood", "contact"), several, strict=True)}
-    for key, wanted in of.items():
-        if key in columns.model_fields_set and all(places.get(name) is None for name in wanted):
-            raise BadInputError(
-                f"{path}: row 1: expected a column {wanted[0]}{nearest(wanted[0], header)}, found "
-                f"{shortened(', '.join(header))}; is it the right --columns.{key}?"
-            )
-
-
-def _rate(path: Path, frames: Ints, t: Floats) -> float | None:
-    """Frames a second by a column of time [s]; None of one frame."""
-    new = np.diff(frames) > 0
-    steps = np.diff(t)[new] / np.diff(frames)[new]
-    if not np.isfinite(t).all() or (steps <= 0).any():
-        raise BadInputError(f"{path}: expected time to rise with the frames, found it otherwise")
-    return float(1.0 / np.median(steps)) if len(steps) else None
+    return from_columns(path, np.asarray(index, np.float64), by_name, names)
 
 
 def _trex(path: Path, names: Sequence[str]) -> list[Track]:
     """Points poseX0, poseY0 and so on, of one individual; what is missing is infinite."""
-    import io
-
     data = read_limited(path, LARGEST)
     if not data.startswith(b"PK"):
         raise BadInputError(f"{path}: expected {_TREX}, found {'none' if data else 'nothing'}")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            held = _arrays(path, file, names)
+            arrays = _arrays(path, file, names)
     except BadInputError:
         raise
     except _DAMAGES as error:
-        found = "objects of Python" if "pickle" in str(error) else f"a damaged one: {error}"
-        raise BadInputError(f"{path}: expected {_TREX}, found {found}") from None
-    frames = numbered(path, held["frame"])
-    lost = held["missing"] > 0 if "missing" in held else np.zeros(len(frames), bool)
+        what = "objects of Python" if "pickle" in str(error) else f"a damaged one: {error}"
+        raise BadInputError(f"{path}: expected {_TREX}, found {what}") from None
+    frames = numbered(path, arrays["frame"])
+    lost = arrays["missing"] > 0 if "missing" in arrays else np.zeros(len(frames), bool)
     points = {}
     for name in names:
-        values = np.stack([held[f"pose{axis}{name}"] for axis in "XY"], axis=1)
+        values = np.stack([arrays[f"pose{axis}{name}"] for axis in "XY"], axis=1)
         values[~np.isfinite(values).all(axis=1) | lost] = np.nan
         points[name] = values
-    rate = float(held["frame_rate"][0]) if len(held.get("frame_rate", ())) else None
+    rate = float(arrays["frame_rate"][0]) if len(arrays.get("frame_rate", ())) else None
     return [Track(str(path), "", frames, rate, points, {})]
 
 
@@ -291,7 +330,10 @@ def _lengths(packed: zipfile.ZipFile, keys: Collection[str]) -> tuple[dict[str, 
         if (key := entry.filename.removesuffix(".npy")) not in keys:
             continue
         with packed.open(entry) as file:
-            shape, _, kind = _header(file.read(_LONGEST_HEADER))
+            begin = io.BytesIO(file.read(_LONGEST_HEADER))
+        old = np.lib.format.read_magic(begin) == (1, 0)
+        read_header = getattr(np.lib.format, f"read_array_header_{1 if old else 2}_0")
+        shape, _, kind = read_header(begin)
         if kind.hasobject:
             raise ValueError(f"{key} is pickled")
         if kind.kind not in "biuf" or min(shape, default=0) < 0:
@@ -301,12 +343,3 @@ def _lengths(packed: zipfile.ZipFile, keys: Collection[str]) -> tuple[dict[str, 
         lengths[key] = math.prod(shape)
         total += lengths[key] * max(8, kind.itemsize)
     return lengths, total
-
-
-def _header(begin: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    import io
-
-    file = io.BytesIO(begin)
-    if np.lib.format.read_magic(file) == (1, 0):
-        return np.lib.format.read_array_header_1_0(file)
-    return np.lib.format.read_array_header_2_0(file)

@@ -17,10 +17,19 @@ from antennate.errors import BadInputError
 from antennate.experiments.tracks import measures, synthetic
 from antennate.experiments.tracks.cleaning import COUNTED, Antennae, clean
 from antennate.experiments.tracks.config import TracksConfig
-from antennate.experiments.tracks.measures import FREE, NAMES, SHAPES, UNKNOWN, Seen
+from antennate.experiments.tracks.measures import (
+    FREE,
+    NAMES,
+    NEAR,
+    SHAPES,
+    UNKNOWN,
+    Antenna,
+    Wall,
+    require_inside,
+    wall_of,
+)
 from antennate.experiments.tracks.readers import read
 from antennate.experiments.tracks.track import Track
-from antennate.experiments.tracks.walls import NEAR, Wall, require_inside, wall_of
 from antennate.messages import shortened
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers
@@ -101,7 +110,7 @@ class TracksOutcome:
 
     config: TracksConfig
     rows: Sequence[TrackRow]
-    antennae: Sequence[Seen]
+    antennae: Sequence[Antenna]
     walls: dict[str, Wall]
     skipped: int
     unseen: Sequence[Unseen]
@@ -124,7 +133,7 @@ class TracksOutcome:
             },
             "animals": len(counted),
             "skipped": self.skipped,
-            "unseen": [asdict(one) for one in self.unseen],
+            "unseen": [asdict(antenna) for antenna in self.unseen],
             "trials_in_contact": len(table),
             "frames": {
                 name: sum(getattr(row, name) for row in self.rows)
@@ -141,7 +150,7 @@ class TracksOutcome:
     def _at_wall(self, name: str) -> dict[str, float | None]:
         """Least distance of a point to the wall of a file, and the share of frames beyond it."""
         pairs = zip(self.rows, self.antennae, strict=True)
-        near = [one.distance[one.known] for row, one in pairs if row.file == name]
+        near = [a.distance[a.known] for row, a in pairs if row.file == name]
         joined = np.concatenate([np.zeros(0), *near])
         if self.walls[name].kind not in ("line", "circle") or not len(joined):
             return {"nearest": None, "beyond": None}
@@ -157,17 +166,14 @@ class TracksOutcome:
         writer.writerow(
             ["trial", "side", "frame", "time_s", "angle_rad", "flex_rad", *bends, "shape"]
         )
-        for one in self.antennae:
-            shapes = measures.shapes_of(self.config.criteria, one)
-            values = np.column_stack(
-                [one.outline.direction, one.outline.flex, one.outline.curvature]
-            ).round(5)
-            for i, (numbers, shape) in enumerate(
-                zip(values.tolist(), shapes.tolist(), strict=True)
-            ):
+        for antenna in self.antennae:
+            shapes, angles = measures.shapes_of(self.config.criteria, antenna), antenna.outline
+            columns = np.column_stack([angles.direction, angles.flex, angles.curvature]).round(5)
+            rows = zip(columns.tolist(), shapes.tolist(), strict=True)
+            for i, (numbers, shape) in enumerate(rows):
                 cells = ["" if math.isnan(v) else v for v in numbers[: 2 + inner]]
-                time = f"{i / one.rate:.6f}"
-                writer.writerow([one.trial, one.side, i, time, *cells, NAMES[shape]])
+                time = f"{i / antenna.rate:.6f}"
+                writer.writerow([antenna.trial, antenna.side, i, time, *cells, NAMES[shape]])
         return file.getvalue()
 
 
@@ -185,40 +191,48 @@ def run(
         MissingPackageError: A file is HDF5 and h5py is not installed.
     """
     del workers  # reading and measuring take less time than starting processes
-    made = _Made(config)
+    animals = _Animals(config)
     if not config.files:
-        made.config = config.model_copy(
+        animals.config = config.model_copy(
             update={"points": synthetic.POINTS, "wall": synthetic.WALL, "y_down": False}
         )
     names = config.files or [f"synthetic{k}" for k in range(config.synthetic.trials)]
     for number, name in enumerate(names):
         if config.files:
-            rows = made.add(name, _read(config, Path(name)))
+            tracks = read(Path(name), config.points.parts, config.columns)
+            if not tracks:
+                raise BadInputError(f"{name}: expected an animal with the named points, found none")
+            rows = animals.add(name, [track.in_order() for track in tracks])
         else:
             track, truth = synthetic.animal(config.synthetic, config.criteria, config.seed, number)
-            rows = made.add(name, [track], truth)
+            rows = animals.add(name, [track], truth)
         for row in rows:
             on_row(row)
         on_step(number + 1, len(names))
-    if not made.rows:
-        empty = {f"{p} has no value in {one.file}": 0 for one in made.unseen for p in one.empty}
+    if not animals.rows:
+        empty = {f"{p} has no value in {a.file}": 0 for a in animals.unseen for p in a.empty}
         why = shortened(", ".join(empty)) if empty else "are the points right"
         raise BadInputError(
             f"{', '.join(names)}: expected an animal known in {config.cleaning.least_frames} "
             f"frames, found none; {why}, and is --cleaning.likelihood not too high?"
         )
     return TracksOutcome(
-        made.config, made.rows, made.antennae, made.walls, made.skipped, made.unseen
+        animals.config,
+        animals.rows,
+        animals.antennae,
+        animals.walls,
+        animals.skipped,
+        animals.unseen,
     )
 
 
 @dataclass
-class _Made:
-    """What has been measured so far."""
+class _Animals:
+    """Animals that have been measured so far."""
 
     config: TracksConfig
     rows: list[TrackRow] = field(default_factory=list[TrackRow])
-    antennae: list[Seen] = field(default_factory=list[Seen])
+    antennae: list[Antenna] = field(default_factory=list[Antenna])
     walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
     skipped: int = 0
     unseen: list[Unseen] = field(default_factory=list["Unseen"])
@@ -230,20 +244,20 @@ class _Made:
     ) -> Sequence[TrackRow]:
         """Measure the animals of one file; `truth` are the shapes of the left antenna."""
         config, before = self.config, len(self.rows)
-        found = self._cleaned(tracks)
-        self._refuse_again(name, [animal.track for animal in found])
-        self.walls[name] = wall = _wall(config, found)
+        cleaned = self._cleaned(tracks)
+        self._refuse_again(name, [animal.track for animal in cleaned])
+        self.walls[name] = wall = _wall(config, cleaned)
         trial = self.rows[-1].trial + 1 if self.rows else 0
-        for number, animal in enumerate(found, trial):
+        for number, animal in enumerate(cleaned, trial):
             for side in config.points.sides:
-                one = measures.seen(number, side, animal, wall)
-                self.rows.append(_row(config, animal, one, truth if side == "left" else None))
-                self.antennae.append(one)
+                antenna = measures.measured(number, side, animal, wall)
+                self.rows.append(_row(config, animal, antenna, truth if side == "left" else None))
+                self.antennae.append(antenna)
         return self.rows[before:]
 
     def _cleaned(self, tracks: Sequence[Track]) -> list[Antennae]:
         """The antennae of the animals that are known in enough frames."""
-        config, found = self.config, list[Antennae]()
+        config, cleaned = self.config, list[Antennae]()
         for track in tracks:
             antennae = clean(config, track, frame_rate(config, track), config.y_down)
             known = {side: antennae.known(side) for side in antennae.sides}
@@ -257,43 +271,34 @@ class _Made:
             if len(few) == len(known):
                 self.skipped += 1
             else:
-                found.append(antennae)
-        return found
+                cleaned.append(antennae)
+        return cleaned
 
     def _refuse_again(self, name: str, tracks: Sequence[Track]) -> None:
         """Refuse an animal that another file holds too: one recording would count as two."""
-        here = {_content(track): track.animal for track in tracks}
-        for content, animal in here.items():
+        hashes: dict[bytes, str] = {}
+        for track in tracks:  # a hash of the points, the same in every format
+            points = np.stack(list(track.points.values()))
+            content = np.where(np.isnan(points), np.nan, points).tobytes()
+            hashes[hashlib.sha256(content).digest()] = track.animal
+        for content, animal in hashes.items():
             if content in self.files:
                 raise BadInputError(
                     f"{name}: expected another recording than {self.files[content]}, found the "
                     f"same points{f' of {animal}' if animal else ''}; give each recording once"
                 )
-        self.files |= dict.fromkeys(here, name)
+        self.files |= dict.fromkeys(hashes, name)
 
 
-def _content(track: Track) -> bytes:
-    """A hash of the points of an animal, the same in every format."""
-    points = np.stack(list(track.points.values()))
-    return hashlib.sha256(np.where(np.isnan(points), np.nan, points).tobytes()).digest()
-
-
-def _read(config: TracksConfig, path: Path) -> list[Track]:
-    tracks = read(path, config.points.parts, config.columns)
-    if not tracks:
-        raise BadInputError(f"{path}: expected an animal with the named points, found none")
-    return [track.in_order() for track in tracks]
-
-
-def _wall(config: TracksConfig, found: Sequence[Antennae]) -> Wall:
-    if not found:
+def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> Wall:
+    """The wall of a file, from its animals."""
+    if not animals:
         return Wall("none")
-    tips = [places[:, -1] for animal in found for places in animal.places.values()]
-    lengths = [measures.length_of(points) for animal in found for points in animal.sides.values()]
-    usual, file = float(np.nanmedian(lengths)), found[0].track.file
-    wall = wall_of(config.wall, file, np.concatenate(tips), usual)
-    bases = [places[:, 0] for animal in found for places in animal.places.values()]
-    require_inside(file, wall, np.concatenate(bases))
+    places = [antenna for animal in animals for antenna in animal.places.values()]
+    lengths = [measures.length_of(side) for animal in animals for side in animal.sides.values()]
+    usual, file = float(np.nanmedian(lengths)), animals[0].track.file
+    wall = wall_of(config.wall, file, np.concatenate([p[:, -1] for p in places]), usual)
+    require_inside(file, wall, np.concatenate([p[:, 0] for p in places]))
     return wall
 
 
@@ -327,33 +332,29 @@ def frame_rate(config: TracksConfig, track: Track) -> float:
     return config.rate or stated
 
 
-def _row(config: TracksConfig, animal: Antennae, one: Seen, truth: Ints | None) -> TrackRow:
-    shape = measures.shapes_of(config.criteria, one)
-    contact = shape >= 0
-    share = measures.shares([shape])
-    median = {
-        name: float(np.median(values[contact])) if contact.any() else None
-        for name, values in (("angle", one.outline.direction), ("flex", one.outline.flex))
-    }
-    classes = {
-        name: None if math.isnan(value) else float(value)
-        for name, value in zip(SHAPES, share, strict=True)
-    }
+def _row(config: TracksConfig, animal: Antennae, antenna: Antenna, truth: Ints | None) -> TrackRow:
+    shape = measures.shapes_of(config.criteria, antenna)
+    contact, angles = shape >= 0, antenna.outline
+    direction, flex = (
+        float(np.median(values[contact])) if contact.any() else None
+        for values in (angles.direction, angles.flex)
+    )
+    shares = zip(SHAPES, measures.shares([shape]).tolist(), strict=True)
     return TrackRow(
         seed=config.seed,
-        trial=one.trial,
+        trial=antenna.trial,
         file=animal.track.file,
         animal=animal.track.animal,
-        side=one.side,
+        side=antenna.side,
         status="contact" if contact.any() else "no_contact",
-        rate_hz=one.rate,
+        rate_hz=antenna.rate,
         frames=animal.frames,
         unknown=int((shape == UNKNOWN).sum()),
         free=int((shape == FREE).sum()),
         contact=int(contact.sum()),
-        angle_median_rad=median["angle"],
-        flex_median_rad=median["flex"],
+        angle_median_rad=direction,
+        flex_median_rad=flex,
         correct=None if truth is None else float((shape == truth).mean()),
-        **classes,
+        **{name: None if math.isnan(share) else share for name, share in shares},
         **animal.counts,
     )

@@ -20,7 +20,7 @@ from antennate.experiments.tracks.config import (
     SyntheticParams,
     TrackWallParams,
 )
-from antennate.experiments.tracks.measures import FREE, Seen, shapes_of
+from antennate.experiments.tracks.measures import FREE, Antenna, shapes_of
 from antennate.experiments.tracks.track import Track
 from antennate.types import Floats, Ints
 
@@ -70,7 +70,7 @@ def animal(
     if separated:
         truth = kind.astype(np.int64)
     else:
-        exact = Seen(trial, "left", params.rate, left, outline(left), off / params.length)
+        exact = Antenna(trial, "left", params.rate, left, outline(left), off / params.length)
         truth = shapes_of(criteria, exact)
     return _spoiled(params, points, rng), truth
 

@@ -1,17 +1,20 @@
-"""One animal as a file of tracking software holds it, and what every format has to fulfil."""
+"""One animal as a file of tracking software holds it, what every format has to fulfil, and CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
-from antennate.csv_files import LARGEST_WHOLE
+from antennate.csv_files import LARGEST_WHOLE, MISSING, Row, column, csv_rows, number_of
 from antennate.errors import BadInputError
-from antennate.files import in_units
+from antennate.experiments.tracks.config import ColumnsParams
+from antennate.files import in_units, read_limited
 from antennate.messages import nearest, shortened
 from antennate.types import Floats, Ints
 
@@ -150,3 +153,173 @@ def numbered(path: Path, frames: Floats) -> Ints:
             f"{frames[abs(frames).argmax()]:g}"
         )
     return frames.astype(np.int64)
+
+
+def read_csv(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
+    """The animals of a plain CSV file, or of one of DeepLabCut.
+
+    Raises:
+        BadInputError: It cannot be read, or lacks a point.
+    """
+    rows = csv_rows(path, read_limited(path, LARGEST), (), BadInputError, ended=True)
+    _, header = next(rows)
+    if not header:
+        raise BadInputError(f"{path}: row 1: expected the names of the columns, found a blank line")
+    if header[0] == "scorer":
+        return _deeplabcut(path, header, rows, names)
+    return _plain(path, header, rows, names, columns)
+
+
+def _numbers(
+    path: Path, line: int, header: Sequence[str], cells: list[str], places: Sequence[int]
+) -> list[float]:
+    """Numbers of a row, NaN for a cell that says of itself that it has none."""
+    if len(cells) != len(header):
+        why = "; are there decimal commas? write points"
+        if len(cells) < len(header):
+            why = " (truncated); delete the row"
+        elif any("." in cell for cell in cells):
+            why = (
+                "; does row 1 lack the name of a column? R writes none above its row names: write "
+                "one there, and name the column of frames with --columns.frame"
+            )
+        raise BadInputError(
+            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
+        )
+    values: list[float] = []
+    for place in places:
+        cell = cells[place].strip()
+        try:
+            value = number_of(cell)
+        except ValueError as error:
+            raise BadInputError(f"{path}: row {line}: expected {error}, found {cell!r}") from None
+        if math.isnan(value) and cell.lower() not in MISSING:
+            raise BadInputError(
+                f"{path}: row {line}: expected a number or nothing in {header[place]}, found "
+                f"{shortened(cell)}"
+            )
+        values.append(value)
+    return values
+
+
+def _table(
+    path: Path, rows: Iterator[Row], header: Sequence[str], places: Sequence[int]
+) -> tuple[Floats, list[str]]:
+    """Numbers of some columns, a row for each frame, and the texts of the last place, if any."""
+    numbers, texts = array("d"), list[str]()
+    *places, text = places
+    for line, cells in rows:
+        numbers.extend(_numbers(path, line, header, cells, places))
+        texts.append(cells[text].strip() if text >= 0 else "")
+    if not texts:
+        raise BadInputError(f"{path}: expected rows of frames, found none")
+    return np.array(numbers).reshape(len(texts), -1), texts
+
+
+def _deeplabcut(
+    path: Path, first: list[str], rows: Iterator[Row], names: Sequence[str]
+) -> list[Track]:
+    """Columns named by scorer, (individuals,) bodyparts and coords, a row for each frame."""
+    levels = {"scorer": first}
+    while "coords" not in levels:
+        _, cells = next(rows, (0, []))
+        key = cells[0].strip() if cells else ""
+        if key not in ("individuals", "bodyparts", "coords") or len(cells) != len(first):
+            raise BadInputError(
+                f"{path}: row {len(levels) + 1}: expected DeepLabCut's row of bodyparts or coords, "
+                f"found {shortened(key) if cells else 'the end (truncated)'}"
+            )
+        levels[key] = [cell.strip() for cell in cells]
+    if "bodyparts" not in levels:
+        raise BadInputError(f"{path}: row 2: expected DeepLabCut's row of bodyparts, found none")
+    begin = next((i for i, name in enumerate(levels["coords"]) if name in ("x", "y")), 1)
+    body = _without_images(path, rows)
+    if begin > 1:
+        refuse_labels(path, "/".join(next(body, (0, [""]))[1][:begin]))
+    animals = levels.get("individuals", [""] * len(first))
+    columns = {
+        (animals[i], levels["bodyparts"][i], levels["coords"][i]): i
+        for i in range(1, len(first))
+        if levels["bodyparts"][i] in names
+    }
+    require_points(path, names, levels["bodyparts"][1:])
+    table, _ = _table(path, body, levels["bodyparts"], [0, *columns.values(), -1])
+    values = dict(zip(columns, table.T[1:], strict=True))
+    return from_columns(path, table[:, 0], values, names)
+
+
+def _without_images(path: Path, rows: Iterator[Row]) -> Iterator[Row]:
+    """Rows whose first cell is no image, as that of hand labels is."""
+    for line, cells in rows:
+        if "/" in cells[0] or "\\" in cells[0] or cells[0].lower().endswith(".png"):
+            refuse_labels(path, cells[0])
+        yield line, cells
+
+
+def _plain(
+    path: Path,
+    header: list[str],
+    rows: Iterator[Row],
+    names: Sequence[str],
+    columns: ColumnsParams,
+) -> list[Track]:
+    """A column for each coordinate of a point, and one that tells trials or animals apart."""
+    wanted = {(n, c): getattr(columns, c).format(n) for n in names for c in "xy"}
+    scores = {n: columns.likelihood.format(n) for n in names}
+    touch = {side: columns.contact.format(side) for side in ("left", "right")}
+    extra = {columns.frame, columns.time, *scores.values(), *touch.values()}
+    places = {
+        name: place
+        for name in (*wanted.values(), *sorted(extra))
+        if (place := column(header, name)) is not None
+    }
+    for (_, coordinate), name in wanted.items():
+        if name not in places:
+            raise BadInputError(
+                f"{path}: row 1: expected a column {name}{nearest(name, header)}, found "
+                f"{shortened(', '.join(header))}; name points with --points.* and columns with "
+                f"--columns.{coordinate}"
+            )
+    split = column(header, columns.trial)
+    _require_named(path, header, columns, [*scores.values()], [*touch.values()])
+    table, trials = _table(path, rows, header, [*places.values(), -1 if split is None else split])
+    values = dict(zip(places, table.T, strict=True))
+    tracks = []
+    order = {trial: number for number, trial in enumerate(dict.fromkeys(trials))}
+    number = np.array([order[trial] for trial in trials])
+    for trial, place in order.items():
+        at = number == place
+        part = {name: value[at] for name, value in values.items()}
+        numbers = numbered(path, part.get(columns.frame, np.arange(float(at.sum()))))
+        points = {n: np.stack([part[wanted[n, c]] for c in "xy"], axis=1) for n in names}
+        likely = {n: part[name] for n, name in scores.items() if name in part}
+        rate = _rate(path, numbers, part[columns.time]) if columns.time in part else None
+        contact = {side: part[name] for side, name in touch.items() if name in part}
+        tracks.append(Track(str(path), trial, numbers, rate, points, likely, contact=contact))
+    return tracks
+
+
+def _require_named(
+    path: Path,
+    header: list[str],
+    columns: ColumnsParams,
+    scores: Sequence[str],
+    touch: Sequence[str],
+) -> None:
+    """Refuse a column that was named and is not there; by their defaults columns may be absent."""
+    single = {key: [getattr(columns, key)] for key in ("frame", "time", "trial")}
+    for key, names in {**single, "likelihood": scores, "contact": touch}.items():
+        if key in columns.model_fields_set and all(column(header, n) is None for n in names):
+            raise BadInputError(
+                f"{path}: row 1: expected a column {names[0]}{nearest(names[0], header)}, found "
+                f"{shortened(', '.join(header))}; is it the right --columns.{key}?"
+            )
+
+
+def _rate(path: Path, frames: Ints, t: Floats) -> float | None:
+    """Frames a second by a column of time [s]; None of one frame."""
+    new = np.diff(frames) > 0
+    steps = np.diff(t)[new] / np.diff(frames)[new]
+    if not np.isfinite(t).all() or (steps <= 0).any():
+        raise BadInputError(f"{path}: expected time to rise with the frames, found it otherwise")
+    return float(1.0 / np.median(steps)) if len(steps) else None

@@ -32,7 +32,7 @@ COMMAND_PERIOD = 0.002
 
 
 class WallConfig(Params):
-    """Everything that decides the outcome of `antennate wall`."""
+    """Everything that decides the outcome of `bench wall`."""
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_angle",
