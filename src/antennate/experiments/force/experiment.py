@@ -236,16 +236,14 @@ PARTS = {
     "dragged": "traverses",
 }
 """Where a result holds each part."""
-EXPLAINED = tuple(
-    measure
-    for name, path in PARTS.items()
-    for place in ("known", "unknown")
-    for measure in (
-        Measure(f"{path}.{place}.flex.r2", f"{name}, place {place}"),
-        Measure(f"{path}.{place}.flex.r2_95", "  95 %"),
-    )
+MEASURES = (
+    Measure("force_max_n", "largest force", "N", form=".4f"),
+    *(
+        Measure(f"{path}.{place}.flex.r2", f"{name}, place {place}", interval="r2_95")
+        for name, path in PARTS.items()
+        for place in ("known", "unknown")
+    ),
 )
-MEASURES = (Measure("force_max_n", "largest force", "N", form=".4f"), *EXPLAINED)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:

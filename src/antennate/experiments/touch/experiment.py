@@ -228,33 +228,26 @@ def _with_truth(
     return {"contact_force_n": force, "merge_time_s": merge, **{key: pooled[key] for key in keys}}
 
 
-_95 = "  95 %"
-F1 = Measure("f1", "F1")
+F1 = Measure("f1", "F1", interval="f1_95")
 ONSET = Measure("onset.median_ms", "onset latency", "ms", form=".0f")
 RELEASE = Measure("release.median_ms", "release latency", "ms", form=".0f")
 PROFILE = (
     Measure("contact_share", "time in contact", "%", form=".0f", scale=100.0),
     F1,
-    Measure("f1_95", _95),
-    Measure("precision", "precision"),
-    Measure("precision_95", _95),
-    Measure("recall", "recall"),
-    Measure("recall_95", _95),
+    Measure("precision", "precision", interval="precision_95"),
+    Measure("recall", "recall", interval="recall_95"),
     Measure("contacts", "contacts", form="d"),
     Measure("missed", "  missed", form="d"),
-    Measure("missed_per_m", "  missed per metre"),
-    Measure("missed_per_m_95", _95),
+    Measure("missed_per_m", "  missed per metre", interval="missed_per_m_95"),
     Measure("alarms", "alarms", form="d"),
     Measure("false", "  false", form="d"),
-    Measure("false_per_m", "  false per metre"),
-    Measure("false_per_m_95", _95),
+    Measure("false_per_m", "  false per metre", interval="false_per_m_95"),
     ONSET,
     Measure("onset.p90_ms", "  90 %", "ms", form=".0f"),
     Measure("onset.median_mm", "  way until then", "mm", form=".0f"),
     RELEASE,
     Measure("release.p90_ms", "  90 %", "ms", form=".0f"),
-    Measure("auc", "area under ROC, level", form=".3f"),
-    Measure("auc_95", _95, form=".3f"),
+    Measure("auc", "area under ROC, level", form=".3f", interval="auc_95"),
     Measure("auc_flex", "  flex itself", form=".3f"),
 )
 AVERAGING = (
@@ -304,7 +297,7 @@ def _grid(
     cells = {(row["profile"], row[part]): row for row in rows}
     lines = []
     for value in dict.fromkeys(row[part] for row in rows):
-        for name, label in (("f1", f"{value:{form}}"), ("f1_95", _95)):
+        for name, label in (("f1", f"{value:{form}}"), ("f1_95", "  95 %")):
             lines.append((label, [shown(cells[p, value][name]) for p in profiles]))
     return Table(title, list(profiles), lines)
 

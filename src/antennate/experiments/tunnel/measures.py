@@ -42,13 +42,16 @@ def _share(label: str, name: str) -> Measure:
     return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0, least=0.0, most=1.0)
 
 
-_SECONDS = (
-    Measure("restricted_mean_time_s", "restricted mean time", "s", form=".1f"),
-    Measure("restricted_mean_time_95", "  95 %", "s", form=".1f"),
+_SECONDS = Measure(
+    *("restricted_mean_time_s", "restricted mean time", "s"),
+    form=".1f",
+    interval="restricted_mean_time_95",
 )
-_SHARES = (
-    Measure("restricted_mean_share", "restricted mean time", "% of limit", form=".1f", scale=100.0),
-    Measure("restricted_mean_share_95", "  95 %", "% of limit", form=".1f", scale=100.0),
+_SHARES = Measure(
+    *("restricted_mean_share", "restricted mean time", "% of limit"),
+    form=".1f",
+    scale=100.0,
+    interval="restricted_mean_share_95",
 )
 CONTROLLER = (
     Measure("trials", "trials", form="d"),
@@ -58,17 +61,15 @@ CONTROLLER = (
     Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
     Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
     Measure("invalid", "invalid", form="d"),
-    Measure("speed_m_s", "speed over successes", "m/s", form=".3f"),
-    Measure("speed_95", "  95 %", "m/s", form=".3f"),
+    Measure("speed_m_s", "speed over successes", "m/s", form=".3f", interval="speed_95"),
     Measure("progress_per_time_m_s", "progress over time", "m/s", form=".3f"),
-    *_SECONDS,
+    _SECONDS,
     Measure("stuck", "stuck episodes", of=total, form="d", least=0.0),
     Measure("recovered", "  recovered", of=total, form="d", least=0.0),
     *(_share(label, name) for name, label in SHARES.items()),
     Measure("force_mean_n", "contact force, mean", "N", of=mean, least=0.0),
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
-    Measure("offset_m", "off the middle", "m", form=".3f", least=0.0),
-    Measure("offset_95", "  95 %", "m", form=".3f"),
+    Measure("offset_m", "off the middle", "m", form=".3f", least=0.0, interval="offset_95"),
     Measure("spring_low_n_m", of=smallest),
     Measure("spring_high_n_m", "spring torque, most", "N·mm", of=largest, scale=1e3),
     Measure("spring_cycles", "  load cycles, most", of=largest, form="d", least=0.0),
@@ -78,13 +79,14 @@ TIME = Measure(
 )
 LIMIT = Measure("limit_s", "time limit", "s", form=".1f", least=0.0)
 COLUMNS = (*CONTROLLER, TIME, LIMIT)
-_SECONDS_APART = (
-    Measure("time_difference_s", "difference", "s", form="+.1f"),
-    Measure("time_difference_95", "  95 %", "s", form="+.1f"),
+_SECONDS_APART = Measure(
+    "time_difference_s", "difference", "s", form="+.1f", interval="time_difference_95"
 )
-_SHARES_APART = (
-    Measure("share_difference", "difference", "% of limit", form="+.1f", scale=100.0),
-    Measure("share_difference_95", "  95 %", "% of limit", form="+.1f", scale=100.0),
+_SHARES_APART = Measure(
+    *("share_difference", "difference", "% of limit"),
+    form="+.1f",
+    scale=100.0,
+    interval="share_difference_95",
 )
 PAIR = (
     Measure("trials", "valid in both", form="d"),
@@ -93,10 +95,13 @@ PAIR = (
     Measure("both", "both succeeded", form="d"),
     Measure("both_time_s", "  time of each", "s", form=".1f", join=", "),
     Measure("mcnemar_p", "McNemar p", form=".3g"),
-    *_SECONDS_APART,
+    _SECONDS_APART,
     Measure("wilcoxon_p", "Wilcoxon p", form=".3g"),
-    Measure("offset_difference_m", "off the middle", "m", form="+.3f"),
-    Measure("offset_difference_95", "  95 %", "m", form="+.3f"),
+    Measure(
+        *("offset_difference_m", "off the middle", "m"),
+        form="+.3f",
+        interval="offset_difference_95",
+    ),
 )
 
 
@@ -110,7 +115,7 @@ def measures_of(limit: float | None) -> tuple[Sequence[Measure], Sequence[Measur
     """What tables show of one controller, and of two: in shares where there is no limit of all."""
     if limit is not None:
         return CONTROLLER, PAIR
-    shares = dict(zip((*_SECONDS, *_SECONDS_APART), (*_SHARES, *_SHARES_APART), strict=True))
+    shares = {_SECONDS: _SHARES, _SECONDS_APART: _SHARES_APART}
     one, two = ([shares.get(measure, measure) for measure in each] for each in (CONTROLLER, PAIR))
     return one, two
 
