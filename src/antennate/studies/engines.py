@@ -73,13 +73,13 @@ class Submitted:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
         theirs = {**(work.shared or environment()), _FOLDER: _folder()}
-        told = (theirs, added_objects(_by_value()))
+        environs = (theirs, added_objects(_by_value()))
         try:
             while waiting or running:
                 count = self._workers() if self._workers is not None else count
                 while waiting and len(running) < count * self._ahead:
                     places = waiting.next()
-                    running[self._submitted(work.part(places), *told)] = places
+                    running[self._submitted(work.part(places), *environs)] = places
                 ended = [future for future in running if future.done()]
                 for future in ended:
                     self._take(future, running.pop(future), work, waiting, emit, fail)
@@ -183,19 +183,19 @@ class _Carried:
         return self._content
 
     def __setstate__(self, content: bytes) -> None:
-        told = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
-        self._part, folder, added, ignored = told
+        carried = pickle.loads(content)  # noqa: S301  (a worker of ours made it)
+        self._part, folder, added, ignored = carried
         for number in ignored:
             signal.signal(number, signal.SIG_IGN)
         os.chdir(folder)
         take_added(added)
 
-    def __call__(self, *told: Any) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         """Run one task, or some together and emit their results."""
         part: Part = self._part
         if not part.together:
-            return part.function(*part.tasks[told[0]])
-        chosen, emit = told
+            return part.function(*part.tasks[arguments[0]])
+        chosen, emit = arguments
         return part.function([part.tasks[place] for (place,) in chosen], emit)
 
 

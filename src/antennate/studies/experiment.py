@@ -103,7 +103,7 @@ class Trials(Generic[Config]):
     ) -> None:
         """Run some trials in this process; emit the index and the row of each as it ends."""
         tasks = [(config, *trial, None) for trial in trials]
-        _Lockstep(self)(tasks, lambda i, found: emit(i, found[0]))
+        _Lockstep(self)(tasks, lambda i, result: emit(i, result[0]))
 
     def run_on_device(
         self,
@@ -118,7 +118,7 @@ class Trials(Generic[Config]):
             ConfigError: It has none.
         """
         tasks = [(config, *trial, None) for trial in trials]
-        self._batched(tasks, lambda i, found: emit(i, found[0]), no_failure, device)
+        self._batched(tasks, lambda i, result: emit(i, result[0]), no_failure, device)
 
     def gather(
         self,

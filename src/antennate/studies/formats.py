@@ -293,14 +293,14 @@ def decoded(data: Any, packages: Collection[str]) -> Any:
         raise ValueError(f"expected a result, found {error}") from None
 
 
-def _object(found: type, data: Mapping[str, Any], packages: Collection[str]) -> Any:
-    if issubclass(found, Enum):
-        return found(data["value"])
-    if issubclass(found, BaseModel):
-        return found.model_validate_json(data["fields"])
-    if not is_dataclass(found):
-        raise TypeError(f"the class {found.__name__}")
-    return found(**{k: decoded(item, packages) for k, item in data.items() if k != _KIND})
+def _object(kind: type, data: Mapping[str, Any], packages: Collection[str]) -> Any:
+    if issubclass(kind, Enum):
+        return kind(data["value"])
+    if issubclass(kind, BaseModel):
+        return kind.model_validate_json(data["fields"])
+    if not is_dataclass(kind):
+        raise TypeError(f"the class {kind.__name__}")
+    return kind(**{k: decoded(item, packages) for k, item in data.items() if k != _KIND})
 
 
 def _name(value: Any) -> str:
@@ -312,12 +312,12 @@ def _class(name: str, packages: Collection[str]) -> type:
     module, _, path = name.partition(":")
     if module.partition(".")[0] not in packages or module not in sys.modules:
         raise TypeError(f"a class of {module}")
-    found: Any = sys.modules[module]
+    kind: Any = sys.modules[module]
     for part in path.split("."):
-        found = getattr(found, part)
-    if not isinstance(found, type):
+        kind = getattr(kind, part)
+    if not isinstance(kind, type):
         raise TypeError(f"no class {name}")
-    return found
+    return kind
 
 
 def dumped(value: Any) -> str:

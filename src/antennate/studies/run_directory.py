@@ -192,9 +192,9 @@ class RunDirectory:
 
     def _versions(self) -> str:
         """Versions of what the numbers depend on, and the models of the processors."""
-        told = self.store.identity if self.store is not None else None
+        identity = self.store.identity if self.store is not None else None
         models = self.store.processors if self.store is not None else []
-        known = versions() if told is None else told["versions"]
+        known = versions() if identity is None else identity["versions"]
         return formats.to_json({**known, "processor": " and ".join(models or [processor()])})
 
     def without_trials(self) -> None:
@@ -347,9 +347,9 @@ class RunDirectory:
         return self
 
     def __exit__(self, *_: object) -> None:
-        kept = self._kept or (self.store is not None and self.store.holds_trials)
-        self._close_store(remove=not kept)
-        if kept:
+        stays = self._kept or (self.store is not None and self.store.holds_trials)
+        self._close_store(remove=not stays)
+        if stays:
             if self._partial is not None:
                 with contextlib.suppress(OSError):
                     self._partial.close()

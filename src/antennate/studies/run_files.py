@@ -253,10 +253,10 @@ def inside(place: Path, name: str) -> Path:
     Raises:
         ConfigError: The name leads out of it.
     """
-    found = Path(checks.text("name", name))
-    if found.is_absolute() or ".." in found.parts or not name.isprintable():
+    path = Path(checks.text("name", name))
+    if path.is_absolute() or ".." in path.parts or not name.isprintable():
         raise ConfigError(f"name: expected one within the run, found {name}")
-    return place / found
+    return place / path
 
 
 @contextlib.contextmanager

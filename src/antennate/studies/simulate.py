@@ -98,8 +98,8 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            kept = SimulatedLog(log, header, start.world, walk.decisions)
-            walk.log = stack.enter_context(kept)
+            logged = SimulatedLog(log, header, start.world, walk.decisions)
+            walk.log = stack.enter_context(logged)
         run_loop(robot, walk.checked, control.period, walk.go_on)
     return walk.recorder.series(
         {

@@ -245,11 +245,11 @@ class _Driver:
         data = data[: data.rfind(b"\n") + 1]
         if data:
             self._failed_starts = 0
-        found = parsed(data)
-        for model in found.processors:
+        lines = parsed(data)
+        for model in lines.processors:
             self._work.saw(model)
-        for place in [place for place in job.left if str(place) in found.records]:
-            record = found.records[str(place)]
+        for place in [place for place in job.left if str(place) in lines.records]:
+            record = lines.records[str(place)]
             job.has_trials = True
             job.left.remove(place)
             if "failure" in record:

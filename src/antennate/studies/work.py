@@ -124,16 +124,16 @@ class Part:
         A log that cannot be written fails all that run beside it, as it is for the disk.
         """
         left = dict(self.tasks)
-        told: Exception | None = None
+        emit_error: Exception | None = None
         process, back = os.getpid(), _way_back()
 
         def take(place: int, result: Any) -> None:
-            nonlocal told
+            nonlocal emit_error
             _end_forked(process)
             try:
                 emit(place, result)
             except Exception as error:
-                told = error
+                emit_error = error
                 raise
             del left[place]
             back()
@@ -151,8 +151,8 @@ class Part:
                     take(now[0], self.function(*self.tasks[now[0]]))
             except Exception as error:  # noqa: BLE001  (a trial may raise anything)
                 _end_forked(process)
-                if told is not None:
-                    raise told from None
+                if emit_error is not None:
+                    raise emit_error from None
                 known = isinstance(error, LogError | WorkerError)
                 reason = str(error) if known else in_one_line(error)
                 if len(now) == 1 or isinstance(error, LogError):  # a full disk is one for all
@@ -273,8 +273,8 @@ def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
 def take_added(added: Packed) -> None:
     """In a worker: know the objects that were added in the driver."""
     for group, objects in added.items():
-        found = {name: _read(content) for name, content in objects.items()}
-        ADDED.setdefault(group, {}).update(found)
+        objects_read = {name: _read(content) for name, content in objects.items()}
+        ADDED.setdefault(group, {}).update(objects_read)
 
 
 def _read(content: bytes) -> Any:
