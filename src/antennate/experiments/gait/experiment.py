@@ -102,15 +102,15 @@ class GaitOutcome(Outcome):
 
     def _unknown(self) -> dict[str, Any]:
         """What the unknown numbers make of FORWARD, in body lengths a cycle."""
-        found = np.array([self.pace(walk).body_lengths for walk in self.drawn])
+        lengths = np.array([self.pace(walk).body_lengths for walk in self.drawn])
         ends = {n: [self.pace(walk).body_lengths for walk in both] for n, both in self.ends.items()}
-        low, median, high = np.percentile(found, [2.5, 50.0, 97.5]).tolist()
+        low, median, high = np.percentile(lengths, [2.5, 50.0, 97.5]).tolist()
         return {
-            "draws": len(found),
+            "draws": len(lengths),
             "median": median,
             "interval95": [low, high],
-            "range": [float(found.min()), float(found.max())],
-            "body_lengths_per_cycle": found.tolist(),
+            "range": [float(lengths.min()), float(lengths.max())],
+            "body_lengths_per_cycle": lengths.tolist(),
             "parameters": {
                 one.name: {
                     "range": [one.low, one.high],

@@ -70,9 +70,9 @@ def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
     over = (alarms[None, :, 0] < contacts[:, None, 1] + grace) & (
         alarms[None, :, 1] > contacts[:, None, 0]
     )
-    found, answering = np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0))
+    answered, answering = np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0))
     onset, release, carried = [], [], 0
-    for i in np.flatnonzero(found):
+    for i in np.flatnonzero(answered):
         begin, end = contacts[i]
         answers = alarms[over[i]]
         if answers[0, 0] < begin:
@@ -84,7 +84,7 @@ def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
         if not onwards and end < len(truth) and last < len(truth):
             release.append(last - end)
     return Matches(
-        *(contacts, found, carried, len(alarms), int((~answering).sum())),
+        *(contacts, answered, carried, len(alarms), int((~answering).sum())),
         onset=np.array(onset, dtype=np.int64),
         release=np.array(release, dtype=np.int64),
     )

@@ -97,8 +97,10 @@ def run_trials(
     if parts_of(condition)[1] == YOKED and donors is None:
         for first in range(0, len(trials), batch):
             some = trials[first : first + batch]
-            found = _donors(config, parts_of(condition)[0], some, batch)
-            run_trials(config, condition, some, emit, batch, logs, watch, make, bodies, found)
+            given_counts = _donors(config, parts_of(condition)[0], some, batch)
+            run_trials(
+                config, condition, some, emit, batch, logs, watch, make, bodies, given_counts
+            )
         return
     made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
     size = min(batch, len(trials))
@@ -124,7 +126,7 @@ def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch:
     """What robots with their own readings read in the trials that follow these, by these."""
     following = {trial: config.following(trial) for trial in trials}
     read: Donors = {}
-    run_trials(config, controller, [*following.values()], lambda found: None, batch, read=read)
+    run_trials(config, controller, [*following.values()], lambda result: None, batch, read=read)
     return {trial: read[donor] for trial, donor in following.items() if donor in read}
 
 

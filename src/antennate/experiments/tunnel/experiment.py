@@ -189,7 +189,7 @@ def record(
         )
         return ()
 
-    run_trials(config, controller, [trial], lambda found: rows.append(found[0]), watch=watch)
+    run_trials(config, controller, [trial], lambda result: rows.append(result[0]), watch=watch)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
     return recorder.decided(title, config.control.rule.threshold, ending(rows[0], config))
 

@@ -166,16 +166,16 @@ def paired(
     """
     tests = {}
     for first, second in combinations(by_controller, 2):
-        ours, theirs = (
+        first_rows, second_rows = (
             {row.trial: row for row in by_controller[name] if row.outcome != "invalid"}
             for name in (first, second)
         )
-        both = sorted(ours.keys() & theirs.keys())
+        both = sorted(first_rows.keys() & second_rows.keys())
         if both:
-            times = np.array([[rows[k].time_s for k in both] for rows in (ours, theirs)])
-            ends = np.array([[rows[k].outcome for k in both] for rows in (ours, theirs)])
+            times = np.array([[rows[k].time_s for k in both] for rows in (first_rows, second_rows)])
+            ends = np.array([[rows[k].outcome for k in both] for rows in (first_rows, second_rows)])
             won = ends == "success"
-            units = np.array([ours[k].limit_s for k in both]) if limit is None else 1.0
+            units = np.array([first_rows[k].limit_s for k in both]) if limit is None else 1.0
             first_t, second_t = times / units
             test = statistics.compare(won[0], won[1], first_t, second_t, limit or 1.0)
             comparison = asdict(test)
@@ -184,7 +184,7 @@ def paired(
                 comparison["share_difference_95"] = comparison.pop("time_difference_95")
                 means = times[:, won.all(axis=0)].mean(axis=1).tolist() if test.both else None
                 comparison["both_time_s"] = means and tuple(means)
-            apart = np.array([ours[k].offset_m - theirs[k].offset_m for k in both])
+            apart = np.array([first_rows[k].offset_m - second_rows[k].offset_m for k in both])
             offset, offsets = statistics.mean95(apart[won.all(axis=0)])
             known = math.isfinite(offset)
             tests[f"{first}-{second}"] = {
@@ -249,7 +249,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     """Which controllers came through, and how sure it is."""
     without = none_valid(result)
     short = short_names(result["controllers"])
-    found = successes(
+    passed = successes(
         {short[n]: row for n, row in result["controllers"].items() if n not in without}
     )
     so_few = few(_valid(result))
@@ -260,8 +260,8 @@ def sentence(result: Mapping[str, Any]) -> str:
     what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
     if known := result.get("knows"):  # results of older versions have none
         what += f", knowing {' and '.join(known)}"
-    text = f"{what} (95 % interval): {found}{test}." if found else ""
-    text += f" {so_few}" if found and so_few else ""
+    text = f"{what} (95 % interval): {passed}{test}." if passed else ""
+    text += f" {so_few}" if passed and so_few else ""
     for name, reason in without.items():
         text += f" No trial of {name} is valid: {reason}."
     return f"{text}{why}".strip()

@@ -251,18 +251,18 @@ class Passage:
         bench.place(0.0, 0.0, self.base)
         return bench
 
-    def traverse(self, begin: float, went: chain.Motion) -> Traverse:
+    def traverse(self, begin: float, motion: chain.Motion) -> Traverse:
         """What was seen on the way.
 
         Args:
             begin: Place of the tip along the wall as the travel began [m].
-            went: After the commands `kept`.
+            motion: After the commands `kept_commands`.
         """
         path = ramp(self.config.wall.travel, self.config.wall.speed)
-        rows, shown_at = kept(len(path)), marks(path)
+        rows, shown_at = kept_commands(len(path)), marks(path)
         sampled = [row for row, i in enumerate(rows) if i % SAMPLES == 0]
         shown = [row for row, i in enumerate(rows) if i in shown_at]
-        seen = went[sampled]
+        seen = motion[sampled]
         return Traverse(
             np.array(path[::SAMPLES]),
             seen.joints[:, -1, 1] - begin,
@@ -270,12 +270,12 @@ class Passage:
             np.hypot(*seen.force.T),
             seen.hinges[:, : self.antenna.sensed_hinges].sum(axis=1),
             seen.hinges,
-            went[shown].joints - [self.crest, 0.0],
+            motion[shown].joints - [self.crest, 0.0],
             from_crest(self.balls, self.crest),
         )
 
 
-def kept(count: int) -> list[int]:
+def kept_commands(count: int) -> list[int]:
     """Commands of a travel of so many after which something is kept: samples, and shapes."""
     return sorted({*range(0, count, SAMPLES), *marks(range(count))})
 
@@ -351,8 +351,8 @@ def _on_chain(drawn: Passage) -> Traverse:
     there = np.column_stack([ahead, np.zeros_like(ahead)])
     came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
     along = np.column_stack([np.full_like(path, drawn.approach), path])
-    went = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
-    return drawn.traverse(came[-1:].joints[-1, -1, 1], went[kept(len(path))])
+    motion = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
+    return drawn.traverse(came[-1:].joints[-1, -1, 1], motion[kept_commands(len(path))])
 
 
 def spheres(
