@@ -84,7 +84,7 @@ class Trials(Generic[Config]):
             None in place of `how`; None if nothing does.
         check_batch: Raises if a configuration, given with the folder for logs, has no such batches.
         watched: watched(view): what `carry_out` is given to show its trials on a page.
-        partial: Whether an interrupted run ends with the trials that it has.
+        interruptible: Whether an interrupted run ends with the trials that it has.
     """
 
     condition: str
@@ -96,7 +96,7 @@ class Trials(Generic[Config]):
     batch: Callable[..., None] | None = None
     check_batch: Callable[[Config, Path | None], None] = lambda config, logs: None
     watched: Callable[[SimulationView], Mapping[str, Any]] = lambda view: {}
-    partial: bool = False
+    interruptible: bool = False
 
     def run(
         self, config: Config, trials: Sequence[Trial], emit: Callable[[int, Any], None]
@@ -115,7 +115,7 @@ class Trials(Generic[Config]):
         """The same in batches on a GPU or another device of Warp.
 
         Raises:
-            ConfigError: It has none.
+            ConfigError: This configuration has no such batches.
         """
         tasks = [(config, *trial, None) for trial in trials]
         self._batched(tasks, lambda i, result: emit(i, result[0]), no_failure, device)
@@ -165,7 +165,7 @@ class Trials(Generic[Config]):
                     self._show(config, *trial, take, logs, view)
                     on_step(done, len(trials))
         except KeyboardInterrupt:
-            if not self.partial:
+            if not self.interruptible:
                 raise
             interrupted = True
         order = {name: i for i, name in enumerate(dict.fromkeys(name for name, _ in trials))}

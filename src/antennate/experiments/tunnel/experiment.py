@@ -128,7 +128,7 @@ def _watched(view: SimulationView) -> dict[str, Any]:
 TRIALS = Trials[TunnelConfig](
     *("controller", every, run_trials, TrialResult, lost_row, BATCH, _on_warp, _check_batch),
     watched=_watched,
-    partial=True,
+    interruptible=True,
 )
 
 
