@@ -635,7 +635,7 @@ def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gait, "run", interrupted)
+    monkeypatch.setattr(gait, "gather", interrupted)
     assert main(["gait"]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert not (tmp_path / "runs" / "gait-1").exists()
