@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Union
@@ -94,16 +95,17 @@ def run_trials(
             read in trials that are run for it, so many at once.
         read: Takes what the robot of each trial reads, likewise.
     """
+    again = functools.partial(
+        *(run_trials, config, condition), emit=emit, logs=logs, make=make, bodies=bodies, read=read
+    )
     if parts_of(condition)[1] == YOKED and donors is None:
         for first in range(0, len(trials), batch):
             some = trials[first : first + batch]
-            given_counts = _donors(config, parts_of(condition)[0], some, batch)
-            run_trials(
-                config, condition, some, emit, batch, logs, watch, make, bodies, given_counts
-            )
+            counts = _donors(config, parts_of(condition)[0], some, batch)
+            again(some, batch=batch, watch=watch, donors=counts)
         return
-    made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
     size = min(batch, len(trials))
+    made = (bodies or cpu_bodies(config))(size)
     rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read)
     try:
         rows.run(make)
@@ -116,10 +118,7 @@ def run_trials(
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(
-                *(config, condition, [trial], emit, 1, logs, None),
-                *(make, bodies, donors, read),
-            )
+            again([trial], batch=1, donors=donors)
 
 
 def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch: int) -> Donors:
