@@ -22,7 +22,6 @@ from antennate.experiments.wall.physics import (
 )
 from antennate.sim import chain
 from antennate.sim.bench import Watch, unwatched
-from antennate.sim.chain import require_solver
 from antennate.studies import statistics
 from antennate.studies.experiment import (
     Experiment,
@@ -247,11 +246,6 @@ def _border(result: Mapping[str, Any]) -> str:
     )
 
 
-def _none_valid(result: Mapping[str, Any]) -> bool:
-    """Whether a profile has trials, and all of them are invalid."""
-    return any(0 < p["trials"] == p["invalid"] for p in result["profiles"].values())
-
-
 OUTCOME_COLOURS = {
     "successes": "#009E73",
     "jams": "#D55E00",
@@ -398,8 +392,10 @@ EXPERIMENT = Experiment.of_folder(
     trials=TRIALS,
     measures=PROFILE,
     shown=True,
-    check=require_solver,
-    failed=_none_valid,
+    check=chain.require_solver,
+    failed=lambda result: any(  # all trials of a profile are invalid
+        0 < p["trials"] == p["invalid"] for p in result["profiles"].values()
+    ),
     captions=CAPTIONS,
     explained="docs/results-bench.md",
 )
