@@ -337,22 +337,16 @@ class Experiment(Generic[Config, Found]):
         run: Callable[..., Found],
         tables: Callable[[Mapping[str, Any]], Sequence[Table]],
         sentence: Callable[[Mapping[str, Any]], str],
-        filmed: bool = False,
         shown: bool = False,
         **more: Any,
     ) -> Experiment[Config, Found]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. Without `figures` they are those that
-        `figures(outcome)` of the module `figure` beside it returns, and if it is `filmed`, films
-        are those of `films(config, trial)` of the module `film`; both are imported when they are
-        needed. If it is `shown`, `run` also takes a `view`, and with `logs` a folder `logs`.
+        `figures(outcome)` of the module `figure` beside it returns, which is imported when they are
+        drawn. If it is `shown`, `run` also takes a `view`, and with `logs` a folder `logs`.
         """
         folder = module.rpartition(".")[0]
-        if filmed:
-            more["films"] = lambda c, trial: importlib.import_module(f"{folder}.film").films(
-                c, trial
-            )
         if "figures" not in more:
             more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
                 outcome

@@ -8,9 +8,12 @@ from typing import Any
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED
 from antennate.antenna.plateau import Plateau
+from antennate.errors import ConfigError
+from antennate.experiments.bench import bench_films
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import conversion_sentence
+from antennate.sim.bench import Watch
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
@@ -222,13 +225,30 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     }
 
 
+_SPEED = 0.2
+"""Speed of a film over that of the rod: the fastest push takes a third of a second."""
+
+
+def _filmed_speeds(config: calibrate.CalibrateConfig) -> list[str]:
+    if config.recording is not None:
+        raise ConfigError("video: expected the rig, which alone can be filmed, found a recording")
+    return [f"{speed:g} m_s" for speed in config.rig.speeds]
+
+
+def _film(config: calibrate.CalibrateConfig, speed: str, trial: int, watch: Watch) -> str:
+    """Push once at one of the speeds for its film, the first time; the title."""
+    first = _filmed_speeds(config).index(speed) * config.rig.pushes
+    calibrate.push(config, first, watch)
+    return f"{speed.replace('_', '/')}, {1 / _SPEED:g} times slower"
+
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     calibrate.CalibrateConfig,
     lambda config, workers, on_step, _: calibrate.run(config, workers, on_step),
     tables,
     sentence,
-    filmed=True,
+    films=bench_films(_filmed_speeds, _film, "rod", _SPEED),
     files=_files,
     check=require_solver,
     parts="pushes",
