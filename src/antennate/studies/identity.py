@@ -28,7 +28,9 @@ def identity(command: str, config: Params) -> dict[str, Any]:
     """What decides the numbers of a run, as JSON can hold it."""
     values = json.loads(config.model_dump_json())
     shared = environment(command, config)
-    more = _code_added(values) | _code_of(type(config))
+    more, module = _code_added(values), type(config).__module__
+    if not module.startswith("antennate."):  # of another package
+        more |= _module(module)
     return {
         "command": command,
         "config": values,
@@ -128,11 +130,6 @@ def _code_added(values: Any) -> dict[str, str]:
     return checksums
 
 
-def _code_of(kind: type) -> dict[str, str]:
-    """Checksum of the module of a configuration of another package."""
-    return {} if kind.__module__.startswith("antennate.") else _module(kind.__module__)
-
-
 def _module(name: str) -> dict[str, str]:
     try:
         loaded = getattr(sys.modules.get(name), "__file__", None)
@@ -180,16 +177,13 @@ def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
     group, name = path[0], ".".join(path[1:])
     if group == "code":
         kind = "module" if _is_module(name) else "file"
-        return f"the {kind} {name} {_changed(old, new)}"
+        change = "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
+        return f"the {kind} {name} {change}"
     return f"{name or group} {_short(old)}, now {_short(new)}"
 
 
 def _is_module(name: str) -> bool:
     return not name.endswith(".py") and all(map(str.isidentifier, name.split(".")))
-
-
-def _changed(old: Any, new: Any) -> str:
-    return "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
 
 
 def _short(value: Any) -> str:

@@ -117,10 +117,12 @@ def numbers(table: Table) -> str:
     """A table of measures, with its title and its note, behind what its columns are."""
     columns = ["", *(name.replace("_", " ") for name in table.columns)]
     rows = [[name, *cells] for name, cells in table.rows]
+    short = all(len(cell) < 30 for _, cells in table.rows for cell in cells)
+    kind = "numbers" if short else ""  # short cells stand in columns, texts are left as they flow
     note = paragraphs(table.note, "muted")
     lines = (line.partition(":") for line in table.preface.splitlines())
     preface = "".join(f"<p><strong>{escape(a)}</strong>{b}{escape(c)}</p>" for a, b, c in lines)
-    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, _kind(table))}{note}"
+    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, kind)}{note}"
 
 
 def is_broad(table: Table) -> bool:
@@ -144,11 +146,6 @@ def beside(figures: Sequence[str], words: str) -> str:
         f'{"".join(above)}<div class="beside"><div class="first">{first}</div>'
         f'<div class="words">{words}</div><div class="others">{"".join(others)}</div></div>'
     )
-
-
-def _kind(table: Table) -> str:
-    """`numbers` for short cells, which stand in columns; texts are left as they flow."""
-    return "numbers" if all(len(c) < 30 for _, cells in table.rows for c in cells) else ""
 
 
 def picture(png: bytes, svg: bytes, described: str) -> str:

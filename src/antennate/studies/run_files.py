@@ -303,13 +303,10 @@ def place_of(command: str, path: str | Path | None) -> Path:
         raise OutputError("expected the name of a folder, found an empty one")
     if "/" in checks.text("command", command):
         raise ConfigError(f"command: expected a name without a slash, found {command}")
-    return _free(command) if path is None else checks.path("path", path)
-
-
-def _free(command: str) -> Path:
-    """The next folder for a run of a command that nobody has named."""
-    runs = Path("runs")
-    return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())
+    if path is not None:
+        return checks.path("path", path)
+    places = (Path("runs") / f"{command}-{number}" for number in itertools.count(1))
+    return next(place for place in places if not place.exists())
 
 
 _DATE = "%Y-%m-%d %H:%M:%S UTC"

@@ -267,7 +267,13 @@ def _unknown_tables(result: Mapping[str, Any]) -> Sequence[Table]:
     if (unknown := result["unknown"]) is None:
         return ()
     rows = [
-        (name, [*(f"{end:g}" for end in row["range"]), *_numbers(row["body_lengths_per_cycle"])])
+        (
+            name,
+            [
+                *(f"{end:g}" for end in row["range"]),
+                *(f"{end:.2f}" for end in row["body_lengths_per_cycle"]),
+            ],
+        )
         for name, row in unknown["parameters"].items()
     ]
     one = Table(
@@ -283,16 +289,9 @@ def _unknown_tables(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     if (measured := result["measured_body_lengths_per_cycle"]) is not None:
         every += [("measured on a robot", [f"{measured:.2f}"])]
-        every += [("draws below that", [f"{_below(unknown, measured)} of {unknown['draws']}"])]
+        below = sum(value < measured for value in unknown["body_lengths_per_cycle"])
+        every += [("draws below that", [f"{below} of {unknown['draws']}"])]
     return one, Table("All of them drawn", ("body lengths a cycle",), every)
-
-
-def _numbers(values: Sequence[float]) -> list[str]:
-    return [f"{value:.2f}" for value in values]
-
-
-def _below(unknown: Mapping[str, Any], measured: float) -> int:
-    return sum(value < measured for value in unknown["body_lengths_per_cycle"])
 
 
 def sentence(result: Mapping[str, Any]) -> str:
