@@ -1,7 +1,12 @@
-"""Write docs/commands.md from the commands themselves; with --check only compare it."""
+"""Write the list of docs/commands.md from the commands themselves; with --check only compare it.
+
+What stands before the mark is written by hand. An option that is the same in several commands and
+explained there is named alone where a command takes it.
+"""
 
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 from generated import finish, heads, row
 
@@ -12,15 +17,13 @@ from antennate.cli.options import Option
 from antennate.experiments import is_ours
 from antennate.messages import command_words
 
-HEAD = """\
-# Commands
-
-Every command with its options. [Options, files, exit codes](cli.md) says what holds for all
-of them.
-"""
+MARK = "<!-- commands: python docs/commands.py -->"
+SHARED = "[Options of a run](#options-of-a-run): "
 GROUPS = "Groups of further options, each described in [Parameters](parameters.md): "
 _SHOWN = 40
 """Longest default that is shown whole."""
+_MANY = 3
+"""Least number of commands that have an option, the same in all, that is named alone."""
 
 
 def command(name: str) -> Command:
@@ -32,17 +35,24 @@ def command(name: str) -> Command:
     raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
 
 
-def section(page: Command) -> Iterator[str]:
-    """The lines of one command."""
+def options(page: Command) -> dict[str, str]:
+    """Options on a command's first level, and the row of each."""
+    top = [option for option in page.parameters if len(option.path) == 1]
+    return {option.free or option.offered: line(option) for option in [*page.others, *top]}
+
+
+def section(page: Command, shared: set[str]) -> Iterator[str]:
+    """The lines of one command; rows that are shared are named alone."""
     free = "".join(f" {option.free}" for option in page.others if option.free)
     name = command_words(page.name)
     yield f"## `antennate {name}`"
     yield page.description
     yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
-    top = [option for option in page.parameters if len(option.path) == 1]
-    lines = [line(option) for option in [*page.others, *top]]
-    if lines:
-        yield "\n".join([heads("option", "default", "meaning"), *lines])
+    rows = options(page)
+    if own := [text for text in rows.values() if text not in shared]:
+        yield "\n".join([heads("option", "default", "meaning"), *own])
+    if common := [f"`{flag}`" for flag, text in rows.items() if text in shared]:
+        yield SHARED + ", ".join(common) + "."
     counts = Counter(option.path[0] for option in page.parameters if len(option.path) > 1)
     if counts:
         named = (f"`--{group.replace('_', '-')}.*` ({n})" for group, n in counts.items())
@@ -79,9 +89,13 @@ def main() -> None:
     """Write the page, or compare it."""
     others = ROBOT_COMMANDS | LOG_COMMANDS
     studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
-    named = studies | others
-    parts = [HEAD, index("Simulation and study", studies), index("Robot, twin, logs", others)]
-    parts += [part for name in named for part in section(command(name))]
+    pages = [command(name) for name in studies | others]
+    rows = [pair for page in pages for pair in options(page).items()]
+    counts = Counter(text for _, text in rows)
+    begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)
+    shared = {text for name, text in rows if counts[text] >= _MANY and f"`{name}" in begin}
+    lists = [index("Simulation and study", studies), index("Robot, twin, logs", others)]
+    parts = [begin, MARK, *lists, *(part for page in pages for part in section(page, shared))]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 
 

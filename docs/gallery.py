@@ -18,6 +18,7 @@ from pathlib import Path
 
 from antennate import experiments
 from antennate.cli import main as antennate
+from antennate.messages import command_of, command_words
 
 ROOT = Path(__file__).parent
 IMAGES = ROOT / "images"
@@ -35,14 +36,14 @@ SCRIPTS = {
 }
 """What draws the pictures that no single command draws."""
 FEW = {
-    "force": "--profiles descending --speeds 0.15 --place-step 0.1",
+    "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
-    "sweep": "--profiles descending --estimate.trials 8",
-    "touch": "--trials 1 --speeds 0.15",
+    "bench sweep": "--profiles descending --estimate.trials 8",
+    "bench touch": "--trials 1 --speeds 0.15",
     "tunnel": "--trials 1 --time-limit 20",
-    "wall": "--trials 1",
+    "bench wall": "--trials 1",
 }
 """Options of --quick."""
 _HEADING = re.compile(r"^## `antennate (.*?)`$", re.MULTILINE)
@@ -65,7 +66,8 @@ def check() -> None:
         SystemExit: A picture is missing, one is shown nowhere, or the gallery lacks an experiment.
     """
     text = (ROOT / "gallery.md").read_text(encoding="utf-8")
-    if lacks := [name for name in experiments.names() if f"`antennate {name}" not in text]:
+    names = map(command_words, experiments.names())
+    if lacks := [name for name in names if f"`antennate {name}" not in text]:
         raise SystemExit(f"docs/gallery.md: expected every experiment, lacks {', '.join(lacks)}")
     pages = [*ROOT.rglob("*.md"), ROOT.parent / "README.md"]
     shown = {name for page in pages for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
@@ -102,17 +104,17 @@ def main() -> None:
         check()
         return
     for text, pictures in gallery().items():
-        name, *rest = shlex.split(text)
-        if options.commands and name not in options.commands:
+        words = shlex.split(text)
+        if options.commands and command_of(words) not in options.commands:
             continue
         by_script = [picture for picture in pictures if picture in SCRIPTS]
         figures = [picture for picture in pictures if picture not in SCRIPTS]
         if options.quick and figures:
             options.quick.mkdir(parents=True, exist_ok=True)
-            draw([name, *rest, *FEW.get(text, "").split()], figures, options.quick)
+            draw([*words, *FEW.get(text, "").split()], figures, options.quick)
         elif not options.quick:
             if figures:
-                draw([name, *rest], figures, IMAGES)
+                draw(words, figures, IMAGES)
             for script in dict.fromkeys(SCRIPTS[picture] for picture in by_script):
                 subprocess.run([sys.executable, ROOT / script], check=True)
 

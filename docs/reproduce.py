@@ -70,8 +70,8 @@ runs springs, bench, walls, sweeps, gait and tunnel with few trials, in some min
 without `--quick` every experiment runs with its own defaults, the tunnel with 100 trials a
 controller, in about half an hour. The run directory holds `report.html`: this page with a figure
 for each claim, which needs no network and no program but a browser. `result.json` holds the same
-([keys](results-bench.md)), for a program that compares two versions. Seeds are the same for all
-experiments (`--seed`); two runs with one seed give the same numbers.
+([keys](results.md#antennate-reproduce-schema-1)), for a program that compares two versions. Seeds
+are the same for all experiments (`--seed`); two runs with one seed give the same numbers.
 
 What stands behind the verdicts is told in full in [Antenna](science/antenna.md) and
 [Tunnel](science/tunnel.md).
@@ -132,7 +132,7 @@ def counts(found: Mapping[str, Any]) -> str:
 
 
 def verdicts(found: Mapping[str, Any]) -> str:
-    """The table of all claims, then the criterion and the reason of each."""
+    """The table of all claims with our numbers, then the criterion and the reason of each."""
     lines = [
         "## Verdicts",
         "",
@@ -150,7 +150,6 @@ def verdicts(found: Mapping[str, Any]) -> str:
             f"**{claim['claim']}**",
             "",
             f"- Criterion: {rule.rule}",
-            f"- Ours: {claim['ours']}",
             f"- Verdict: {VERDICTS[claim['verdict']]}. {claim['reason']}",
             f"- Run: `{claim['command']}`",
             "",

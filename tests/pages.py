@@ -3,7 +3,7 @@
 A block of `sh` is run, one of `python` too, each by itself; any other block with a title is a file.
 What stands in `in a terminal of its own` goes on running, and the ports that it prints stand for
 those of the page. Each line of a `text` block was said by the commands before it, with `…` for what
-may differ. Blocks of other kinds are for readers alone.
+may differ. Blocks of other kinds, as of `bash`, are for readers alone.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class Block(NamedTuple):
     @property
     def words(self) -> list[list[str]]:
         """Words of each of its commands behind `uv run antennate`; none for other commands."""
-        lines = self.text.replace("\\\n", " ").splitlines() if self.kind == "sh" else []
+        shell = self.kind in ("sh", "bash")
+        lines = self.text.replace("\\\n", " ").splitlines() if shell else []
         found = [shlex.split(line, comments=True) for line in lines]
         return [words[3:] for words in found if words[:3] == ["uv", "run", "antennate"]]
 
@@ -57,10 +58,11 @@ def blocks(page: str) -> list[Block]:
     return [Block(*parts) for parts in _FENCE.findall(text)]
 
 
-def commands(page: str) -> Iterator[list[str]]:
-    """Words of each command of a page behind `uv run antennate`, in order."""
-    for block in blocks(page):
-        yield from block.words
+def commands(page: str, begin: str = "") -> Iterator[list[str]]:
+    """Words of each command of a page behind `uv run antennate`, in order, from a heading on."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    for parts in _FENCE.findall(text.partition(begin)[2] if begin else text):
+        yield from Block(*parts).words
 
 
 class Script:
@@ -95,7 +97,7 @@ class Script:
             self._compare(block.text)
         elif block.title == _OWN_TERMINAL:
             self.twin = OrderedTwin(words[0], self._folder)
-        elif words and words[0][0] in self._acts:
+        elif block.kind == "sh" and words and words[0][0] in self._acts:
             command = Command(words[0], self._folder)
             self._acts[words[0][0]](command, self)
             assert command.end() == 0, command.text

@@ -16,16 +16,15 @@ from pages import DOCS, Script, blocks
 import antennate
 from antennate.cli import commands
 
-PAGES = ["first-tunnel.md", *(f"tutorials/{p.name}" for p in (DOCS / "tutorials").glob("*.md"))]
-WITH_A_TWIN = {"tutorials/calibrate.md", "tutorials/drive.md"}
-"""Those in real time."""
+TUTORIALS = ("controllers.md", "first-tunnel.md", "log.md", "robots.md", "studies.md")
+"""Pages whose commands run as they stand, but for those in real time before a twin."""
 SCENES = "scenes.md"
 WIDEST = 96
 """Letters of code in a line on a screen of 1280 pixels."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", sorted({*PAGES} - WITH_A_TWIN))
+@pytest.mark.parametrize("page", TUTORIALS)
 def test_a_tutorial_runs(page: str, tmp_path: Path) -> None:
     with Script(page, tmp_path, {}) as script:
         assert len(script.blocks) >= 5
@@ -45,13 +44,13 @@ def hold_marks(record: Command, script: Script) -> None:
 
 @pytest.mark.slow
 def test_an_antenna_of_the_twin_is_calibrated(tmp_path: Path) -> None:
-    with Script("tutorials/calibrate.md", tmp_path, {"record": hold_marks}) as script:
+    with Script("calibrate.md", tmp_path, {"record": hold_marks}) as script:
         script.run()
 
 
 @pytest.mark.slow
 def test_the_twin_is_driven(tmp_path: Path) -> None:
-    with Script("tutorials/drive.md", tmp_path, {}) as script:
+    with Script("drive.md", tmp_path, {}) as script:
         script.run()
 
 
@@ -83,28 +82,32 @@ def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
     assert wide == []
 
 
-def test_every_page_has_its_place_in_the_navigation_by_its_own_name() -> None:
+def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_reference() -> None:
     site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
 
-    def named(entries: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
-        for entry in entries:
-            for name, each in entry.items():
-                if isinstance(each, str):
-                    yield each, name
+    def entries(level: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
+        for entry in level:
+            for name, content in entry.items():
+                if isinstance(content, str):
+                    yield content, name
                 else:
-                    yield from named(each)
+                    yield from entries(content)
 
-    there = {
+    titles = {
         str(path.relative_to(DOCS)): re.findall("^# (.*)$", path.read_text(), re.MULTILINE)[0]
         for path in DOCS.rglob("*.md")
     }
-    found = [*named(site["project"]["nav"])]
-    assert len(found) == len(there)
-    assert dict(found) == there
+    menu = [*entries(site["project"]["nav"])]
+    assert len(menu) == len(dict(menu))
+    reference = re.findall(r"\]\((\S+\.md)\)", (DOCS / "reference.md").read_text())
+    assert {*dict(menu), *reference} == {*titles}
+    assert dict(menu) == {page: titles[page] for page in dict(menu)}
 
 
 def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
-    begin, *sections = (DOCS / "commands.md").read_text().split("\n## ")
+    _, mark, page = (DOCS / "commands.md").read_text().partition("<!-- commands: ")
+    assert mark
+    begin, *sections = page.split("\n## ")
     linked = re.findall(r"\[`([\w ]+)`\]\(#antennate-([\w-]+)\)", begin)
     assert [name.replace(" ", "-") for name, _ in linked] == [anchor for _, anchor in linked]
     assert {name for name, _ in linked} == set(commands())

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(
 )
 ROOT = Path(__file__).parent.parent
 LOOKS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
-PAGES = (*("", "log/", "commands/", "performance/", "reliability/", "hardware/", "tutorials/log/"),)
+PAGES = (*("", "log/", "commands/", "performance/", "reliability/", "hardware/", "controllers/"),)
 """Pages of the docs that are looked at."""
 READABLE = 4.5
 """Least contrast of text (WCAG 2.2, level AA)."""

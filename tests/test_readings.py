@@ -115,7 +115,7 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
     assert json.loads(Path("again/result.json").read_text())["controller"] == "closed@yoked"
     capsys.readouterr()
     shutil.copy(log, "mine.mcap")
-    mine = ["log", "replay", "mine.mcap", *words[2:], "--out", "one", "--overwrite"]
+    mine = ["log", "replay", "mine.mcap", *words[3:], "--out", "one", "--overwrite"]
     assert main(mine) == 2
     assert f"expected another folder than that of {other}, found one" in capsys.readouterr().err
     lent = {log: "expected a log of another trial or drive, found the same"}

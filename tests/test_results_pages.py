@@ -24,23 +24,22 @@ DOCS = Path(__file__).parents[1] / "docs"
 MEASURES = {
     ("results.md", "tunnel"): (*tunnel.CONTROLLER, *tunnel.PAIR),
     ("results.md", "gait"): MANEUVER,
-    ("results-bench.md", "wall"): (*wall.PROFILE, *wall.PAIR),
-    ("results-bench.md", "touch"): (*PROFILE, *AVERAGING),
-    ("results-bench.md", "force"): FORCE,
+    ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
+    ("results.md", "touch"): (*PROFILE, *AVERAGING),
+    ("results.md", "force"): FORCE,
 }
 ROWS = {
     ("results.md", "tunnel"): TrialResult,
-    ("results-bench.md", "wall"): WallTrial,
-    ("results-bench.md", "force"): TraverseRow,
+    ("results.md", "wall"): WallTrial,
+    ("results.md", "force"): TraverseRow,
     ("tracks.md", "tracks"): TrackRow,
 }
 
 
 def words(page: str, command: str) -> set[str]:
-    """Words in backticks of a command's part of a page; that of `trials.csv` belongs to it."""
+    """Words in backticks of a command's part of a page."""
     parts = re.split(r"^## ", (DOCS / page).read_text(), flags=re.MULTILINE)
-    own = [p for p in parts if f"`antennate {command}`" in p.splitlines()[0]]
-    own += [p for p in parts if p.startswith("`trials.csv`")]
+    own = [p for p in parts if re.search(rf"`antennate (\w+ )?{command}`", p.splitlines()[0])]
     assert own
     marked = re.findall(r"`([^`\n]+)`", "\n".join(own))
     return {word for text in marked for word in text.split(".")}

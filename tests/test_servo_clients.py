@@ -1,7 +1,7 @@
 """Programs of other people, unchanged, before twin servos; what they do is as the manual says.
 
 LeRobot and dynio are not among the locked dependencies, because what they need themselves is not
-used here; docs/servo-twin.md says how to install them alone. Without them their tests are skipped.
+used here; docs/twin.md says how to install them alone. Without them their tests are skipped.
 Modules that they import for other purposes are stubs here.
 """
 

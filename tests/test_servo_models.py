@@ -49,7 +49,7 @@ def test_a_model_of_ones_own_is_one_file(tmp_path: Path) -> None:
     assert servo.write(102, (600).to_bytes(2, "little")) == StatusError.NONE
     assert servo.write(64, b"\1") == StatusError.NONE
     servo.advance(0.01)
-    friction = 0.1 * 2.3  # a tenth of the stall torque, docs/servo-twin.md
+    friction = 0.1 * 2.3  # a tenth of the stall torque, docs/twin.md
     assert servo.get("present_current") == pytest.approx(600 - friction / 2.69e-3, abs=5)
 
 

@@ -1,4 +1,4 @@
-"""The examples of docs/servo-twin.md, as they stand there, before servos in real time."""
+"""The examples of docs/twin.md, as they stand there, before servos in real time."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from test_servo_clients import Moving, served, stub
 
 from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
 
-PAGE = Path(__file__).parents[1] / "docs" / "servo-twin.md"
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(), flags=re.DOTALL)
+PAGE = Path(__file__).parents[1] / "docs" / "twin.md"
+SECTION = PAGE.read_text().partition("\n## Servos without a robot\n")[2]
+BLOCKS = re.findall(r"```python\n(.*?)```", SECTION, flags=re.DOTALL)
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +39,7 @@ def run(word: str, server: Moving, **more: Any) -> str:
 @pytest.fixture
 def turned(monkeypatch: pytest.MonkeyPatch) -> Iterator[Moving]:
     """Two servos that somebody turns while LeRobot looks, who then presses Enter."""
-    pytest.importorskip("lerobot", reason="docs/servo-twin.md says how to install it")
+    pytest.importorskip("lerobot", reason="docs/twin.md says how to install it")
     stub(monkeypatch, "torch", "accelerate", "datasets", "datasets.utils", "datasets.utils.logging")
     common = pytest.importorskip("lerobot.motors.motors_bus")
     with served(XL330_M288, XL330_M288, million=True) as server:

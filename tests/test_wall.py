@@ -211,7 +211,11 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize(
     "words",
-    [["wall", "--solver", "mujoco"], ["wall", "--solver", "chain"], ["touch"]],
+    [
+        ["bench", "wall", "--solver", "mujoco"],
+        ["bench", "wall", "--solver", "chain"],
+        ["bench", "touch"],
+    ],
 )
 def test_an_antenna_too_light_for_the_physics_is_refused_in_one_line(
     words: list[str],

@@ -256,5 +256,5 @@ EXPERIMENT = Experiment.of_folder(
         "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
         "against unloading, and rival curves.",
     },
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

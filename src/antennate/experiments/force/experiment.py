@@ -393,5 +393,5 @@ EXPERIMENT = Experiment.of_folder(
         "force": "Force over flex, at rest and on the move, and the share of the force "
         "that one reading explains.",
     },
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )

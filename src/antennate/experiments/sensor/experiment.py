@@ -249,6 +249,6 @@ EXPERIMENT = Experiment.of_folder(
         "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "
         "and the choice of the divider.",
     },
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )

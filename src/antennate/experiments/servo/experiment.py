@@ -148,6 +148,6 @@ EXPERIMENT = Experiment.of_folder(
         "shaded: full drive while the shaft rests.",
         "recordings": "Mean error of each recording with the last model, while it stalls and else.",
     },
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )

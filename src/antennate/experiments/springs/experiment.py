@@ -243,6 +243,6 @@ EXPERIMENT = Experiment.of_folder(
         "springs": "Torque of each spring up to its yield, and the errors of what could "
         "be wound in its place.",
     },
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
     on_workers=False,
 )

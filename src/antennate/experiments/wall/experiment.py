@@ -397,5 +397,5 @@ EXPERIMENT = Experiment.of_folder(
         0 < p["trials"] == p["invalid"] for p in result["profiles"].values()
     ),
     captions=CAPTIONS,
-    explained="docs/results-bench.md",
+    explained="docs/results.md",
 )
