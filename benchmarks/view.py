@@ -117,7 +117,7 @@ def simulated(trials: int, repetitions: int, wait: bool) -> dict[str, Any]:
     cpus: dict[str, list[float]] = {name: [] for name in CASES}
     in_turn: list[float] = []
     with (
-        ViewProcess(0, "antennate.cli.view_server") as page,
+        ViewProcess(0, "antennate.cli.pages") as page,
         tempfile.TemporaryDirectory() as folder,
     ):
         if wait:

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from generated import finish, heads, row
 
-from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, carry_out, commands
-from antennate.cli.arguments import OptionsRequest
+from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, commands, described
 from antennate.cli.help import Command
 from antennate.cli.options import Option
 from antennate.experiments import is_ours
@@ -26,19 +25,11 @@ _MANY = 3
 """Least number of commands that have an option, the same in all, that is named alone."""
 
 
-def command(name: str) -> Command:
-    """What the help of a command is made from."""
-    try:
-        carry_out(name, [OptionsRequest.WORD])
-    except OptionsRequest as request:
-        return request.command
-    raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
-
-
 def options(page: Command) -> dict[str, str]:
     """Options on a command's first level, and the row of each."""
     top = [option for option in page.parameters if len(option.path) == 1]
-    return {option.free or option.offered: line(option) for option in [*page.others, *top]}
+    others = sorted(page.others, key=lambda option: not option.positional)
+    return {option.free or option.offered: line(option) for option in [*others, *top]}
 
 
 def section(page: Command, shared: set[str]) -> Iterator[str]:
@@ -89,7 +80,7 @@ def main() -> None:
     """Write the page, or compare it."""
     others = ROBOT_COMMANDS | LOG_COMMANDS
     studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
-    pages = [command(name) for name in studies | others]
+    pages = [described(name) for name in studies | others]
     rows = [pair for page in pages for pair in options(page).items()]
     counts = Counter(text for _, text in rows)
     begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 import antennate
 from antennate.cli import main
+from antennate.experiments.design.experiment import EXPERIMENT
 
 HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
@@ -46,7 +48,8 @@ def design(out: str = "run", workers: int = 1, figures: bool = False) -> antenna
     """Run the file from Python: in this process, which takes less time than the command."""
     with pytest.MonkeyPatch.context() as patch:
         if not figures:
-            patch.setattr("antennate.experiments.design.figure.figures", lambda outcome: {})
+            without = dataclasses.replace(EXPERIMENT, figures=lambda outcome: {})
+            patch.setattr("antennate.experiments.design.experiment.EXPERIMENT", without)
         values = tomllib.loads(Path("plan.toml").read_text())
         return antennate.run("design", out=out, workers=workers, **values)
 

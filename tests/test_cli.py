@@ -269,7 +269,7 @@ def test_bad_words(capsys, tmp_path, argv, parts):
     assert list(tmp_path.iterdir()) == []  # a refused command leaves nothing behind
 
 
-@pytest.mark.parametrize("flag", ["--log", "--video", "--view"])
+@pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])
 def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
     line = refusal(capsys, "antenna", "springs", flag)
     assert f"expected a flag of this command, found {flag}; " in line

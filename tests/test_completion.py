@@ -56,6 +56,7 @@ def offered(script: Path, *words: str) -> list[str]:
         (["zer"], []),
         (["bench", "w"], ["wall"]),
         (["setup", "z"], ["zero"]),
+        (["log", "re"], ["recover", "replay"]),
         (["setup", "--on"], ["--only"]),
         (["setup", "jog", "--on"], []),
         (["setup", "jog", "--jo"], ["--joint"]),

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 import antennate
-from antennate.cli import carry_out, commands, main
-from antennate.cli.arguments import OptionsRequest
-from antennate.cli.help import Command
+from antennate.cli import commands, described, main
 from antennate.cli.options import Option
 from antennate.errors import ConfigError
 
@@ -33,19 +31,10 @@ the robot's commands its robot.toml may name the port."""
 ELSEWHERE = {("report", "--overwrite"): ["--out", "--compare"]}
 
 
-def page(name: str) -> Command:
-    """The options of a command."""
-    try:
-        carry_out(name, [OptionsRequest.WORD])
-    except OptionsRequest as request:
-        return request.command
-    raise AssertionError(name)
-
-
 def dependents() -> Iterator[tuple[str, Option]]:
     """Every option of every command that needs another one."""
     for name in sorted(commands()):
-        found = page(name)
+        found = described(name)
         yield from ((name, each) for each in [*found.others, *found.parameters] if each.needs)
 
 
@@ -60,7 +49,7 @@ def test_the_options_that_need_another_one_are_these() -> None:
 
 @pytest.mark.parametrize("name", sorted(commands()))
 def test_what_is_needed_is_there_and_a_longer_name_needs_the_shorter(name: str) -> None:
-    others = page(name).others
+    others = described(name).others
     flags = {each.flag for each in others}
     for each in others:
         assert {need.partition(" ")[0] for need in each.needs} <= flags

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.experiments.design.measures import front, spread
+from antennate.experiments.design.designs import front, spread
 
 
 @pytest.fixture(autouse=True)

@@ -14,7 +14,7 @@ import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.experiments.design.config import Evaluation
-from antennate.experiments.design.measures import front_of, worth
+from antennate.experiments.design.designs import front_of, worth_of
 
 HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
@@ -40,7 +40,7 @@ OBJECTIVES = Evaluation.model_validate(
 def test_a_measure_of_successes_leaves_jams_out() -> None:
     """(18 + 21) / 2 = 19.5 of passes; over all walls the jams make it (18 + 21 + 87 + 90) / 4."""
     rows = walls("success", "jam", "success", "jam", flex=(18.0, 87.0, 21.0, 90.0))
-    found = worth(rows, OBJECTIVES, 0.5)
+    found = worth_of(rows, OBJECTIVES, 0.5)
     assert found is not None
     assert found["wall.success_share"]["value"] == 0.5
     assert found["wall.flex_max_deg@success"]["value"] == pytest.approx(19.5)
@@ -52,16 +52,16 @@ def test_a_measure_of_successes_leaves_jams_out() -> None:
 def test_the_interval_of_an_objective_is_that_of_student_within_its_bounds() -> None:
     rows = walls(*["success"] * 5, flex=(1.0, 2.0, 3.0, 4.0, 20.0))
     name, half = "wall.flex_max_deg", 2.776 * math.sqrt(62.5 / 5)  # the printed quantile
-    found = worth(rows, OBJECTIVES, 0.5)
+    found = worth_of(rows, OBJECTIVES, 0.5)
     assert found is not None
     assert found[name]["value95"] == pytest.approx((6.0 - half, 6.0 + half), abs=0.01)
-    found = worth(rows, OBJECTIVES, 0.5, {name: (0.0, 10.0)})
+    found = worth_of(rows, OBJECTIVES, 0.5, {name: (0.0, 10.0)})
     assert found is not None
     assert found[name]["value95"] == (0.0, 10.0)
 
 
 def test_without_success_there_is_no_value_and_the_design_stands() -> None:
-    found = worth(walls("jam", "jam", flex=(87.0, 90.0)), OBJECTIVES, 0.5)
+    found = worth_of(walls("jam", "jam", flex=(87.0, 90.0)), OBJECTIVES, 0.5)
     assert found is not None
     assert found["wall.flex_max_deg@success"] == {"value": None, "value95": None, "trials": 0}
 
@@ -69,12 +69,12 @@ def test_without_success_there_is_no_value_and_the_design_stands() -> None:
 def test_what_failures_lack_does_not_fail_a_design() -> None:
     """A column that only successes have: three of four are None, and the trials are ok."""
     rows = walls("success", "jam", "jam", "jam", flex=(18.0, None, None, None))
-    found = worth(rows, OBJECTIVES[:2], 0.5)
+    found = worth_of(rows, OBJECTIVES[:2], 0.5)
     assert found is not None
     assert found["wall.flex_max_deg@success"] == {"value": 18.0, "value95": None, "trials": 1}
     for row in rows[1:]:
         row["status"] = "failed"
-    assert worth(rows, OBJECTIVES[:2], 0.5) is None
+    assert worth_of(rows, OBJECTIVES[:2], 0.5) is None
 
 
 @pytest.mark.parametrize("goal", ["maximize", "minimize"])

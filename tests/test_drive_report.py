@@ -331,7 +331,7 @@ def test_a_drive_without_a_log_says_so(
         yield prepare(config, BoardPort(robot, clock), clock, clock)
 
     monkeypatch.setattr("antennate.cli.drive.connect", in_process)
-    monkeypatch.setattr("antennate.cli.viewer.__name__", "this")  # `python -m this` keeps nothing
+    monkeypatch.setattr("antennate.cli.viewer.MODULE", "this")  # `python -m this` keeps nothing
     argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
     assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
     out = " ".join(capsys.readouterr().out.split())

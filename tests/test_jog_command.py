@@ -10,7 +10,7 @@ import pytest
 from setup_rig import ROBOT, Box
 from test_jog import Ready
 
-from antennate.cli import jog, main
+from antennate.cli import main, setup
 from antennate.hardware.setup.jog import Jog
 from antennate.port import PortError
 
@@ -34,8 +34,8 @@ class Typist:
         self.box = Ready().box
         self.servo = self.box.servos["yaw1"]
         self._patch, self._capsys = patch, capsys
-        patch.setattr(jog, "opener_of", lambda *_: self.box.opener)
-        patch.setattr(jog, "HostClock", lambda: HostTime(self.box))
+        patch.setattr(setup, "opener_of", lambda *_: self.box.opener)
+        patch.setattr(setup, "HostClock", lambda: HostTime(self.box))
 
     def ran(self, typed: Typed) -> tuple[int, list[str]]:
         """Exit code and lines of stderr."""
@@ -44,7 +44,7 @@ class Typist:
             self.box.wire.sleep(wait)
             return typed()
 
-        self._patch.setattr(jog, "typed_keys", lambda: contextlib.nullcontext(keys))
+        self._patch.setattr(setup, "typed_keys", lambda: contextlib.nullcontext(keys))
         code = main(["setup", "jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud)])
         return code, self._capsys.readouterr().err.strip().splitlines()
 

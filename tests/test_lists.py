@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from test_dependent_options import page
 
-from antennate.cli import commands, main
-from antennate.cli.options import Option, read_words
+from antennate.cli import commands, described, main
+from antennate.cli.arguments import read_words
+from antennate.cli.options import Option
 from antennate.errors import ConfigError
 
 COMMAS = {"--files", "--recording", "--beside", "--slurm", "--compare", "--shards"}
@@ -18,7 +18,7 @@ COMMAS = {"--files", "--recording", "--beside", "--slurm", "--compare", "--shard
 
 def lists() -> Iterator[tuple[str, Option]]:
     for name in sorted(commands()):
-        found = page(name)
+        found = described(name)
         yield from ((name, each) for each in [*found.others, *found.parameters] if each.many)
 
 

@@ -15,8 +15,8 @@ import pytest
 from terminal import Terminal
 
 from antennate.cli import main
-from antennate.cli.output import Output
 from antennate.cli.results import print_table
+from antennate.cli.terminal import Output
 from antennate.control.readings import short_names
 from antennate.experiments.tunnel.measures import tables
 from antennate.messages import extra
@@ -253,3 +253,34 @@ def test_every_row_of_three_controllers_is_one_line_of_a_terminal_of_80_columns(
         at = next(i for i, line in enumerate(shown) if line.startswith("─"))
         body = shown[at + 1 : shown.index("", at)]
         assert [line.split("  ")[0] for line in body] == [name.strip() for name, _ in table.rows]
+
+
+PAIRS = ["closed minus closed@yoked", "closed minus open", "closed@yoked minus open"]
+
+
+@pytest.mark.parametrize(("columns", "parts"), [(45, 3), (60, 3), (80, 2), (110, 1)])
+def test_a_table_is_printed_in_parts_where_its_columns_are_too_many(
+    columns: int, parts: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    cells = [f"-0.0{n}20m/s[-0.0{n}20,+0.0{n}20]" for n in range(3)]
+    print_table(Table("Pairs", PAIRS, [("95 %", cells)], "A note."))
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= columns
+    rows = [line.split()[2:] for line in lines if line.startswith(" 95 %")]
+    assert [cell for row in rows for cell in row] == cells
+    assert len(rows) == parts
+    assert lines.count("A note.") == 1
+
+
+def test_a_dumb_terminal_is_as_wide_as_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Dumb(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr("sys.stdout", Dumb())
+    print_table(Table("Drive", ["robot"], [("frames", ["1"])], "word " * 30))
+    lines = sys.stdout.getvalue().splitlines()
+    assert 35 <= max(map(len, lines)) <= 40

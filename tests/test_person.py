@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from antennate.cli import person
-from antennate.cli.person import TerminalPerson
+from antennate.cli import keys
+from antennate.cli.keys import TerminalPerson
 from antennate.errors import BadInputError
 
 
@@ -29,7 +29,7 @@ def test_lines_are_answers_one_by_one(pipe: int) -> None:
 
 
 def test_a_pipe_that_stays_silent_is_told(pipe: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(person, "PATIENCE", 0.05)
+    monkeypatch.setattr(keys, "PATIENCE", 0.05)
     with pytest.raises(BadInputError, match=r"an answer to 'go on\?', found none in 0.05 s"):
         TerminalPerson().ask("go on?")
 

@@ -343,7 +343,7 @@ def test_overwrite_takes_a_run_of_ours_alone(
         for words in (["antenna", "springs"], WALL, ["log", "replay", "no.mcap"], ["robot"]):
             assert main([*words, "--out", place, "--overwrite"]) == 2
             (line,) = capsys.readouterr().err.splitlines()
-            if words[0] != "replay":
+            if words[0] != "log":
                 assert f"{place}: expected a run of this program to overwrite" in line
             assert files(place) == before
         with pytest.raises(OutputError, match="expected a run of this program to overwrite"):

@@ -17,8 +17,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.experiment import Options
 from antennate.control.registry import RIVAL
 from antennate.experiments.reproduce import experiment as reproduce
-from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig
-from antennate.experiments.reproduce.figure import draw
+from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig, draw
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
 from antennate.messages import command_words
 
@@ -240,7 +239,7 @@ def sensed(
     ],
 )
 def test_a_verdict_follows_its_rule(name: str, result: dict[str, Any], verdict: str) -> None:
-    assert BY_NAME[name].verdict(result) == verdict
+    assert BY_NAME[name].verdict(BY_NAME[name].judge(result)) == verdict
 
 
 def test_a_number_without_an_interval_is_told_and_drawn_without_it() -> None:
@@ -332,5 +331,5 @@ def test_a_claim_without_any_number_has_an_empty_figure() -> None:
     for row in result["controllers"].values():
         row["offset_m"] = None
     claim = BY_NAME["centred"]
-    assert claim.verdict(result) == "undecided"
+    assert claim.verdict(claim.judge(result)) == "undecided"
     assert not draw(claim, claim.judge(result)).axes[0].lines

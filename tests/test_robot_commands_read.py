@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from setup_rig import Box, Script
 from worlds import recorded as logged
 from worlds import simulated
 
-from antennate.cli import doctor, drive, jog, main, record, replay, setup, teleop, twin, zero
+from antennate.cli import doctor, drive, main, record, replay, setup, twin
 from antennate.control.registry import BUILT_IN
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
@@ -72,14 +73,20 @@ def fresh(robot: RobotSpec) -> RobotSpec:
     return RobotSpec.model_validate(robot.model_dump())
 
 
-def told(patch: Patch, module: Any, config: Params, path: Path | None = None, **orders: Any) -> int:
-    """Run a command with a configuration and orders, in place of words."""
-    given = config, module.Orders(**orders)
+def told(
+    patch: Patch,
+    command: Callable[..., int],
+    options: Any,
+    config: Params,
+    path: Path | None = None,
+) -> int:
+    """Run a command with a configuration and options, in place of words."""
+    module = sys.modules[command.__module__]
     if path is None:
-        patch.setattr(module, "parse_robot", lambda *_: given)
+        patch.setattr(module, "parse_robot", lambda *_: (config, options))
     else:
-        patch.setattr(module, "parse_writer", lambda *_, **__: (*given, path))
-    return module.command([])
+        patch.setattr(module, "parse_writer", lambda *_, **__: (config, options, path))
+    return command([])
 
 
 def connected(**of_twin: Any) -> Callable[..., Any]:
@@ -99,14 +106,19 @@ def connected(**of_twin: Any) -> Callable[..., Any]:
     return connect
 
 
-def driven(patch: Patch, module: Any, config: DriveConfig, out: Path, **of_twin: Any) -> None:
+def driven(
+    patch: Patch, config: DriveConfig, out: Path, teleop: bool = False, **of_twin: Any
+) -> None:
     patch.setattr(drive, "Header", lambda **_: HEADER)
     patch.setattr(RunDirectory, "describe", lambda *_: None)
     patch.setattr(drive, "connect", connected(**of_twin))
     patch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
     patch.setattr(drive, "pressed_keys", lambda _: contextlib.nullcontext(lambda: True))
-    told(patch, module, config, arm=True, out=out, **PORTS)
-    for name in BUILT_IN if module is drive and config.control.rate < 100.0 else ():
+    if teleop:
+        told(patch, drive.teleop, drive.TeleopOptions(arm=True, out=out, **PORTS), config)
+        return
+    told(patch, drive.command, drive.DriveOptions(arm=True, out=out, **PORTS), config)
+    for name in BUILT_IN if config.control.rate < 100.0 else ():
         act(name, config.control, config.robot)
 
 
@@ -114,16 +126,17 @@ def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:
     if config.touch_check:
         weak, touch = {"voltage": 10.5}, ("left@0.6s", "right@2.4s")
         fault = "bus=discharge:0.01"
-        driven(patch, drive, config, tmp_path / "1", battery=weak, touch=touch, fault=fault)
+        driven(patch, config, tmp_path / "1", battery=weak, touch=touch, fault=fault)
     else:
-        driven(patch, drive, config, tmp_path / "2", fault="bus=silent")
+        driven(patch, config, tmp_path / "2", fault="bus=silent")
 
 
 def run_teleop(patch: Patch, config: TeleopConfig, tmp_path: Path) -> None:
-    patch.setattr(teleop, "typed_keys", lambda: contextlib.nullcontext(lambda _: ["w", "o"]))
+    patch.setattr(drive, "typed_keys", lambda: contextlib.nullcontext(lambda _: ["w", "o"]))
     touch = ("left@0.6s", "right@2.4s")
     fault = "bus=discharge:0.01" if config.touch_check else "bus=silent"
-    driven(patch, teleop, config, tmp_path, battery={"voltage": 10.5}, touch=touch, fault=fault)
+    weak = {"voltage": 10.5}
+    driven(patch, config, tmp_path, teleop=True, battery=weak, touch=touch, fault=fault)
 
 
 def run_doctor(patch: Patch, config: DoctorConfig, tmp_path: Path) -> None:
@@ -136,7 +149,7 @@ def run_doctor(patch: Patch, config: DoctorConfig, tmp_path: Path) -> None:
 
     patch.setattr(doctor, "opener_of", opener)
     patch.setattr(doctor, "HostClock", lambda: patient.clock)
-    told(patch, doctor, config, fix=True, yes=True, **PORTS)
+    told(patch, doctor.command, doctor.DoctorOptions(fix=True, yes=True, **PORTS), config)
 
 
 def run_record(patch: Patch, config: RecordConfig, tmp_path: Path) -> None:
@@ -152,7 +165,8 @@ def run_record(patch: Patch, config: RecordConfig, tmp_path: Path) -> None:
     patch.setattr(record, "HostClock", lambda: patient.clock)
     with enters.open() as stdin, pytest.MonkeyPatch.context() as inner:
         inner.setattr("sys.stdin", stdin)
-        told(patch, record, config, esp32="the board", out=tmp_path / "recording.csv")
+        options = record.RecordOptions(esp32="the board", out=tmp_path / "recording.csv")
+        told(patch, record.command, options, config)
 
 
 class Waiting:
@@ -185,31 +199,32 @@ def run_setup(patch: Patch, config: SetupConfig, tmp_path: Path) -> None:
     patch.setattr(script, "close", lambda: None, raising=False)
     patch.setattr(setup, "TerminalPerson", lambda: script)
     patch.setattr(setup.ports, "find_port", lambda *_: "the bus")
-    told(patch, setup, config, tmp_path / "robot.toml")
+    told(patch, setup.command, setup.SetupOptions(), config, tmp_path / "robot.toml")
 
 
 def run_zero(patch: Patch, config: ZeroConfig, tmp_path: Path) -> None:
-    box = boxed(patch, zero, config.robot, ready=True)
+    box = boxed(patch, setup, config.robot, ready=True)
     turned = [
         (rf": {n}: ", lambda s=s: s.place(s.position + 300), None) for n, s in box.servos.items()
     ]
     script = Script([("straight", None, ""), *turned])
     patch.setattr(script, "close", lambda: None, raising=False)
-    patch.setattr(zero, "TerminalPerson", lambda: script)
-    told(patch, zero, config, tmp_path / "robot.toml", bus="the bus")
+    patch.setattr(setup, "TerminalPerson", lambda: script)
+    options = setup.ZeroOptions(bus="the bus")
+    told(patch, setup.zero, options, config, tmp_path / "robot.toml")
 
 
 def run_jog(patch: Patch, config: JogConfig, tmp_path: Path) -> None:
-    boxed(patch, jog, config.robot, ready=True)
+    boxed(patch, setup, config.robot, ready=True)
     keys = iter("++-q")
     typed = contextlib.nullcontext(lambda _: [next(keys)])
-    patch.setattr(jog, "typed_keys", lambda: typed)
-    told(patch, jog, config, bus="the bus")
+    patch.setattr(setup, "typed_keys", lambda: typed)
+    told(patch, setup.jog, setup.JogOptions(bus="the bus"), config)
 
 
 def run_replay(patch: Patch, config: ReplayConfig, tmp_path: Path) -> None:
     log = logged(simulated(tmp_path, "paper", 0), tmp_path / "log", 20)
-    patch.setattr(replay, "parse", lambda *_: (config, replay.Options(log=str(log))))
+    patch.setattr(replay, "parse", lambda *_: (config, replay.ReplayOptions(log=str(log))))
     replay.command([])
 
 

@@ -15,7 +15,7 @@ from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
 from antennate.cli import BAD_INPUT, main
-from antennate.cli.addresses import RobotOptions, parse_robot
+from antennate.cli.robot import RobotOptions, parse_robot
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.robot_file import RobotFile
 from antennate.messages import command_words

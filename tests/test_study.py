@@ -609,7 +609,7 @@ def test_as_many_points_as_parameters_tell_nothing(tmp_path: Path) -> None:
 
 
 def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:
-    from antennate.experiments.study.figure import figures
+    from antennate.experiments.study.experiment import figures
 
     drawn = figures(study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1))["effects"]
     assert drawn.get_figwidth() <= 5.0  # 8 points are then 8 pixels on a phone of 375

@@ -11,7 +11,6 @@ from test_robot_commands_read import RUNS, SHORT, driven
 from test_turns import Walk
 from torque_writes import GOAL, TORQUE, Written, watch
 
-from antennate.cli import drive
 from antennate.dxl.bus import Bus
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.safety import torque
@@ -34,7 +33,7 @@ def of(command: str, folder: Path, patch: pytest.MonkeyPatch) -> list[Written]:
     with pytest.MonkeyPatch.context() as inner, contextlib.redirect_stdout(io.StringIO()):
         seen = watch(inner)
         if command == "drive":
-            driven(inner, drive, DriveConfig(**SHORT, touch_check=False), folder / "run")
+            driven(inner, DriveConfig(**SHORT, touch_check=False), folder / "run")
         else:
             model, run, settings = RUNS[command]
             run(inner, model.model_validate(settings[0]), folder)

@@ -255,7 +255,7 @@ TUNNEL = ["tunnel", *FLAT, "--view"]
 
 def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     """Nothing is run and nothing left."""
-    with ViewProcess(0, "antennate.cli.view_server") as view:
+    with ViewProcess(0, "antennate.cli.pages") as view:
         code, text = said(*TUNNEL, "--view-port", str(view.port), folder=tmp_path)
     assert code == 2
     assert text.count("\n") == 1

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from view_rig import ANTENNATE
 
-from antennate.cli import view_server
+from antennate.cli import pages
 from antennate.hardware.driving.lateness import MANY, Recent
 from antennate.telemetry.view.channel import TICK
 from antennate.telemetry.view.process import ViewProcess
@@ -35,7 +35,7 @@ def page() -> Iterator[tuple[ViewProcess, list[str]]]:
     """A page that gives way, and what is said of its end."""
     pytest.importorskip("viser")
     said: list[str] = []
-    with ViewProcess(0, view_server.__name__, on_lost=said.append, idle=True) as process:
+    with ViewProcess(0, pages.MODULE, on_lost=said.append, idle=True) as process:
         yield process, said
 
 

@@ -128,6 +128,24 @@ def _plain(cell: str) -> str:
     return re.sub(r"[\s-]+", "_", bare)
 
 
+def wrong_count(header: Sequence[str], cells: Sequence[str], surplus: str) -> str:
+    """What was expected of a row with too many or too few cells and found; empty if it has neither.
+
+    Args:
+        header: Names of the columns.
+        cells: Cells of the row.
+        surplus: What is said of too many cells that hold decimal points.
+    """
+    if len(cells) == len(header):
+        return ""
+    why = "; are there decimal commas? write points"
+    if len(cells) < len(header):
+        why = " (truncated); delete the row"
+    elif any("." in cell for cell in cells):
+        why = surplus
+    return f"expected {len(header)} cells, found {len(cells)}{why}"
+
+
 def number_of(cell: str) -> float:
     """The number of a cell, NaN if it holds none.
 

@@ -10,10 +10,16 @@ import errno
 import importlib
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from antennate import __version__
-from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.messages import COMMAND_GROUPS, command_words
+
+if TYPE_CHECKING:
+    from antennate.cli.help import Command
+
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+"""Exit codes of every command."""
 
 ROBOT_COMMANDS = {
     "twin": "A simulated robot on two ports: an antenna board and a servo bus",
@@ -33,8 +39,18 @@ LOG_COMMANDS = {
     "report": "A run, or two side by side, as one page to read, print and send",
 }
 _MERGE = {"study merge": "The shards of a run as the run that they are parts of"}
-_MODULES = {name.split()[-1] for name in (*ROBOT_COMMANDS, *LOG_COMMANDS, *_MERGE)}
-_FAMILIES = {
+_FUNCTIONS = {
+    "setup zero": "setup:zero",
+    "setup jog": "setup:jog",
+    "drive teleop": "drive:teleop",
+    "log replay": "replay:command",
+    "log view": "log:view",
+    "report": "results:command",
+    "study merge": "merge:command",
+}
+"""Module and function of the commands that are not `command` of a module of their name."""
+_OWN = {**ROBOT_COMMANDS, **LOG_COMMANDS, **_MERGE}
+_GROUPS = {
     "bench": "An antenna before walls and posts",
     "antenna": "What an antenna is made of",
 }
@@ -57,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    from antennate.cli.output import safe_streams
+    from antennate.cli.terminal import safe_streams
     from antennate.sim.describing import describe_only
     from antennate.sim.engine_warnings import dropped
     from antennate.sim.gl import keep_wish
@@ -99,13 +115,28 @@ def carry_out(name: str, argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the run failed.
     """
-    name = name.split()[-1]
-    if name in _MODULES:
-        return importlib.import_module(f"antennate.cli.{name}").command(list(argv))
+    if name in _OWN:
+        module, _, function = _FUNCTIONS.get(name, f"{name}:command").partition(":")
+        return getattr(importlib.import_module(f"antennate.cli.{module}"), function)(list(argv))
     from antennate.cli.experiment import command
     from antennate.experiments import load
 
-    return command(load(name), list(argv))
+    return command(load(name.split()[-1]), list(argv))
+
+
+def described(name: str) -> Command:
+    """What the help of a command is made from, which is asked for in place of a run.
+
+    Raises:
+        AntennateError: It cannot be loaded.
+    """
+    from antennate.cli.arguments import OptionsRequest
+
+    try:
+        carry_out(name, [OptionsRequest.WORD])
+    except OptionsRequest as request:
+        return request.command
+    raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
 
 
 def _divided(words: Sequence[str]) -> tuple[str, list[str]]:
@@ -113,7 +144,7 @@ def _divided(words: Sequence[str]) -> tuple[str, list[str]]:
     name = words[0] if words else ""
     if f"{name} {''.join(words[1:2])}" in _parts(name):
         return " ".join(words[:2]), list(words[2:])
-    if name in _FAMILIES or _is_command(name):
+    if name in _GROUPS or _is_command(name):
         return name, list(words[1:])
     return "", list(words)
 
@@ -124,7 +155,7 @@ def _is_command(name: str) -> bool:
 
     if command_words(name) != name:
         return False
-    return name in _MODULES or is_ours(name) or name in names()
+    return name in _OWN or is_ours(name) or name in names()
 
 
 def _parts(name: str) -> list[str]:
@@ -135,7 +166,7 @@ def _parts(name: str) -> list[str]:
 def _page(name: str, words: Sequence[str]) -> str:
     """What is printed in place of a run, empty if that is wanted."""
     word = words[0] if words else None
-    if name in _FAMILIES and word in (None, "-h", "--help", "--help-all"):
+    if name in _GROUPS and word in (None, "-h", "--help", "--help-all"):
         return _usage_of(name)
     if not name and word in (None, "-h", "--help"):
         return _usage()
@@ -150,17 +181,18 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         sys.stderr.write(f"{title}: error: expected a command, found none\n")
         return BAD_INPUT
     from antennate.cli.arguments import HelpRequest
-    from antennate.cli.output import write_result
+    from antennate.cli.terminal import write_result
     from antennate.errors import AntennateError, BadInputError, reason
     from antennate.messages import one_line, shortened
 
     try:
         if not name and words[0] == "--completion":
-            from antennate.cli.completion import script
+            from antennate.cli.help import script
 
-            sys.stdout.write(script(words[1:], commands(), carry_out))
+            pages = (described(name) for name in commands())
+            sys.stdout.write(script(words[1:], commands(), pages))
             return OK
-        if name in ("", *_FAMILIES):
+        if name in ("", *_GROUPS):
             raise BadInputError(_unknown(name, words[0]))
         return carry_out(name, words)
     except HelpRequest as page:
@@ -177,20 +209,20 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         return BAD_INPUT
 
 
-def _unknown(family: str, word: str) -> str:
+def _unknown(group: str, word: str) -> str:
     """What is said of a word that is no command, or the old name of one."""
     from antennate.messages import nearest, shortened, typed
 
     if command_words(word) != word:
         return f"{word} is `{typed(word)}` now"
-    known = COMMAND_GROUPS[family] if family else [*_top()]
+    known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"
     return f"expected a command{choices}, found {shortened(word)}"
 
 
 def _top() -> dict[str, str]:
     """What stands in the list of commands: those that are in no group, and the groups."""
-    known = _FAMILIES | commands()
+    known = _GROUPS | commands()
     listed = [*_EXPERIMENTS, *ROBOT_COMMANDS, *LOG_COMMANDS, *known]
     return {name: known[name] for name in listed if " " not in name}
 
@@ -228,9 +260,9 @@ def _usage() -> str:
     )
 
 
-def _usage_of(family: str) -> str:
+def _usage_of(group: str) -> str:
     """The page of a group that is no command of its own."""
-    known, width = commands(), max(map(len, _parts(family)))
-    lines = [f"usage: antennate {family} COMMAND [OPTIONS]", "", f"{_FAMILIES[family]}.", ""]
-    lines += [f"  {name:<{width}}  {known[name]}" for name in _parts(family)]
+    known, width = commands(), max(map(len, _parts(group)))
+    lines = [f"usage: antennate {group} COMMAND [OPTIONS]", "", f"{_GROUPS[group]}.", ""]
+    lines += [f"  {name:<{width}}  {known[name]}" for name in _parts(group)]
     return "\n".join([*lines, ""])

@@ -10,12 +10,11 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
-from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli import BAD_INPUT, OK
 from antennate.cli.options import option
-from antennate.cli.output import write_result
-from antennate.cli.progress import stop_signals
 from antennate.cli.results import ResultOptions, folder_for
+from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
+from antennate.cli.terminal import console, stop_signals, write_result
 from antennate.errors import ConfigError
 from antennate.hardware.doctor.check import Opener, Row
 from antennate.hardware.doctor.checkup import Checkup, examine
@@ -41,7 +40,7 @@ _ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Orders(ResultOptions, PortOptions):
+class DoctorOptions(ResultOptions, PortOptions):
     """What to do about it."""
 
     fix: bool = option(False, "put right what can be, asking before each change")
@@ -55,46 +54,46 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a change did not succeed.
     """
-    config, orders = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, Orders)
-    _check(orders)
+    config, options = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, DoctorOptions)
+    if not (options.esp32 or options.bus):
+        raise ConfigError(
+            f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(options)}"
+        )
+    require_two_ports(options)
+    if options.fix and not options.bus:
+        raise ConfigError("--fix: expected --bus PORT with it, found none")
+    if options.fix and not options.yes and not sys.stdin.isatty():
+        raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
     robot = config.calibrated()
-    key = key_of(orders)
-    with folder_for(VIEW, orders, config, argv) if orders.out else nullcontext() as folder:
-        checkup, changes = _examine(robot, orders, key)
+    key = key_of(options)
+    with folder_for(VIEW, options, config, argv) if options.out else nullcontext() as folder:
+        checkup, changes = _examine(robot, options, key)
         result = checkup.result(changes)
         if folder is not None:
             folder.finish(result)
-        if orders.json:
+        if options.json:
             write_result(to_json(result))
         else:
-            show_rows(checkup.rows)
+            _show(checkup.rows)
     return BAD_INPUT if checkup.grade == "bad" else OK
 
 
-def _check(orders: Orders) -> None:
-    if not (orders.esp32 or orders.bus):
-        raise ConfigError(f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(orders)}")
-    require_two_ports(orders)
-    if orders.fix and not orders.bus:
-        raise ConfigError("--fix: expected --bus PORT with it, found none")
-    if orders.fix and not orders.yes and not sys.stdin.isatty():
-        raise ConfigError("--fix: expected a terminal to ask on, found none; or give --yes")
-
-
-def _examine(robot: DoctorConfig, orders: Orders, key: bytes | None) -> tuple[Checkup, list[str]]:
+def _examine(
+    robot: DoctorConfig, options: DoctorOptions, key: bytes | None
+) -> tuple[Checkup, list[str]]:
     """The examination, the last one if something was changed, and the changes."""
     bus = esp32 = None
-    if orders.bus:
-        bus = (orders.bus, opener_of(orders.bus, "--bus"))
-    if orders.esp32:
-        esp32 = (orders.esp32, opener_of(orders.esp32, "--esp32", key, robot.network))
+    if options.bus:
+        bus = (options.bus, opener_of(options.bus, "--bus"))
+    if options.esp32:
+        esp32 = (options.esp32, opener_of(options.esp32, "--esp32", key, robot.network))
     now = HostClock().now
     with stop_signals():
         checkup = examine(robot, bus, esp32, now)
-        if not orders.fix or bus is None:
+        if not options.fix or bus is None:
             return checkup, []
         sys.stderr.write("examined; now what can be put right\n")
-        changes = _fix(robot, bus, orders.yes, now, checkup)
+        changes = _fix(robot, bus, options.yes, now, checkup)
         if changes:
             checkup = examine(robot, bus, esp32, now)
         else:
@@ -109,12 +108,13 @@ def _fix(
     now: Callable[[], float],
     checkup: Checkup,
 ) -> list[str]:
+    """What was changed, by rounds, as a servo with another id or speed is examined anew."""
     made: list[str] = []
     refused: set[Change] = set()
     for _ in range(_ROUNDS):
         if checkup.bus is None:
             break
-        todo = [one for one in plan(checkup.bus, robot.robot) if one not in refused]
+        todo = [change for change in plan(checkup.bus, robot.robot) if change not in refused]
         if not todo:
             break
         for change in todo:
@@ -136,22 +136,20 @@ def _agreed(change: Change, yes: bool) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def show_rows(rows: Sequence[Row]) -> None:
+def _show(rows: Sequence[Row]) -> None:
     """Print one line for each row, then the cures."""
     from rich.box import SIMPLE_HEAD  # slow to import
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    console = Console(file=sys.stdout, highlight=False)
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    output, table = console(), Table(box=SIMPLE_HEAD, pad_edge=False)
     for head in ("", "check", "expected", "found"):
         table.add_column(head, overflow="fold", no_wrap=not head)
     for row in rows:
         grade = Text(row.grade, _STYLES[row.grade])
         words = (f"{row.part}: {row.check}", row.expected, row.found)
         table.add_row(grade, *(Text(one_line(word)) for word in words))
-    console.print(table)
+    output.print(table)
     wrong = [row for row in rows if row.grade != "ok"]
     for row in sorted(wrong, key=lambda row: row.grade == "warn"):
         line = Text.assemble(
@@ -159,11 +157,10 @@ def show_rows(rows: Sequence[Row]) -> None:
             (f"{row.part}: {row.check}: ", "bold"),
             one_line(row.cure),
         )
-        console.print(line, soft_wrap=True)
+        output.print(line, soft_wrap=True)
     bad = sum(row.grade == "bad" for row in wrong)
-    console.print(
-        Text(_sentence(len(rows), bad, len(wrong) - bad)), soft_wrap=not console.is_terminal
-    )
+    sentence = Text(_sentence(len(rows), bad, len(wrong) - bad))
+    output.print(sentence, soft_wrap=not output.is_terminal)
 
 
 def _sentence(checks: int, bad: int, warnings: int) -> str:
@@ -184,9 +181,9 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
     return (Table("Checks", columns, rows, "\n\n".join(result["changes"])),)
 
 
-def _told(result: Mapping[str, Any]) -> str:
+def _sentence_of(result: Mapping[str, Any]) -> str:
     grades = [row["grade"] for row in result["rows"]]
     return _sentence(len(grades), grades.count("bad"), grades.count("warn"))
 
 
-VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _told)
+VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _sentence_of)

@@ -1,10 +1,9 @@
-"""`antennate drive`: the controller on the real robot, or on its twin."""
+"""`antennate drive`: a controller, or by `drive teleop` a person, on the real robot or its twin."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,31 +13,29 @@ from typing import TYPE_CHECKING, Any
 from pydantic.dataclasses import dataclass
 
 from antennate.antenna.calibration import Calibration
-from antennate.cli import viewer
-from antennate.cli.addresses import PortOptions, at_hand, key_of, parse_robot, require_two_ports
-from antennate.cli.exit_codes import BAD_INPUT, OK
-from antennate.cli.keys import pressed_keys
+from antennate.cli import BAD_INPUT, OK, viewer
+from antennate.cli.keys import END, pressed_keys, typed_keys
 from antennate.cli.options import option
-from antennate.cli.results import ResultOptions, folder_for, tell
-from antennate.cli.view_options import PageOptions, page_of
-from antennate.control.readings import short_names
-from antennate.errors import ConfigError, LogError, OutputError
+from antennate.cli.pages import PageOptions, page_of
+from antennate.cli.results import ResultOptions, folder_for, show_result
+from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
+from antennate.errors import BadInputError, ConfigError, LogError, OutputError
 from antennate.hardware.driving.arrival import Arrival
 from antennate.hardware.driving.config import DriveConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.lateness import MANY, Recent, late_sentence
+from antennate.hardware.driving.gamepad import Gamepad
+from antennate.hardware.driving.lateness import MANY, Recent
 from antennate.hardware.driving.operator import Operator
-from antennate.hardware.driving.priority import Priority, urgent
+from antennate.hardware.driving.priority import urgent
 from antennate.hardware.driving.session import Session
 from antennate.hardware.driving.signals import StopOnce
+from antennate.hardware.driving.teleop import KeyController, TeleopConfig
+from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
-from antennate.hardware.safety.causes import State
-from antennate.hardware.safety.cures import what_to_do
 from antennate.messages import typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json
-from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
 from antennate.studies.run_files import LOG, LOG_PARTS
 from antennate.telemetry.feed import Feed
@@ -63,10 +60,26 @@ verified.
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
 off, if it was armed and never walked, and if its log ended before the drive did."""
+TELEOP_DESCRIPTION = """\
+Walk the real robot, or its twin, by keys: the arrows (or w, a, d, s) are FORWARD, TURN_L, TURN_R
+and REVERSE, the space bar stands, o lets the antennae oscillate, q ends. All else is as with
+`antennate drive`: the dry run, --arm, the supervisor, the log.
+
+Hold a key: half a second without one and the robot stands. A reading that cannot be used stops it
+too.
+
+--gamepad takes the first stick or the cross of a gamepad instead, while a shoulder button (4 or 5,
+L1 or R1) is held, and any other button for o. Without the button, or two seconds without an event
+of the pad (--teleop.gamepad-silence), the robot stands. A pad that is unplugged ends the drive."""
+_CAPTIONS = {"drive": "Readings, bending level, contact, maneuver and supervisor over time."}
+VIEW = View("drive", DESCRIPTION, DriveConfig, viewer.tables, viewer.sentences, captions=_CAPTIONS)
+TELEOP_VIEW = dataclasses.replace(
+    VIEW, name="teleop", about=TELEOP_DESCRIPTION, config=TeleopConfig
+)
 
 
 @dataclass(frozen=True)
-class Orders(ResultOptions, PortOptions, PageOptions):
+class DriveOptions(ResultOptions, PortOptions, PageOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
@@ -81,27 +94,22 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, orders = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, Orders)
+    config, options = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, DriveOptions)
     require_antennae(config.robot, "drive")
-    return walk(VIEW, config, orders, argv)
+    return _walk(VIEW, config, options, argv)
 
 
-def require_ports(orders: Orders) -> None:
-    """Require both ports.
-
-    Raises:
-        ConfigError: One is not named, or they cannot be used.
-    """
+def _require_ports(options: DriveOptions) -> None:
     for name in ("esp32", "bus"):
-        if not getattr(orders, name):
-            raise ConfigError(f"--{name}: expected a serial port, found none{at_hand(orders)}")
-    require_two_ports(orders)
+        if not getattr(options, name):
+            raise ConfigError(f"--{name}: expected a serial port, found none{at_hand(options)}")
+    require_two_ports(options)
 
 
-def walk(
+def _walk(
     view: View,
     config: DriveConfig,
-    orders: Orders,
+    options: DriveOptions,
     argv: Sequence[str],
     controller: Callable[[Session, DriveConfig], Controller] | None = None,
 ) -> int:
@@ -110,24 +118,21 @@ def walk(
     Args:
         view: The command, and how its result is shown.
         config: The robot, and for how long.
-        orders: Where it is, and whether it moves.
+        options: Where it is, and whether it moves.
         argv: The words of the command.
         controller: Makes the controller once the session is there; None for the one that is named.
-
-    Raises:
-        AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    require_ports(orders)
+    _require_ports(options)
     given, config = config, config.calibrated()
-    key = key_of(orders)
+    key = key_of(options)
     with (
-        page_of(orders, idle=True) or contextlib.nullcontext() as page,
-        _operator(config, orders) as operator,
-        folder_for(view, orders, config, argv) as folder,
+        page_of(options, idle=True) or contextlib.nullcontext() as page,
+        _operator(config, options) as operator,
+        folder_for(view, options, config, argv) as folder,
     ):
         folder.without_trials()
         folder.claim_names(LOG_PARTS)
-        with connect(config, orders.esp32, orders.bus, key) as session:
+        with connect(config, options.esp32, options.bus, key) as session:
             if operator.stop is not None:
                 operator.stop.closed = True  # until the first tick: from here on there is a result
             if controller is not None:
@@ -142,26 +147,30 @@ def walk(
             )
             file = None if page is None else page.channel.fileno()
             record = _Record(header, folder.path / LOG, config.record_required, file)
-            result = _carry_out(view.name, config, session, orders, record, operator, page)
+            result = _carry_out(view.name, config, session, options, record, operator, page)
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
-            other = "" if controller is None else " --controller open"
             log = folder.path / (result["logs"] or [LOG])[0]
-            _tell(result, orders, f"{shlex.quote(str(log))}{other}")
+            words = [] if controller is None else ["--controller", "open"]
+            _show(result, options, typed("replay", str(log), *words))
         ticks = 0 if result["pace"] is None else result["pace"]["ticks"]
         if result["logs"] and 0 < ticks <= _LONGEST_DRAWN:
+            from antennate.telemetry.figure import drawn  # slow to import
+
             try:
-                folder.write_figures({"drive": _figure(log)})
+                folder.write_figures({"drive": drawn(log)[1]})
             except (LogError, OutputError) as error:
                 viewer.say(error)
-    return BAD_INPUT if _failed(result) or result["log_cut"] else OK
+    return BAD_INPUT if viewer.failed(result) or result["log_cut"] else OK
 
 
-def _figure(log: Path) -> Any:
-    from antennate.telemetry.figure import drawn  # slow to import
-
-    return drawn(log)[1]
+def _show(result: Mapping[str, Any], options: DriveOptions, replay: str) -> None:
+    """Table and sentences; `replay` is the command that reads the log."""
+    again = f"What was read and decided: {replay}"
+    if not result["logs"]:
+        again = f"No log was kept: {viewer.log_failure(result)}."
+    show_result(result, options, viewer.tables(result), f"{viewer.sentences(result)}\n{again}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -177,7 +186,7 @@ class _Record:
         """The command line of the process that writes the n-th file."""
         more = [viewer.REQUIRED] if self.required else []
         more += [f"{viewer.PAGE}{file}" for file in self.files]
-        return [sys.executable, "-m", viewer.__name__, str(part(self.log, number)), *more]
+        return [sys.executable, "-m", viewer.MODULE, str(part(self.log, number)), *more]
 
     @property
     def files(self) -> list[int]:
@@ -189,35 +198,17 @@ def _calibration(config: DriveConfig) -> str:
     """The calibration files by side, as one JSON object; empty without one."""
     left = config.calibration
     files = {"left": left, "right": config.calibration_right or left} if left else {}
-    found = {side: Calibration.load(Path(file)) for side, file in files.items()}
-    tables = {side: each.model_dump(mode="json") for side, each in found.items()}
+    tables = {
+        side: Calibration.load(Path(file)).model_dump(mode="json") for side, file in files.items()
+    }
     return to_json(tables) if tables else ""
-
-
-def _tell(result: Mapping[str, Any], orders: Orders, log: str) -> None:
-    """Table and sentences; `log` are the words with which `replay` reads the log."""
-    again = f"What was read and decided: {typed('replay')} {log}"
-    again = again if result["logs"] else f"No log was kept: {_why(result)}."
-    tell(result, orders, _tables(result), f"{_sentences(result)}\n{again}")
-
-
-def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    name = result["controller"]
-    return (Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result)),)
-
-
-def _sentences(result: Mapping[str, Any]) -> str:
-    held = result["worst_state"] == State.HOLD.name and result.get("worst_s", 0.0) >= _LONG
-    told = f"{result['refusal']}; {result['why']}" if held or _failed(result) else ""
-    cures = what_to_do(told)
-    return "\n".join([_sentence(result), *late_sentence(result), *cures])
 
 
 def _carry_out(
     command: str,
     config: DriveConfig,
     session: Session,
-    orders: Orders,
+    options: DriveOptions,
     record: _Record,
     operator: Operator,
     page: ViewProcess | None,
@@ -244,15 +235,15 @@ def _carry_out(
 
     operator = dataclasses.replace(operator, watches=lambda: feed.watched)
     with feed, urgent() as priority:
-        report = drive(session, config, orders.arm, keep, operator)
-    logs = [each.name for each in parts(log) if each.exists()]
-    kept = feed.complete and bool(logs)
-    why = feed.failure or ("" if kept else f"{log} is not there any more")
-    head = {"schema": 1, "command": command, "controller": config.controller, "armed": orders.arm}
+        report = drive(session, config, options.arm, keep, operator)
+    logs = [file.name for file in parts(log) if file.exists()]
+    complete = feed.complete and bool(logs)
+    why = feed.failure or ("" if complete else f"{log} is not there any more")
+    head = {"schema": 1, "command": command, "controller": config.controller, "armed": options.arm}
     tail = {
         "priority": priority.value,
-        "unlogged": 0 if kept else feed.offered - count(log),
-        "log_complete": kept,
+        "unlogged": 0 if complete else feed.offered - count(log),
+        "log_complete": complete,
         "log_cut": feed.failed or not logs,
         "log_failure": why,
         "logs": logs,
@@ -261,105 +252,73 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _operator(config: DriveConfig, orders: Orders) -> Iterator[Operator]:
+def _operator(config: DriveConfig, options: DriveOptions) -> Iterator[Operator]:
     """Who may stop the drive: signals, a key that is let go, a file that comes."""
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopOnce(last=True))
         pressed = arrived = None
         if config.hold_to_run:
             pressed = stack.enter_context(pressed_keys("--hold-to-run"))
-        if orders.until is not None:
-            if orders.until.exists():
+        if options.until is not None:
+            if options.until.exists():
                 raise ConfigError(
-                    f"--until: expected no such file yet, found {orders.until} of an earlier "
+                    f"--until: expected no such file yet, found {options.until} of an earlier "
                     "drive; remove it"
                 )
-            arrived = stack.enter_context(Arrival(orders.until))
+            arrived = stack.enter_context(Arrival(options.until))
         yield Operator(stop, pressed, arrived or (lambda: False))
 
 
-_LONG = 1.0
-"""Time in HOLD from which on somebody should look at its cause [s] (assumed)."""
+@dataclass(frozen=True)
+class TeleopOptions(DriveOptions):
+    """Whether to move, and by what."""
+
+    gamepad: Path | None = option(None, "gamepad in place of keys, as /dev/input/js0", "FILE")
 
 
-def _failed(result: Mapping[str, Any]) -> bool:
-    fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
-    return fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
+def teleop(argv: Sequence[str]) -> int:
+    """Walk by keys until q, the duration is over or it is stopped.
 
-
-def _idle(result: Mapping[str, Any]) -> bool:
-    """It was to walk, and never did."""
-    return result["armed"] and not result["commands_sent"]
-
-
-def _note(result: Mapping[str, Any]) -> str:
-    lines: list[str] = []
-    if result["priority"] == Priority.ORDINARY.value:
-        lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
-    if result.get("echoes"):  # results of older versions have none
-        lines.append(
-            "The adapter of the servo bus sends back what it gets (an echo); that was dropped."
+    Raises:
+        AntennateError: A port, a servo or the board is not what is needed, or no key can come;
+            nothing moved then.
+    """
+    config, options = parse_robot(
+        "teleop", TELEOP_DESCRIPTION, RobotFile.for_teleop, argv, TeleopOptions
+    )
+    if config.hold_to_run:
+        raise ConfigError(
+            "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
-    if not result["log_complete"] and result["logs"]:
-        files = f"Its files: {', '.join(result['logs'])}."
-        lines.append(f"The log is not complete: {_why(result)}. {files}")
-    return "\n".join(lines)
+    require_antennae(config.robot, "teleop")
+    _require_ports(options)
+    with _keys(options.gamepad, config.teleop.gamepad_silence) as keys:
+
+        def controller(session: Session, calibrated: DriveConfig) -> KeyController:
+            control, robot = calibrated.control, calibrated.robot
+            return KeyController(control, robot, config.teleop, keys, session.clock.now)
+
+        return _walk(TELEOP_VIEW, config, options, argv, controller)
 
 
-def _why(result: Mapping[str, Any]) -> str:
-    """Why the log is not complete; results of older versions do not tell."""
-    return result.get("log_failure") or "nothing is known of the reason"
+@contextlib.contextmanager
+def _keys(path: Path | None, silence: float) -> Iterator[Callable[[], list[str]]]:
+    """Yield what says, without waiting, which keys have come.
 
+    A gamepad without an event for `silence` [s] counts as released.
+    """
+    if path is not None:
+        with contextlib.closing(Gamepad(path, HostClock().now, silence)) as pad:
+            yield pad.keys
+        return
+    with typed_keys() as read:
+        early = read(0.0)
+        if END in early:
+            raise BadInputError("expected keys on a terminal, found the end of the input")
 
-def _sentence(result: Mapping[str, Any]) -> str:
-    """What came out, in one sentence."""
-    state = result["worst_state"]
-    causes = [cause.removeprefix(f"{state} ") for cause in result["why"].split("; ")]
-    why = f" ({'; '.join(causes)})" if result["why"] else ""
-    time = result.get("worst_s")  # results of older versions have none
-    worst = f"worst state {state}{f' for {time:.1f} s' if time else ''}{why}"
-    torque, ended = _torque(result), f"ended by {result['ended']}"
-    if result["refusal"]:
-        more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
-        return f"The robot was not armed: {result['refusal']}{more}; {torque}."
-    if not result["armed"]:
-        dry = "A dry run: nothing was written to the servos"
-        return f"{dry}, {worst}; {ended}; --arm lets the robot walk."
-    if _idle(result):
-        return f"The robot never walked, no command was sent; {worst}; {ended}; {torque}."
-    sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
-    shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
-    walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
-    return f"{walked}, {worst}; {ended}; {torque}."
+        def keys() -> list[str]:
+            nonlocal early
+            came, early = [*early, *read(0.0)], []
+            return came
 
-
-def _torque(result: Mapping[str, Any]) -> str:
-    if result["torque_off"] is None:
-        return "torque never came on"
-    if not result["servos_on"]:
-        return "torque is off, verified"
-    names = ", ".join(map(str, result["servos_on"]))
-    return f"torque is NOT confirmed off: servos {names}; switch their supply off"
-
-
-MEASURES = (
-    Measure("pace.ticks", "ticks", form="d"),
-    Measure("pace.missed_cycles", "missed ticks", form="d"),
-    Measure("pace.missed_share", "missed", "%", scale=100.0),
-    Measure("walking.missed_share", "missed since the walk began", "%", scale=100.0),
-    Measure("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
-    Measure("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
-    Measure("frames", "frames", form="d"),
-    Measure("crc_errors", "crc errors", form="d"),
-    Measure("lost_samples", "lost samples", form="d"),
-    Measure("resets", "resets", form="d"),
-    Measure("missed_answers", "missed answers", form="d"),
-    Measure("stale_answers", "stale answers", form="d"),
-    Measure("unlogged", "unlogged ticks", form="d"),
-    Measure("commands_sent", "commands sent", form="d"),
-    Measure("commands_refused", "commands refused", form="d"),
-    Measure("priority", "priority"),
-)
-
-_CAPTIONS = {"drive": "Readings, bending level, contact, maneuver and supervisor over time."}
-VIEW = View("drive", DESCRIPTION, DriveConfig, _tables, _sentences, captions=_CAPTIONS)
+        yield keys

@@ -1,8 +1,9 @@
-"""The command of an experiment: parse, run, keep, draw, tell."""
+"""The command of an experiment: parse, run, keep, draw, print."""
 
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,13 +12,12 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
-from antennate.cli.options import fields_of, flag_of, found, option
-from antennate.cli.progress import progress, stop_signals
-from antennate.cli.results import drawn_table, folder_for, tell
-from antennate.cli.run_options import OF_WORKERS, RunOptions, go_on, workers_of
-from antennate.cli.view_options import ViewOptions, say_by_hand, view_of
+from antennate.cli import BAD_INPUT, INTERRUPTED, OK
+from antennate.cli.arguments import as_typed, parse
+from antennate.cli.options import fields_of, flag_of, option
+from antennate.cli.pages import ViewOptions, say_by_hand, view_of
+from antennate.cli.results import ResultOptions, drawn_table, folder_for, show_result
+from antennate.cli.terminal import progress, stop_signals
 from antennate.errors import (
     AntennateError,
     BadInputError,
@@ -28,30 +28,53 @@ from antennate.errors import (
     raised,
 )
 from antennate.experiments.running import keep, require_films, write_films
-from antennate.messages import typed
+from antennate.messages import shortened, typed
 from antennate.params.base import Params
-from antennate.studies.engines import WARP
+from antennate.studies.engines import BATCHED, EVERYWHERE, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.measures import Interim, Table
-from antennate.studies.pool import ShardEnd, Workers
+from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD, files_of
 from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)
-class FilmOptions(RunOptions):
-    """What is filmed."""
+class RunOptions(ResultOptions):
+    """How to run; nothing among these changes a result, but for another engine."""
 
+    workers: int | None = option(None, "processes to use, else one for each core", "INT", ge=1)
+    no_figures: bool = option(False, "draw no figures")
+    resume: bool = option(
+        False, "go on with the run that the folder holds, if there is one", needs=["--out"]
+    )
+    retry: bool = option(
+        False, "resume, and run crashed or hung trials again, if there are any", needs=["--out"]
+    )
+    engine: str = option(
+        LOCAL,
+        f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel and studies of it "
+        f"also {', '.join(BATCHED)}",
+        "ENGINE",
+    )
+    shard: str | None = option(None, "run one of N parts, for `antennate study merge`", "I/N")
+    slurm: tuple[str, ...] = option(
+        (), "what SLURM is asked for, as timeout_min=60", "NAME=VALUE", needs=["--engine slurm"]
+    )
+    trial_timeout: float | None = option(
+        None,
+        f"give a trial up after this time [s], else {TIMEOUT:g}; unless said, one worker waits on",
+        gt=0,
+    )
     video: bool = option(False, "film one trial of each condition, drawn without a display")
     video_trial: int = option(0, "trial that --video films", "INT", needs=["--video"], ge=0)
 
 
 @dataclass(frozen=True)
-class Options(ViewOptions, FilmOptions):
-    """All that can be said of an experiment; `_without` tells what one of them has not."""
+class Options(ViewOptions, RunOptions):
+    """All options of experiments; `_without` says which of them one has not."""
 
     log: bool = option(False, "keep the log of every trial or walk, in the folder logs")
     trust_code: bool = option(False, "run code of its own that the file names, as FILE.py:NAME")
@@ -62,6 +85,10 @@ class StudyOptions(Options):
     """The same where a file says what is run."""
 
     config: Path | None = option(None, "TOML file of the study or search", "FILE", positional=True)
+
+
+OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
+"""Options that only trials on workers have."""
 
 
 def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
@@ -76,11 +103,6 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
         ("trust_code",): experiment.continued,
     }
     return [name for names, there in has.items() if not there for name in names]
-
-
-def _filmed(options: Options) -> int | None:
-    """The trial to film, None for none."""
-    return options.video_trial if options.video else None
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
@@ -103,9 +125,8 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
             "found none"
         )
     experiment.check(config)
-    trial = _filmed(options)
-    if trial is not None:
-        require_films(experiment, config, trial)
+    if options.video:
+        require_films(experiment, config, options.video_trial)
     return carry_out(experiment, argv, config, options)
 
 
@@ -132,11 +153,9 @@ def carry_out(
         AntennateError: The physics became invalid, a worker died, or a file could not be written;
             what was measured is kept and shown first.
     """
-    if options.view or options.foxglove:
-        _require_viewable(options, config)
-    _require_unfinished(options)
+    _require_possible(options, config)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
-    workers = workers_of(options, closed=shards is not None, apart=apart)
+    workers = _workers(options, closed=shards is not None, apart=apart)
     kind = f"{experiment.name} --log" if options.log else experiment.name
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
     what = identity(kind, config)
@@ -162,13 +181,62 @@ def carry_out(
             run.keep_logs()
             raise
         except ShardEnd as end:
-            told = {"shard": options.shard, "trials": end.count, "of": end.total}
-            run.write(SHARD, to_json(told))
+            part = {"shard": options.shard, "trials": end.count, "of": end.total}
+            run.write(SHARD, to_json(part))
             run.keep()
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
         say_by_hand(() if view is None else view.by_hand, run)
         return _end(experiment, config, options, run, outcome, None if shards else argv)
+
+
+def _require_possible(options: Options, config: Params) -> None:
+    """Refuse options that exclude one another, before the folder is touched.
+
+    What is run beside a view is run by the engine, in this process.
+    """
+    if options.view or options.foxglove:
+        for name in OF_WORKERS:
+            value = getattr(options, name)
+            if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
+                found = "one" if value is True else as_typed(value)
+                raise ConfigError(
+                    f"{flag_of((name,))}: expected none beside --view or --foxglove, which show "
+                    f"one trial after the other, found {found}"
+                )
+        if getattr(config, "solver", "mujoco") != "mujoco":
+            raise ConfigError(
+                "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
+                "found chain"
+            )
+    finished = options.out is not None and (options.out / RESULT).exists()
+    if options.shard is not None and finished and not options.overwrite:
+        raise ConfigError(
+            f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
+        )
+
+
+_MOST_SHARDS = 999_999
+
+
+def shard_of(text: str) -> tuple[int, int] | None:
+    """Which part, and of how many, I/N names; None if it names none."""
+    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    number, count = (int(match[1]), int(match[2])) if match else (0, 0)
+    return (number, count) if 1 <= number <= count else None
+
+
+def _workers(options: RunOptions, closed: bool, apart: bool) -> Workers:
+    """The workers that are asked for; see `Workers`. They are given the store later."""
+    shard = None if options.shard is None else shard_of(options.shard)
+    if options.shard is not None and shard is None:
+        raise ConfigError(
+            f"--shard: expected I/N, I from 1 to N, N up to {_MOST_SHARDS}, found "
+            f"{shortened(options.shard)}"
+        )
+    engine, count = make_engine(options.engine, options.slurm), options.workers or core_count()
+    how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
+    return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
 
 
 def _folder(
@@ -180,41 +248,15 @@ def _folder(
     shards: Shards | None,
 ) -> contextlib.AbstractContextManager[RunDirectory]:
     """The run directory; shards are put together in a new one, apart from theirs."""
+    how: dict[str, Any] = {}
     if shards:
         reads = [file for folder in shards.folders for file in files_of(folder)]
-        how: dict[str, Any] = {"command": "merge", "reads": reads}
+        how = {"command": "merge", "reads": reads}
     elif experiment.on_workers:
         resume = options.resume or options.retry or experiment.continued
         tasks = experiment.grows if options.shard is None else None
         how = {"resume": resume, "retry": options.retry, "tasks": tasks}
-    else:
-        how = {}
     return folder_for(experiment.view, options, config, argv, identity, **how)
-
-
-def _require_viewable(options: Options, config: Params) -> None:
-    """Check that what is run beside a view can be shown: by the engine, in this process."""
-    for name in OF_WORKERS:
-        value = getattr(options, name)
-        if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
-            raise ConfigError(
-                f"{flag_of((name,))}: expected none beside --view or --foxglove, which show one "
-                f"trial after the other, found {'one' if value is True else found(value)}"
-            )
-    if getattr(config, "solver", "mujoco") != "mujoco":
-        raise ConfigError(
-            "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
-            "found chain"
-        )
-
-
-def _require_unfinished(options: Options) -> None:
-    """Refuse a shard of what is finished, before the folder is touched."""
-    finished = options.out is not None and (options.out / RESULT).exists()
-    if options.shard is not None and finished and not options.overwrite:
-        raise ConfigError(
-            f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
-        )
 
 
 def _outcome(
@@ -231,20 +273,20 @@ def _outcome(
     logs = run.folder(LOGS) if options.log else None
     interim = Interim()
 
-    def keep(row: Any) -> None:
+    def on_row(row: Any) -> None:
         run.append(row)
         interim.add(row)
 
     def table() -> Any:
-        found = interim.table()
-        return None if found is None else drawn_table(found)
+        rows = interim.table()
+        return None if rows is None else drawn_table(rows)
 
     with progress(experiment.parts, table) as step:
         if view is not None and experiment.viewed is not None:
-            return experiment.viewed(config, step, keep, view, logs)
+            return experiment.viewed(config, step, on_row, view, logs)
         if logs is not None and experiment.logged is not None:
-            return experiment.logged(config, workers, step, keep, logs)
-        return experiment.run(config, workers, step, keep)
+            return experiment.logged(config, workers, step, on_row, logs)
+        return experiment.run(config, workers, step, on_row)
 
 
 def _end(
@@ -255,35 +297,37 @@ def _end(
     outcome: Outcome,
     argv: Sequence[str] | None,
 ) -> int:
-    """Keep what came out, tell it, and make the films; `argv` can be given again to go on."""
-    result = outcome.result()
+    """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
+    result, title = outcome.result(), experiment.view.title
     interrupted = bool(result.get("interrupted"))
-    holds_trials = run.store is not None and run.store.holds_trials
     again = ""
-    if argv is not None and interrupted and holds_trials:
-        again = go_on(experiment.name, argv, run.path)
+    if argv is not None and interrupted and run.store is not None and run.store.holds_trials:
+        again = f"to go on: {_go_on(experiment.name, argv, run.path)}\n"
     if interrupted and (options.shard is not None or not outcome.rows):
-        sys.stderr.write(f"to go on: {again}\n" if again else "")
+        sys.stderr.write(again)
         raise KeyboardInterrupt
-    failure = _keep(experiment, outcome, options, run)
     try:
-        tell(result, options, *_words(experiment, result), experiment.explained)
-    except AntennateError:
-        if failure is None:
-            raise
-    if failure is not None:
-        raise failure
+        keep(experiment, outcome, run, figures=not options.no_figures)
+    except OutputError:
+        with contextlib.suppress(AntennateError):
+            show_result(result, options, *_shown(experiment, result), experiment.explained)
+        raise
+    show_result(result, options, *_shown(experiment, result), experiment.explained)
     if interrupted:
-        sys.stderr.write(
-            f"{experiment.view.title}: interrupted: kept {len(outcome.rows)} trials, all "
-            "that had ended\n" + (f"to go on: {again}\n" if again else "")
-        )
-    elif _film(experiment, config, options, run):
-        return BAD_INPUT if experiment.failed(result) else OK
-    return INTERRUPTED
+        kept = f"kept {len(outcome.rows)} trials, all that had ended"
+        sys.stderr.write(f"{title}: interrupted: {kept}\n{again}")
+        return INTERRUPTED
+    if options.video:
+        try:
+            with progress("% of the films") as step:
+                write_films(experiment, config, options.video_trial, run, step)
+        except KeyboardInterrupt:
+            sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
+            return INTERRUPTED
+    return BAD_INPUT if experiment.failed(result) else OK
 
 
-def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Table], str]:
+def _shown(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Table], str]:
     """Tables and sentence of a result, checked, as an experiment may be anybody's code."""
     try:
         tables, sentence = [*experiment.tables(result)], experiment.sentence(result)
@@ -298,28 +342,21 @@ def _words(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Tabl
     )
 
 
-def _film(
-    experiment: Experiment[Any, Any], config: Params, options: Options, run: RunDirectory
-) -> bool:
-    """Make the films that are wanted; False if that was interrupted."""
-    trial = _filmed(options)
-    if trial is None:
-        return True
-    try:
-        with progress("% of the films") as step:
-            write_films(experiment, config, trial, run, step)
-    except KeyboardInterrupt:
-        sys.stderr.write(f"{experiment.view.title}: interrupted: kept all but some films\n")
-        return False
-    return True
+_GIVEN_AGAIN = {"--out": 1, "--overwrite": 0, "--no-overwrite": 0, "--resume": 0, "--no-resume": 0}
+"""Flags that are left out of the words that go on, and how many values each has."""
 
 
-def _keep(
-    experiment: Experiment[Any, Any], outcome: Outcome, options: Options, run: RunDirectory
-) -> OutputError | None:
-    """Write what came out; the error that ended it, if any."""
-    try:
-        keep(experiment, outcome, run, figures=not options.no_figures)
-    except OutputError as error:
-        return error
-    return None
+def _go_on(command: str, argv: Sequence[str], folder: Path) -> str:
+    """The whole command that goes on with the interrupted run of a folder, ready to be pasted."""
+    words: list[str] = []
+    values = 0
+    for word in argv:
+        name, given, _ = word.partition("=")
+        count = _GIVEN_AGAIN.get(name.replace("_", "-"))
+        if count is not None:
+            values = 0 if given else count
+        elif values:
+            values -= 1
+        else:
+            words.append(word)
+    return typed(command, *words, "--out", str(folder), "--resume")

@@ -1,35 +1,55 @@
-"""`antennate log`: what a log holds, and the log in other forms."""
+"""`antennate log`: what a log holds, the log in other forms, and on a page: `log view`."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic.dataclasses import dataclass
 
+from antennate import experiments
+from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.progress import progress, stop_signals
-from antennate.cli.replay import complain, say_unguarded
-from antennate.cli.results import ResultOptions, log_of, tell
+from antennate.cli.pages import MODULE, FoxgloveOptions
+from antennate.cli.results import ResultOptions, log_of, show_result
+from antennate.cli.terminal import progress, stop_signals
 from antennate.control.readings import condition
-from antennate.errors import ConfigError, MissingPackageError, OutputError, reason
+from antennate.errors import (
+    AntennateError,
+    ConfigError,
+    MissingPackageError,
+    OutputError,
+    reason,
+)
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
-from antennate.messages import extra, one_line, shortened, typed
+from antennate.messages import command_words, extra, one_line, shortened, typed
 from antennate.params.base import Params
+from antennate.params.reading import from_values
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
+from antennate.studies.report import command_of
+from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import LOGS
+from antennate.telemetry.header import Header
 from antennate.telemetry.parts import MOST_PARTS, part, parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.recover import RECOVERED, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS
+from antennate.telemetry.view import ports
+
+if TYPE_CHECKING:  # these import much, for a page and for films
+    from antennate.sim.trial import TrialConfig
+    from antennate.sim.world import World
+    from antennate.telemetry.view.player import LogPlayer
 
 DESCRIPTION = """\
 Look at the log of a drive or a simulation: `info` says what it holds; `recover` writes the log of a
@@ -52,7 +72,7 @@ _SHOWN = 10
 
 
 @dataclass(frozen=True)
-class Options(ResultOptions):
+class LogOptions(ResultOptions):
     """What to do with which log."""
 
     action: Literal["info", "recover", "export", "plot", "film"] = option(
@@ -74,15 +94,14 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log cannot be read, or the file not written.
     """
-    _, options = parse("log", DESCRIPTION, Params, argv, Options)
+    _, options = parse("log", DESCRIPTION, Params, argv, LogOptions)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
     if options.action == "info":
-        if options.out is not None:
-            raise ConfigError("--out: expected no file for `info`, found one")
-        if options.overwrite:
-            raise ConfigError("--overwrite: expected no file for `info`, found one")
+        for flag, given in (("--out", options.out is not None), ("--overwrite", options.overwrite)):
+            if given:
+                raise ConfigError(f"{flag}: expected no file for `info`, found one")
         return _info(path, options)
     if options.json:
         raise ConfigError(f"--json: expected `info` beside it, found {options.action}")
@@ -101,14 +120,14 @@ def command(argv: Sequence[str]) -> int:
     recovered = options.action == "recover"
     more = f"; {left_out(log)}" if recovered else ""
     done = "drawn into" if options.action in ("plot", "film") else "written to"
-    tell({}, options, (), f"{log.ticks} ticks were {done} {target}{more}.")
+    show_result({}, options, (), f"{log.ticks} ticks were {done} {target}{more}.")
     if recovered:
         say_unguarded("log", log)
         return OK
     return complain("log", log)
 
 
-def _target(path: Path, options: Options) -> Path:
+def _target(path: Path, options: LogOptions) -> Path:
     """The file to write."""
     endings = _ENDINGS[options.action]
     stem = f"{path.stem}{RECOVERED}" if options.action == "recover" else path.stem
@@ -183,8 +202,7 @@ def _plot(path: Path, target: Path) -> LogReader:
 
 
 def _film(path: Path, target: Path) -> LogReader:
-    from antennate.cli.view import arena_of  # slow to import
-    from antennate.telemetry.film import PICTURE_SIZE, encoded, require_video
+    from antennate.telemetry.film import PICTURE_SIZE, encoded, require_video  # slow to import
     from antennate.telemetry.log_film import film_of
 
     with LogReader(path) as log:
@@ -200,16 +218,16 @@ def _film(path: Path, target: Path) -> LogReader:
     return log
 
 
-def _info(path: Path, options: Options) -> int:
+def _info(path: Path, options: LogOptions) -> int:
     with LogReader(path) as log:
         result = _result(log, log.survey())
-    tell(result, options, [_table(result)], _sentence(result))
+    show_result(result, options, [_table(result)], _sentence(result))
     return complain("log", log)
 
 
-def _result(log: LogReader, found: Survey) -> dict[str, Any]:
+def _result(log: LogReader, survey: Survey) -> dict[str, Any]:
     header = log.header
-    events = ((time, EVENTS.decode(data)["msg"]) for time, data in found.events)
+    events = ((time, EVENTS.decode(data)["msg"]) for time, data in survey.events)
     return {
         "schema": 1,
         "command": "log",
@@ -223,8 +241,8 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
         "calibrated": bool(header.calibration),
         "versions": dict(header.versions),
         "ticks": log.ticks,
-        "duration_s": 1e-9 * (found.last - found.first),
-        "messages": {topic.name: count for topic, count in found.messages.items()},
+        "duration_s": 1e-9 * (survey.last - survey.first),
+        "messages": {topic.name: count for topic, count in survey.messages.items()},
         "events": [{"time_ns": time, "text": text} for time, text in events],
         "missing": log.missing,
         "damaged": log.bad,
@@ -235,7 +253,7 @@ def _result(log: LogReader, found: Survey) -> dict[str, Any]:
 
 def _table(result: Mapping[str, Any]) -> Table:
     events, start = result["events"], result["start_ns"]
-    lines = [f"{1e-9 * (each['time_ns'] - start):.2f} s {each['text']}" for each in events]
+    lines = [f"{1e-9 * (e['time_ns'] - start):.2f} s {e['text']}" for e in events]
     if (hidden := len(events) - 2 * _SHOWN) > 0:
         lines[_SHOWN:-_SHOWN] = [f"... {hidden} more events; --json has all"]
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]
@@ -254,3 +272,125 @@ def _sentence(result: Mapping[str, Any]) -> str:
         f"{result['ticks']} ticks in {result['duration_s']:.2f} s, in "
         f"{one_line(', '.join(result['parts']))}, by antennate {by}; {closed}."
     )
+
+
+def complain(command: str, log: LogReader) -> int:
+    """Say on stderr what of a log could not be read: the exit code of the command."""
+    say_unguarded(command, log)
+    if not log.bad and not log.missing:
+        return OK
+    place = ""
+    if log.bad:
+        first = log.damage[0]
+        place = f"; first at byte {first.offset} of {first.path.name}: {first.reason}"
+    sys.stderr.write(
+        f"antennate {command_words(command)}: error: {log.path}: expected an undamaged log, found "
+        f"damaged places: {log.bad}; ticks missing: {log.missing}; ticks read: {log.ticks}{place}\n"
+    )
+    return BAD_INPUT
+
+
+def say_unguarded(command: str, log: LogReader) -> None:
+    """Say on stderr that bytes of a log may have changed unnoticed."""
+    if not log.guarded:
+        sys.stderr.write(
+            f"antennate {command_words(command)}: {log.path}: written by another program without "
+            "CRCs, so damage to its numbers is not noticed\n"
+        )
+
+
+VIEW_DESCRIPTION = """\
+Show the log of a drive or of a simulation on a page of this computer: the robot, charts of what was
+read and decided, and a map. It works without a network; over ssh, forward the port that it tells.
+
+A run with several logs wants the name of one. Ctrl-C ends it."""
+
+
+@dataclass(frozen=True)
+class ShownOptions(FoxgloveOptions):
+    """What to show, and where."""
+
+    shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
+    port: int = option(ports.PAGE, "port of the page, 0 takes any", "PORT", ge=0, le=65535)
+    speed: float = option(
+        1.0, "times real time at which it begins, 0 as fast as it goes", "FLOAT", ge=0, le=100
+    )
+
+
+def view(argv: Sequence[str]) -> int:
+    """Show one log on a page until Ctrl-C.
+
+    Raises:
+        AntennateError: There is no such log, or the page cannot be served, or not any more.
+    """
+    _, options = parse("view", VIEW_DESCRIPTION, Params, argv, ShownOptions)
+    if options.shown is None:
+        raise ConfigError("expected a log or the folder of a run, found none")
+    from antennate.telemetry.view.pace import Restart  # slow to import
+    from antennate.telemetry.view.player import LogPlayer
+    from antennate.telemetry.view.process import ViewProcess
+
+    path = log_of(options.shown)
+    with LogReader(path) as log:
+        header = log.header
+    arena = arena_of(path, header)  # first, as an import may swallow a signal, and one alone counts
+    with (
+        stop_signals(last=True),
+        contextlib.suppress(KeyboardInterrupt),  # that is how it ends
+        ViewProcess(options.port, MODULE, options.port_for_foxglove, "--port") as page,
+    ):
+        player = LogPlayer(page.channel, header, str(path), options.speed, arena)
+        while not page.channel.closed:
+            with contextlib.suppress(Restart), LogReader(path) as log:
+                player.begin()
+                player.play(log)
+                _say_damage(player, log)
+                player.rest()
+        raise page.lost()
+    return OK
+
+
+def _say_damage(player: LogPlayer, log: LogReader) -> None:
+    """Say on the page what of a log could not be read."""
+    if log.bad or log.missing:
+        player.say(f"damaged places in this log: {log.bad}; ticks missing: {log.missing}")
+    if not log.guarded:
+        player.say("no CRC guards this log: damage to its numbers is not noticed")
+
+
+def arena_of(path: Path, header: Header) -> World | None:
+    """The world of a trial as the log or its run has it, None where neither tells."""
+    if header.trial is None:
+        return None
+    from antennate.sim.trial import draw_trial, scene_of  # slow to import
+
+    try:
+        config = _trial_of(path, header)
+        if config is None:
+            return None
+        gait, period = header.params.gait, header.params.period
+        seed = config.seed if header.seed is None else header.seed
+        config = config.model_copy(update={"seed": seed})
+        return draw_trial(config, scene_of(config), header.trial, gait, period).world
+    except AntennateError:
+        return None  # the log is shown all the same, on a bare floor
+
+
+def _trial_of(path: Path, header: Header) -> TrialConfig | None:
+    """The configuration of a trial, None where nothing tells.
+
+    A log may come from elsewhere, so that of a scene in code of its own only the run can tell.
+    """
+    from antennate.sim.scenes.registry import SHIPPED  # slow to import
+    from antennate.sim.trial import TrialConfig
+
+    if header.arena.get("scene") in SHIPPED:
+        return from_values(TrialConfig, {**header.arena, "robot": header.robot})
+    if path.parent.name != LOGS:
+        return None
+    run = RunDirectory.open(path.parent.parent)
+    name = command_of(run)
+    model = experiments.load(name).config if name in experiments.names() else None
+    if model is None or not issubclass(model, TrialConfig):
+        return None
+    return run.config(model)

@@ -12,9 +12,9 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.experiment import Options, Shards, carry_out
+from antennate.cli.experiment import Options, Shards, carry_out, shard_of
 from antennate.cli.options import option
-from antennate.cli.run_options import shard_of
+from antennate.cli.results import ResultOptions
 from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params
 from antennate.studies.identity import differences
@@ -34,15 +34,10 @@ _NAMED = 3
 
 
 @dataclass(frozen=True)
-class MergeOptions:
+class MergeOptions(ResultOptions):
     """Which shards, and where the run goes."""
 
     shards: tuple[Path, ...] = option((), "folders of all shards", "SHARD", positional=True)
-    out: Path | None = option(None, "folder for the run, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(
-        False, "first rename the folder to FOLDER.old, in place of an older one", needs=["--out"]
-    )
-    json: bool = option(False, "print the content of result.json and nothing else")
     no_figures: bool = option(False, "draw no figures")
 
 
@@ -52,7 +47,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A folder is no shard, trials are missing, or nothing can be written.
     """
-    _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions)
+    _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions, without=["config"])
     if not options.shards:
         raise ConfigError("merge: expected the folders of all shards, found none")
     shards = _gathered(options.shards)
@@ -61,14 +56,8 @@ def command(argv: Sequence[str]) -> int:
         raise BadInputError(f"{options.shards[0]}: expected trials of an experiment, found {name}")
     experiment = experiments.load(name)
     config = RunDirectory.open(options.shards[0]).config(experiment.config)
-    asked = Options(
-        out=options.out,
-        overwrite=options.overwrite,
-        json=options.json,
-        no_figures=options.no_figures,
-        workers=1,
-    )
-    return carry_out(experiment, argv, config, asked, shards)
+    how = {name: getattr(options, name) for name in ("out", "overwrite", "json", "no_figures")}
+    return carry_out(experiment, argv, config, Options(**how, workers=1), shards)
 
 
 class _Part(NamedTuple):
@@ -104,22 +93,22 @@ def _gathered(shards: Sequence[Path]) -> Shards:
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
         parts.append(read_as(shard / SHARD, _part))
         RunDirectory.open(shard).text(VERSIONS)  # one that was cut is refused
-        found = read_store(shard / STORE)
-        if identity is not None and (changes := differences(identity, found.identity)):
+        store = read_store(shard / STORE)
+        if identity is not None and (changes := differences(identity, store.identity)):
             raise BadInputError(
                 f"{shard}: expected a shard of the same run as {shards[0]}, found {changes}"
             )
-        identity = identity or found.identity
-        _require_whole(shard, parts[-1], places_of(found.records))
-        records |= found.records
-        processors += found.processors
+        identity = identity or store.identity
+        _require_whole(shard, parts[-1], places_of(store.records))
+        records |= store.records
+        processors += store.processors
     _require_all(parts[0], places_of(records))
     return Shards(shards, identity, records, processors)
 
 
-def _require_whole(shard: Path, part: _Part, found: Set[int]) -> None:
+def _require_whole(shard: Path, part: _Part, trials: Set[int]) -> None:
     """Check that a shard, which was complete, has lost none of its trials."""
-    sound = sum(place in part.places for place in found)
+    sound = sum(place in part.places for place in trials)
     if sound < len(part.places):
         raise BadInputError(
             f"{shard / STORE}: expected {len(part.places)} finished trials, found {sound}: the "
@@ -128,22 +117,17 @@ def _require_whole(shard: Path, part: _Part, found: Set[int]) -> None:
         )
 
 
-def _require_all(part: _Part, found: Set[int]) -> None:
-    """Check that all shards are there.
-
-    Args:
-        part: One of them.
-        found: Trials of all of them.
-    """
-    each = Counter(place % part.parts for place in found)
+def _require_all(part: _Part, trials: Set[int]) -> None:
+    """Check that all shards are there, by one of them and the trials of all of them."""
+    counts = Counter(place % part.parts for place in trials)
     missing = [
         f"{first + 1}/{part.parts}"
         for first in range(min(part.parts, part.trials))
-        if each[first] < len(range(first, part.trials, part.parts))
+        if counts[first] < len(range(first, part.trials, part.parts))
     ]
     if missing:
         named = ", ".join(missing[:_NAMED]) + (", …" if missing[_NAMED:] else "")
         raise BadInputError(
-            f"merge: expected {part.trials} finished trials, found {len(found)}: a shard is "
+            f"merge: expected {part.trials} finished trials, found {len(trials)}: a shard is "
             f"missing: {named}"
         )

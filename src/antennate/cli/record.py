@@ -16,11 +16,10 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from antennate.antenna.plateau import plateau_of
-from antennate.cli.addresses import RobotOptions, at_hand, key_of, parse_robot
-from antennate.cli.exit_codes import OK
+from antennate.cli import OK
 from antennate.cli.options import option
-from antennate.cli.progress import stop_signals
-from antennate.cli.status import StatusLine
+from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
+from antennate.cli.terminal import StatusLine, stop_signals
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.hardware.doctor.ports import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
@@ -43,7 +42,7 @@ _SHOWN = 100
 
 
 @dataclass(frozen=True)
-class Orders(RobotOptions):
+class RecordOptions(RobotOptions):
     """Where from and where to."""
 
     out: Path | None = option(None, "CSV file to make", "FILE")
@@ -55,25 +54,25 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the board is silent.
     """
-    params, orders = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, Orders)
-    if not orders.esp32:
-        raise ConfigError(f"--esp32: expected a serial port, found none{at_hand(orders)}")
-    if orders.out is None:
+    params, options = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, RecordOptions)
+    if not options.esp32:
+        raise ConfigError(f"--esp32: expected a serial port, found none{at_hand(options)}")
+    if options.out is None:
         raise ConfigError("--out: expected a CSV file to make, found none")
-    key, now = key_of(orders), HostClock().now
-    opener = opener_of(orders.esp32, "--esp32", key, params.network)
+    key, now = key_of(options), HostClock().now
+    opener = opener_of(options.esp32, "--esp32", key, params.network)
     with opener(BOARD_BAUD) as port:
         board = Board(port)
         status = Status(board, params, now)
-        with Lines(orders.out) as lines, stop_signals():
+        with Lines(options.out) as lines, stop_signals():
             recorder = Recorder(board, params, now, status.ask, lines.write, status)
             then = "."
             try:
                 recorder.run()
-                then = f"; {_next(params, orders.out)}"
+                then = f"; {_next(params, options.out)}"
             finally:
                 lost = board.clock.sequence.lost
-                where = f"are in {orders.out}" if recorder.rows else "came, so there is no file"
+                where = f"are in {options.out}" if recorder.rows else "came, so there is no file"
                 status.close()
                 sys.stderr.write(f"{recorder.rows} readings {where}, {lost} were lost{then}\n")
                 sys.stderr.writelines(status.saturated())
@@ -155,8 +154,11 @@ class Status:
 
     def saturated(self) -> list[str]:
         """A line for each antenna whose readings stand at their highest."""
-        found = {side: plateau_of(np.array(codes, float)) for side, codes in self._codes.items()}
-        return [f"{one.text(f'the {side} readings')}\n" for side, one in found.items() if one]
+        lines: list[str] = []
+        for side, codes in self._codes.items():
+            if plateau := plateau_of(np.array(codes, float)):
+                lines.append(f"{plateau.text(f'the {side} readings')}\n")
+        return lines
 
     def line(self) -> str:
         """The line."""
@@ -164,7 +166,7 @@ class Status:
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
         parts = ["waiting for Enter" if self._waiting else "recording"]
         for side in ("left", "right"):
-            counts = [float(getattr(one.sample, side)) for one in self._shown]
+            counts = [float(getattr(reading.sample, side)) for reading in self._shown]
             parts.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
         bytes_ = self._board.decoder.counters
         lost = self._board.clock.sequence.lost

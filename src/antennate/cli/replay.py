@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic.dataclasses import dataclass
 
+from antennate.cli import BAD_INPUT, OK
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import BAD_INPUT, OK
+from antennate.cli.log import arena_of, complain
 from antennate.cli.options import option
-from antennate.cli.results import ResultOptions, folder_for, log_of, tell
-from antennate.cli.view_options import ViewOptions, page_of, say_by_hand
+from antennate.cli.pages import ViewOptions, page_of, say_by_hand
+from antennate.cli.results import ResultOptions, folder_for, log_of, show_result
 from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
-from antennate.messages import command_words, one_line, shortened
+from antennate.messages import one_line, shortened
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
-from antennate.telemetry.reader import Damage, LogReader
+from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import (
     ReplayConfig,
     Replayed,
@@ -48,7 +48,7 @@ COUNTS = (
 
 
 @dataclass(frozen=True)
-class Options(ViewOptions, ResultOptions):
+class ReplayOptions(ViewOptions, ResultOptions):
     """Which log, and what to leave behind."""
 
     log: str = option("", "log, or the folder of a run with one", "RUN|LOG", positional=True)
@@ -66,7 +66,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log, the controller or the folder cannot be used.
     """
-    config, options = parse("replay", DESCRIPTION, ReplayConfig, argv, Options)
+    config, options = parse("replay", DESCRIPTION, ReplayConfig, argv, ReplayOptions)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
@@ -76,21 +76,21 @@ def command(argv: Sequence[str]) -> int:
             if config.readings == YOKED
             else f"--donor: expected --readings {YOKED} beside it, found {config.readings}"
         )
-    log, found, by_hand = _replayed(path, config, options)
+    log, replayed, by_hand = _replayed(path, config, options)
     log.require_ticks()
-    result = _result(log, found, config)
+    result = _result(log, replayed, config)
     if options.out is not None:
         donor = [log_of(Path(options.donor))] if options.donor else []
         with folder_for(VIEW, options, config, argv, reads=[*log.parts, *donor]) as folder:
-            _keep(folder, path, found)
+            _keep(folder, path, replayed)
             say_by_hand(by_hand, folder)
             folder.finish(result)
-    tell(result, options, VIEW.tables(result), VIEW.sentence(result))
-    return max(complain("replay", log), BAD_INPUT if found.failures else OK)
+    show_result(result, options, VIEW.tables(result), VIEW.sentence(result))
+    return max(complain("replay", log), BAD_INPUT if replayed.failures else OK)
 
 
 def _replayed(
-    path: Path, config: ReplayConfig, options: Options
+    path: Path, config: ReplayConfig, options: ReplayOptions
 ) -> tuple[LogReader, Replayed, Sequence[str]]:
     """The log, what came of its replay, and what was changed by hand on a page."""
     page = page_of(options)
@@ -99,8 +99,7 @@ def _replayed(
             controller = recorded_controller(log.header, config.controller)
             readings = _readings(log, config, options)
             return log, replay(log, controller, log.header, readings=readings), ()
-    from antennate.cli.view import arena_of  # these import much, for a page
-    from antennate.telemetry.view.pace import Restart
+    from antennate.telemetry.view.pace import Restart  # these import much, for a page
     from antennate.telemetry.view.replayed import ReplayPlayer
 
     with page:
@@ -114,11 +113,11 @@ def _replayed(
                 player.tell()
                 ticks = player.ticks(log)
                 readings = _readings(log, config, options)
-                found = replay(ticks, player.controller, log.header, player.decided, readings)
-                return log, found, player.by_hand
+                decide = (player.controller, log.header, player.decided)
+                return log, replay(ticks, *decide, readings), player.by_hand
 
 
-def _readings(log: LogReader, config: ReplayConfig, options: Options) -> Readings:
+def _readings(log: LogReader, config: ReplayConfig, options: ReplayOptions) -> Readings:
     """What the controller is given upon a log."""
     if not options.donor:
         return changed_readings(log.header, config.readings, None)
@@ -126,36 +125,10 @@ def _readings(log: LogReader, config: ReplayConfig, options: Options) -> Reading
         return changed_readings(log.header, config.readings, donor, donor.header)
 
 
-def complain(command: str, log: LogReader) -> int:
-    """Say on stderr what of a log could not be read: the exit code of the command."""
-    say_unguarded(command, log)
-    if not log.bad and not log.missing:
-        return OK
-    place = f"; first at {_place(log.damage[0])}" if log.bad else ""
-    sys.stderr.write(
-        f"antennate {command_words(command)}: error: {log.path}: expected an undamaged log, found "
-        f"damaged places: {log.bad}; ticks missing: {log.missing}; ticks read: {log.ticks}{place}\n"
-    )
-    return BAD_INPUT
-
-
-def say_unguarded(command: str, log: LogReader) -> None:
-    """Say on stderr that bytes of a log may have changed unnoticed."""
-    if not log.guarded:
-        sys.stderr.write(
-            f"antennate {command_words(command)}: {log.path}: written by another program without "
-            "CRCs, so damage to its numbers is not noticed\n"
-        )
-
-
-def _place(damage: Damage) -> str:
-    return f"byte {damage.offset} of {damage.path.name}: {damage.reason}"
-
-
-def _result(log: LogReader, found: Replayed, config: ReplayConfig) -> dict[str, Any]:
+def _result(log: LogReader, replayed: Replayed, config: ReplayConfig) -> dict[str, Any]:
     header, ticks = log.header, max(1, log.ticks)
     name = config.controller or header.controller
-    first = found.first
+    first = replayed.first
     return {
         "log": str(log.path),
         "parts": [part.name for part in log.parts],
@@ -167,11 +140,11 @@ def _result(log: LogReader, found: Replayed, config: ReplayConfig) -> dict[str, 
         "seed": header.seed,
         "trial": header.trial,
         "ticks": log.ticks,
-        "duration_s": found.end - found.start,
-        "recorded_shares": {m.name: found.recorded[m] / ticks for m in Maneuver},
-        "shares": {m.name: found.maneuvers.count(m) / ticks for m in Maneuver},
-        "states": {state or _NO_STATE: n / ticks for state, n in found.states.items()},
-        "different": found.different,
+        "duration_s": replayed.end - replayed.start,
+        "recorded_shares": {m.name: replayed.recorded[m] / ticks for m in Maneuver},
+        "shares": {m.name: replayed.maneuvers.count(m) / ticks for m in Maneuver},
+        "states": {state or _NO_STATE: n / ticks for state, n in replayed.states.items()},
+        "different": replayed.different,
         "first_difference": None
         if first is None
         else {
@@ -180,9 +153,9 @@ def _result(log: LogReader, found: Replayed, config: ReplayConfig) -> dict[str, 
             "recorded": Maneuver.label(first.recorded),
             "replayed": Maneuver.label(first.replayed),
         },
-        "different_commands": found.commands,
-        "failures": found.failures,
-        "failure": found.failure,
+        "different_commands": replayed.commands,
+        "failures": replayed.failures,
+        "failure": replayed.failure,
         "missing": log.missing,
         "damaged": log.bad,
         "closed": log.end is not None,
@@ -242,16 +215,16 @@ def _sentence(result: Mapping[str, Any]) -> str:
 VIEW = View("replay", DESCRIPTION, ReplayConfig, _tables, _sentence)
 
 
-def _keep(folder: RunDirectory, path: Path, found: Replayed) -> None:
+def _keep(folder: RunDirectory, path: Path, replayed: Replayed) -> None:
     """Write the table and the figure, each in a further pass over the log."""
     from antennate.telemetry.figure import Course
     from antennate.telemetry.figure import replay as draw
 
     with LogReader(path) as log:
-        ticks = zip(log, found.maneuvers, strict=True)
-        rows = (tick.row(log.header.robot) | {"replayed": each} for tick, each in ticks)
+        ticks = zip(log, replayed.maneuvers, strict=True)
+        rows = (tick.row(log.header.robot) | {"replayed": maneuver} for tick, maneuver in ticks)
         folder.write(TICKS, csv_lines(rows))
-    if found.maneuvers:
+    if replayed.maneuvers:
         with LogReader(path) as log:
-            figure = draw(Course.of(log, len(found.maneuvers), found.maneuvers))
+            figure = draw(Course.of(log, len(replayed.maneuvers), replayed.maneuvers))
         folder.write_figures({"replay": figure})

@@ -1,25 +1,228 @@
-"""`antennate robot`: what a robot's file says, and how to build and wire that robot."""
+"""Which robot a command talks to: its file, its ports and the key of its board.
+
+`antennate robot` says what a robot's file describes, and how to build and wire that robot.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import RobotFileOptions, parse_robot
-from antennate.cli.exit_codes import OK
-from antennate.cli.results import ResultOptions, folder_for, tell
+from antennate.cli import OK
+from antennate.cli.arguments import FromFile, parse
+from antennate.cli.options import option
+from antennate.cli.results import ResultOptions, folder_for, show_result
+from antennate.cli.terminal import write
 from antennate.dxl.model import EXTENDED_MODE
+from antennate.errors import ConfigError
+from antennate.hardware.doctor.ports import same
+from antennate.hardware.ports.finder import is_udp
+from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
+from antennate.messages import typed
 from antennate.params.base import Params
+from antennate.params.reading import Config, read_file
 from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec
 from antennate.robots.supply import Rail, Supply, servos_of, supply
 from antennate.studies.formats import to_csv
 from antennate.studies.measures import Measure, Table
 from antennate.studies.report import View
+
+USUAL = Path("robot.toml")
+"""The robot's file if --config names no other."""
+
+
+@dataclass(frozen=True)
+class RobotFileOptions(FromFile):
+    """Which file describes the robot."""
+
+    no_config: bool = option(False, f"leave {USUAL} of this folder, which else is read")
+
+
+@dataclass(frozen=True)
+class RobotOptions(RobotFileOptions):
+    """Where the robot is."""
+
+    esp32: str = option(
+        "", "antenna board: a serial port, tcp://HOST:PORT, udp://HOST:PORT", "PORT"
+    )
+    key: Path | None = option(
+        None, "file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY", "FILE"
+    )
+    insecure_udp: bool = option(
+        False, "a board without a key; anybody on the network can then send frames in its place"
+    )
+
+
+@dataclass(frozen=True)
+class BusOptions(RobotFileOptions):
+    """Where the servos are."""
+
+    bus: str = option("", "servo bus: a serial port, or tcp://HOST:PORT", "PORT")
+
+
+@dataclass(frozen=True)
+class PortOptions(BusOptions, RobotOptions):
+    """Where both are."""
+
+
+Chosen = TypeVar("Chosen", bound=RobotFileOptions)
+
+
+def usual_file(options: RobotFileOptions) -> Path | None:
+    """The file to read: the one of --config, else robot.toml of this folder, which is said.
+
+    Raises:
+        ConfigError: One is named, and none is to be read.
+    """
+    if options.config is not None and options.no_config:
+        raise ConfigError("--no-config: expected no --config beside it, found both")
+    if options.config is not None or options.no_config or not USUAL.exists():
+        return options.config
+    write(f"{USUAL} of this folder is read; --no-config leaves it\n")
+    return USUAL
+
+
+def parse_robot(
+    command: str,
+    description: str,
+    take: Callable[[RobotFile], Config],
+    argv: Sequence[str],
+    options: type[Chosen],
+    file_of: Callable[[Chosen], Path | None] = usual_file,
+    without: Sequence[str] = (),
+    named: type[Config] | None = None,
+) -> tuple[Config, Chosen]:
+    """Read the words of a command that talks to a robot.
+
+    Args:
+        command: Its name.
+        description: What it does.
+        take: What it takes of a robot's file.
+        argv: Its words.
+        options: Its other options; ports that no flag names are those of the file.
+        file_of: Which file is read.
+        without: Fields of the other options that this command has not.
+        named: What the file of --config holds, if it is no robot's file.
+
+    Raises:
+        ConfigError: A flag, the file or a value cannot be used.
+        HelpRequest: Help was asked for.
+    """
+    robot = RobotFile()
+
+    def read(path: Path) -> Config:
+        nonlocal robot
+        if named is not None and path is not USUAL:
+            return read_file(path, named)
+        robot = read_file(path, RobotFile)
+        return take(robot)
+
+    model = type(take(robot))
+    config, chosen = parse(command, description, model, argv, options, read, without, file_of)
+    ports = {
+        name: getattr(robot.ports, name)
+        for name in type(robot.ports).model_fields
+        if getattr(chosen, name, None) == ""
+    }
+    return config, replace(chosen, **ports)
+
+
+def parse_writer(
+    command: str,
+    description: str,
+    take: Callable[[RobotFile], Config],
+    argv: Sequence[str],
+    options: type[Chosen],
+    may_make: bool = False,
+) -> tuple[Config, Chosen, Path]:
+    """Read the words of a command that writes a robot's file, and say which file that is.
+
+    Without --config it is robot.toml in this folder, which need not exist; with `may_make` that of
+    --config need not either.
+
+    Raises:
+        ConfigError: A flag, the file or a value cannot be used.
+        HelpRequest: Help was asked for.
+    """
+
+    def file_of(chosen: Chosen) -> Path | None:
+        path = chosen.config or USUAL
+        if not path.exists() and (chosen.config is None or may_make):
+            return None
+        if chosen.config is None:
+            write(f"{USUAL} of this folder is read\n")
+        return path
+
+    without = ["no_config"]
+    config, chosen = parse_robot(command, description, take, argv, options, file_of, without)
+    return config, chosen, chosen.config or USUAL
+
+
+def key_of(options: RobotOptions) -> bytes | None:
+    """The key for a board behind udp://, None if there is no such board.
+
+    Raises:
+        ConfigError: --insecure-udp beside a key, or either without such a board.
+        BadInputError: There is no key, or it cannot be used.
+    """
+    if not is_udp(options.esp32):
+        for flag, given in (("--key", options.key), ("--insecure-udp", options.insecure_udp)):
+            if given:
+                raise ConfigError(f"{flag}: expected a board behind udp:// beside it, found none")
+        return None
+    if not options.insecure_udp:
+        return read_key(options.key, "or give --insecure-udp for a board without one")
+    if options.key is not None:
+        raise ConfigError("--insecure-udp: expected no --key beside it, found both")
+    warning = (
+        "UDP without a key: anybody on this network can send frames in place of the antenna board"
+    )
+    red = "\x1b[1;31m{}\x1b[0m" if sys.stderr.isatty() else "{}"
+    sys.stderr.write(red.format(warning) + "\n")
+    return b""
+
+
+def at_hand(options: RobotFileOptions) -> str:
+    """A hint at the robot's file in this folder, else at the commands that find or make a port."""
+    if options.no_config and USUAL.is_file():
+        return f"; {USUAL} is here, without --no-config its ports are taken"
+    return f"; `{typed('setup')}` finds it, `{typed('twin')}` simulates a robot"
+
+
+def require_two_ports(options: PortOptions) -> None:
+    """Refuse one port for both, and a servo bus on a network that loses packets.
+
+    Raises:
+        ConfigError: They are the same, or the bus is behind udp://.
+    """
+    bus = options.bus
+    if bus and options.esp32 and same(options.esp32, bus):
+        raise ConfigError(f"--esp32 and --bus: expected two ports, found {bus} twice")
+    _refuse_udp(bus)
+
+
+def require_bus(bus: str) -> None:
+    """Refuse a bus that is not named, or on a network that loses packets.
+
+    Raises:
+        ConfigError: It is.
+    """
+    if not bus:
+        raise ConfigError(f"--bus: expected a serial port, found none; `{typed('setup')}` finds it")
+    _refuse_udp(bus)
+
+
+def _refuse_udp(bus: str) -> None:
+    if is_udp(bus):
+        raise ConfigError("--bus: expected a serial port or tcp://, found udp://; it loses packets")
+
 
 DESCRIPTION = """\
 Say what a robot consists of: joints with their ids and servos, what its supply has to give, a
@@ -47,17 +250,17 @@ class Options(ResultOptions, RobotFileOptions):
     """Where the results go, and which file describes the robot."""
 
 
-def _of_robot(file: RobotFile) -> DescribedRobot:
-    return DescribedRobot(robot=file.robot)
-
-
 def command(argv: Sequence[str]) -> int:
     """Describe the robot, and write the diagram and the bill.
 
     Raises:
         AntennateError: The robot or the folder cannot be used.
     """
-    config, options = parse_robot("robot", DESCRIPTION, _of_robot, argv, Options)
+
+    def take(file: RobotFile) -> DescribedRobot:
+        return DescribedRobot(robot=file.robot)
+
+    config, options = parse_robot("robot", DESCRIPTION, take, argv, Options)
     robot = config.robot
     with folder_for(VIEW, options, config, argv) as folder:
         from antennate.robots.wiring import wiring  # slow to import
@@ -74,24 +277,8 @@ def command(argv: Sequence[str]) -> int:
             "bom": parts,
         }
         folder.finish(result)
-        tell(result, options, VIEW.tables(result), VIEW.sentence(result))
+        show_result(result, options, VIEW.tables(result), VIEW.sentence(result))
     return OK
-
-
-def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    power = _supply(result)
-    rails = {
-        f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
-    }
-    return (
-        Table("Joints", _COLUMNS, _cells(result["joints"])),
-        Table.of("Supply", rails, _RAIL, _note(power)),
-    )
-
-
-def _supply(result: Mapping[str, Any]) -> Supply:
-    found = result["supply"]
-    return Supply(**{**found, "rails": tuple(Rail(**rail) for rail in found["rails"])})
 
 
 def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -104,15 +291,22 @@ def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
         yield name, row | {"direction": direction}
 
 
-def _cells(joints: dict[str, dict[str, Any]]) -> list[tuple[str, list[str]]]:
-    return [(name, [str(row[key]) for key in _COLUMNS]) for name, row in joints.items()]
+def _supply(result: Mapping[str, Any]) -> Supply:
+    table = result["supply"]
+    return Supply(**{**table, "rails": tuple(Rail(**rail) for rail in table["rails"])})
 
 
-def _note(power: Supply) -> str:
-    return (
+def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    power, joints = _supply(result), result["joints"]
+    rails = {
+        f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
+    }
+    note = (
         f"A plug of a servo's cable carries at most 3 A: feed the chain for each {power.per_feed} "
         f"servos, at {power.feeds} places."
     )
+    rows = [(name, [str(row[key]) for key in _COLUMNS]) for name, row in joints.items()]
+    return Table("Joints", _COLUMNS, rows), Table.of("Supply", rails, _RAIL, note)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

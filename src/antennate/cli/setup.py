@@ -1,32 +1,42 @@
-"""`antennate setup`: from a box of servos to a robot, one servo at a time."""
+"""`antennate setup`, `setup zero` and `setup jog`: from a box of servos to a robot, by hand."""
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import BusOptions, parse_writer
-from antennate.cli.exit_codes import OK
+from antennate.cli import BAD_INPUT, OK
+from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
 from antennate.cli.options import option
-from antennate.cli.person import TerminalPerson
-from antennate.cli.progress import stop_signals
 from antennate.cli.results import print_table
+from antennate.cli.robot import BusOptions, parse_robot, parse_writer, require_bus
+from antennate.cli.terminal import StatusLine, stop_signals, write
+from antennate.dxl.bus import Bus
 from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
+from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.ports import opener_of
+from antennate.hardware.driving.connect import require_servos
+from antennate.hardware.driving.signals import StopOnce
+from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.host_clock import HostClock
 from antennate.hardware.robot_file import RobotFile
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import JOG_PERIOD
 from antennate.hardware.setup import ports
 from antennate.hardware.setup.assembly import Assembly, JointState
-from antennate.hardware.setup.config import SetupConfig
+from antennate.hardware.setup.config import JogConfig, SetupConfig, ZeroConfig
+from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.person import Quit, confirm
-from antennate.hardware.setup.robot_toml import change
-from antennate.hardware.setup.servos import ServoSetup
-from antennate.hardware.setup.zeros import by_group
+from antennate.hardware.setup.robot_toml import change, require_changeable
+from antennate.hardware.setup.servos import ServoSetup, joints_of
+from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
 from antennate.messages import nearest, shortened, typed
+from antennate.robots.spec import RobotSpec
 from antennate.studies.measures import Table
 
 DESCRIPTION = """\
@@ -38,10 +48,23 @@ joint, each written and read back. Torque never comes on.
 What is done is kept in robot.toml (--config names another file), so that you may stop and go on
 later. Two servos on the bus and a servo of another model are refused. For one that is done you are
 asked whether it is a spare, to become the servo of this joint."""
+ZERO_DESCRIPTION = """\
+Measure zeros and directions of all joints. Torque goes off; you hold the robot straight, legs at
+mid-stance, antennae at their mounting angle, and press Enter. Then you move each joint in turn as
+you are told, and the sign of its motion becomes its direction. Live numbers show what is read.
+
+A horn that sits a tooth off is told. robot.toml (--config names another file) gets zeros and
+directions at the end; all else in it stays. Nothing moves by itself."""
+JOG_DESCRIPTION = """\
+Move one joint by small steps, slowly and with little force: + or the right arrow turns it in its
+positive sense, - or the left arrow back, n and p go to the next and the previous joint, q ends.
+
+Torque is on that joint alone and off at the end, verified. If the program dies, the joint stops
+within 0.2 s by its own watchdog. A servo that is not set up for its joint gets no torque."""
 
 
 @dataclass(frozen=True)
-class Orders(BusOptions):
+class SetupOptions(BusOptions):
     """What to set up."""
 
     esp32: str = option("", "antenna board: a serial port, tcp:// or udp://", "PORT")
@@ -55,15 +78,21 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or no answer can come.
     """
-    config, orders, path = parse_writer(
-        "setup", DESCRIPTION, RobotFile.for_setup, argv, Orders, may_make=True
+    config, options, path = parse_writer(
+        "setup", DESCRIPTION, RobotFile.for_setup, argv, SetupOptions, may_make=True
     )
-    _check(config, orders)
+    if options.among and options.bus and options.esp32:
+        raise ConfigError(
+            "--among: expected a port that is to be found, found both known, bus "
+            f"{options.bus} and esp32 {options.esp32}; leave it out"
+        )
+    for name in options.only:
+        _require_joint("--only: expected joints", name, config.robot)
     person = TerminalPerson()
     try:
         with stop_signals():
-            bus = _ports(person, config, orders, path)
-            return _servos(person, config, orders, path, bus)
+            bus = _ports(person, config, options, path)
+            return _servos(person, config, options, path, bus)
     except Quit:
         sys.stderr.write(f"ended; what is done is in {path}, run `{typed('setup')}` to go on\n")
         return OK
@@ -71,45 +100,39 @@ def command(argv: Sequence[str]) -> int:
         person.close()
 
 
-def _check(config: SetupConfig, orders: Orders) -> None:
-    if orders.among and orders.bus and orders.esp32:
+def _require_joint(expected: str, name: str, robot: RobotSpec) -> None:
+    known = robot.joint_names
+    if name not in known:
         raise ConfigError(
-            f"--among: expected a port that is to be found, found both known, bus {orders.bus} and "
-            f"esp32 {orders.esp32}; leave it out"
+            f"{expected} of the robot{nearest(name, known)}, one of {', '.join(known)}, found "
+            f"{shortened(name)}"
         )
-    known = config.robot.joint_names
-    for name in orders.only:
-        if name not in known:
-            raise ConfigError(
-                f"--only: expected joints of the robot{nearest(name, known)}, one of "
-                f"{', '.join(known)}, found {shortened(name)}"
-            )
 
 
-def _ports(person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path) -> str:
+def _ports(person: TerminalPerson, config: SetupConfig, options: SetupOptions, path: Path) -> str:
     """The bus; both ports are kept in the file. One that is given is opened before any question."""
-    if orders.bus:
-        with opener_of(orders.bus, "--bus")(config.robot.baud):
+    if options.bus:
+        with opener_of(options.bus, "--bus")(config.robot.baud):
             pass
-    listing = ports.ports_like(orders.among) if orders.among else ports.all_ports
-    clock, found = HostClock(), {"bus": orders.bus, "esp32": orders.esp32}
+    listing = ports.ports_like(options.among) if options.among else ports.all_ports
+    clock, known = HostClock(), {"bus": options.bus, "esp32": options.esp32}
     for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):
-        if not found[name]:
-            found[name] = ports.find_port(
+        if not known[name]:
+            known[name] = ports.find_port(
                 person,
                 what,
                 listing,
                 lambda time: clock.sleep_until(clock.now() + time),
                 config.setup.port_time,
             )
-    if not found["bus"]:
+    if not known["bus"]:
         raise ConfigError("--bus: expected a serial port, found none; nothing can be set up")
-    change(path, {("ports", name): port for name, port in found.items() if port})
-    return found["bus"]
+    change(path, {("ports", name): port for name, port in known.items() if port})
+    return known["bus"]
 
 
 def _servos(
-    person: TerminalPerson, config: SetupConfig, orders: Orders, path: Path, bus: str
+    person: TerminalPerson, config: SetupConfig, options: SetupOptions, path: Path, bus: str
 ) -> int:
     robot = config.robot
     ids = by_group(robot, "ids", robot.ids)
@@ -118,12 +141,12 @@ def _servos(
         servos, config.setup.done, lambda done: change(path, {**ids, ("setup", "done"): done})
     )
     states = assembly.look()
-    _show(states)
+    _show_servos(states)
     try:
-        assembly.run(person, states, orders.only)
+        assembly.run(person, states, options.only)
         if len(assembly.done) < len(states):
             raise Quit
-        _whole(person, assembly)
+        _connect_all(person, assembly)
     except Quit:
         done = len(assembly.done)
         person.say(f"{done} of {len(states)} servos are set up; this is kept in {path}")
@@ -132,13 +155,13 @@ def _servos(
     return OK
 
 
-def _whole(person: TerminalPerson, assembly: Assembly) -> None:
+def _connect_all(person: TerminalPerson, assembly: Assembly) -> None:
     """Ask for the whole robot until all servos answer."""
     while confirm(person, "connect all servos as they are in the robot"):
         states = assembly.look()
         missing = [state.joint.name for state in states if state.note != "answers"]
         if not missing:
-            _show(states)
+            _show_servos(states)
             return
         person.say(
             f"expected all servos to answer, found none of {', '.join(missing)}; check the plugs "
@@ -147,7 +170,7 @@ def _whole(person: TerminalPerson, assembly: Assembly) -> None:
     raise Quit
 
 
-def _show(states: Sequence[JointState]) -> None:
+def _show_servos(states: Sequence[JointState]) -> None:
     rows = [
         (s.joint.name, [str(s.joint.servo), model_name(s.joint.model), s.state, s.note])
         for s in states
@@ -156,3 +179,161 @@ def _show(states: Sequence[JointState]) -> None:
     note = f"{done} of {len(states)} servos are set up."
     print_table(Table("Servos", ["id", "model", "state", "note"], rows, note))
     sys.stdout.flush()
+
+
+@dataclass(frozen=True)
+class ZeroOptions(BusOptions):
+    """What to measure."""
+
+    keep_directions: bool = option(False, "measure zeros alone")
+
+
+def zero(argv: Sequence[str]) -> int:
+    """Measure zeros and directions, show them, write them.
+
+    Raises:
+        AntennateError: Something given cannot be used, the servos are not fit, or no answer can
+            come; nothing was written then.
+    """
+    config, options, path = parse_writer(
+        "zero", ZERO_DESCRIPTION, RobotFile.for_zero, argv, ZeroOptions
+    )
+    require_bus(options.bus)
+    person = TerminalPerson()
+    try:
+        with stop_signals():
+            return _measure(person, config, options, path)
+    except Quit:
+        sys.stderr.write("ended; nothing was written\n")
+        return OK
+    finally:
+        person.close()
+
+
+def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, path: Path) -> int:
+    robot, clock = config.robot, HostClock()
+    present = by_group(robot, "zeros", robot.zeros)
+    require_changeable(path, present | by_group(robot, "directions", robot.directions))
+    with master(opener_of(options.bus, "--bus"), robot.baud, clock.now) as bus:
+        require_servos(bus, robot)
+        if left := torque.disable(bus, robot.ids):
+            raise BringUpError(f"expected torque off, servos {left} did not confirm it")
+        positions = Positions(bus, robot, lambda time: clock.sleep_until(clock.now() + time))
+        zeroing = Zeroing(robot, config.setup, positions)
+        zeros = zeroing.zeros(person)
+        for horn in zeroing.horns(zeros):
+            person.say(str(horn))
+        keep = options.keep_directions
+        directions = list(robot.directions) if keep else zeroing.directions(person)
+    change(path, by_group(robot, "zeros", zeros) | by_group(robot, "directions", directions))
+    person.close()
+    _show_zeros(robot, zeros, directions, zeroing.measured)
+    sys.stderr.write(f"{path} is written. Next: {typed('doctor', '--config', str(path))}\n")
+    return OK
+
+
+def _show_zeros(
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], measured: Collection[str]
+) -> None:
+    before = zip(robot.zeros, robot.directions, strict=True)
+    after = zip(zeros, directions, strict=True)
+    rows: list[tuple[str, list[str]]] = []
+    for name, (old, sense), (zero, sign) in zip(robot.joint_names, before, after, strict=True):
+        note = "reversed" if sign != sense else ""
+        note = note if name in measured else "direction not measured"
+        rows.append((name, [str(zero), f"{zero - old:+d}", f"{sign:+d}", note]))
+    print_table(Table("Joints", ["zero", "change", "direction", "note"], rows, ""))
+
+
+_REST = 0.3
+"""Time for a joint to come to rest once the keys have ended [s] (assumed)."""
+_STEPS = {"+": 1, "=": 1, "right": 1, "up": 1, "-": -1, "left": -1, "down": -1}
+_OTHERS = {"n": 1, "p": -1}
+
+
+@dataclass(frozen=True)
+class JogOptions(BusOptions):
+    """Which joint."""
+
+    joint: str = option("", "name of the joint, such as yaw1; else the first", "JOINT")
+
+
+def jog(argv: Sequence[str]) -> int:
+    """Move joints until q or the end of the input.
+
+    Raises:
+        AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
+    """
+    config, options = parse_robot("jog", JOG_DESCRIPTION, RobotFile.for_jog, argv, JogOptions)
+    names = config.robot.joint_names
+    if options.joint:
+        _require_joint("--joint: expected a joint", options.joint, config.robot)
+    require_bus(options.bus)
+    at, clock = names.index(options.joint or names[0]), HostClock()
+    opener = opener_of(options.bus, "--bus")
+    with (
+        master(opener, config.robot.baud, clock.now) as bus,
+        typed_keys() as keys,
+        StopOnce(last=True) as stop,
+    ):
+        stop.within = _move  # no signal keeps the torque from going off
+        off, last = True, ""
+        while off and last not in ("q", END) and not stop.received:
+            off, last = _one_joint(bus, config, at, keys, clock)
+            at = (at + _OTHERS.get(last, 0)) % len(names)
+    return OK if off else BAD_INPUT
+
+
+def _one_joint(
+    bus: Bus, config: JogConfig, at: int, keys: ReadKeys, clock: HostClock
+) -> tuple[bool, str]:
+    """One joint until another is wanted: whether its torque is off, and the last key.
+
+    What became of the torque is written in any case, above the error if there is one.
+    """
+    status, last, left = StatusLine(), "q", list[int]()
+    joint = Jog(bus, config.robot, joints_of(config.robot)[at], config.jog)
+    try:
+        last = _move(joint, config.jog.speed, keys, clock, status)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        left = joint.end()
+        status.close()
+        write(
+            f"torque is NOT confirmed off: servos {left}; switch their supply off\n"
+            if left
+            else f"{joint.joint.name}: torque is off, verified\n"
+        )
+    return not left, last
+
+
+def _move(joint: Jog, speed: float, keys: ReadKeys, clock: HostClock, status: StatusLine) -> str:
+    """Torque on, and what the keys ask for: the key that ends it."""
+    last, arrives = "", math.inf
+    joint.begin()
+    while last not in (*_OTHERS, "q") and clock.now() < arrives:
+        last = _take_steps(joint, keys(JOG_PERIOD if last != END else 0.0)) or last
+        now = joint.look()
+        if last != END:
+            arrives = clock.now() + abs(now.goal - now.angle) / speed + _REST
+        else:
+            clock.sleep_until(clock.now() + JOG_PERIOD)
+        if status.due(clock.now()):
+            status.show(_line(now, joint.joint.name))
+    return last
+
+
+def _take_steps(joint: Jog, keys: Sequence[str]) -> str:
+    """Steps up to a key that is none, which is returned; empty if there is none."""
+    for key in keys:
+        if key in (*_OTHERS, "q", END):
+            return key
+        if key in _STEPS:
+            joint.step(_STEPS[key])
+    return ""
+
+
+def _line(now: JogState, name: str) -> str:
+    angle, goal = math.degrees(now.angle), math.degrees(now.goal)
+    return f"{name}: {angle:+7.1f} deg, goal {goal:+7.1f} deg, {now.ticks} ticks, load {now.load}"

@@ -6,27 +6,31 @@ import json
 import re
 import secrets
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from types import TracebackType
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.addresses import RobotFileOptions, parse_robot, usual_file
-from antennate.cli.exit_codes import OK
-from antennate.cli.options import fields_of, flag_of, found, option
-from antennate.cli.progress import stop_signals
-from antennate.cli.twin_kept import Kept, KeptOptions
-from antennate.cli.view_options import PageOptions, page_of
+from antennate.cli import OK
+from antennate.cli.arguments import as_typed
+from antennate.cli.options import fields_of, flag_of, option
+from antennate.cli.pages import PageOptions, page_of
+from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
+from antennate.cli.terminal import progress, stop_signals, write
 from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
-from antennate.errors import ConfigError, reason
+from antennate.errors import ConfigError, LogError, reason
+from antennate.files import write_whole
 from antennate.hardware.driving.priority import LEVEL, urgent
 from antennate.hardware.ports.keys import read_key
 from antennate.hardware.robot_file import RobotFile
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
+from antennate.telemetry.twin_log import TwinLog
 from antennate.twin.config import Passage, TwinConfig, watched
 from antennate.twin.faults import Demand, Faults, read
 from antennate.twin.orders import Orders
@@ -37,6 +41,7 @@ from antennate.twin.udp import UdpEndpoint
 from antennate.types import AntennaFrame
 
 if TYPE_CHECKING:
+    from antennate.telemetry.twin_film import TwinFilm
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
@@ -82,7 +87,15 @@ wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways.
 
 
 @dataclass(frozen=True)
-class Places(RobotFileOptions, KeptOptions, PageOptions):
+class RecordOptions:
+    """What of the twin is recording."""
+
+    log: Path | None = option(None, "keep a log, .mcap", "FILE")
+    video: Path | None = option(None, "film it, .mp4; drawn when it has ended", "FILE")
+
+
+@dataclass(frozen=True)
+class Places(RobotFileOptions, RecordOptions, PageOptions):
     """Where to serve; two pseudo-terminals if no port is given."""
 
     tcp: str | None = option(
@@ -119,8 +132,15 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used.
     """
+
+    def take(file: RobotFile) -> TwinConfig:
+        return TwinConfig(robot=file.robot)
+
+    def file_of(places: Places) -> Path | None:
+        return places.config if places.servos else usual_file(places)  # servos have no robot
+
     config, places = parse_robot(
-        "twin", DESCRIPTION, _of_robot, argv, Places, file_of=_file, named=TwinConfig
+        "twin", DESCRIPTION, take, argv, Places, file_of=file_of, named=TwinConfig
     )
     orders = None if places.orders is None else Orders(str(places.orders), _say)
     if not places.servos:
@@ -128,29 +148,19 @@ def command(argv: Sequence[str]) -> int:
     return _serve_servos(config, places, read_list(places.servos), orders)
 
 
-def _of_robot(file: RobotFile) -> TwinConfig:
-    """What the twin takes of a robot's file: the robot."""
-    return TwinConfig(robot=file.robot)
-
-
-def _file(places: Places) -> Path | None:
-    """The file to read; servos alone have no robot."""
-    return places.config if places.servos else usual_file(places)
-
-
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
     faults = Faults([read(text) for text in config.fault], config.robot.ids)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
-        Kept(places, robot) as kept,
+        Recording(places, robot) as recording,
         page_of(places, idle=True) or nullcontext() as page,
         TwinServer(robot, faults, *_endpoints(places, robot), orders) as server,
     ):
-        _watch(robot, passage, faults, kept, places.passed)
+        _watch(robot, passage, faults, recording, places.passed)
         if page is not None:
-            kept.watchers.append(_shown(page, robot, config))
-        kept.begin(passage, config)
+            recording.watchers.append(_shown(page, robot, config))
+        recording.begin(passage, config)
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
                 serve = server.run if real else server.run_lockstep
@@ -163,24 +173,29 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
 
 
 def _watch(
-    robot: TwinRobot, passage: Passage, faults: Faults, kept: Kept, file: Path | None
+    robot: TwinRobot, passage: Passage, faults: Faults, recording: Recording, file: Path | None
 ) -> None:
     """Tell what happens, and keep it."""
 
     def began(demand: Demand, t: float) -> None:
         _say(f"{t:.1f} s after the addresses: {demand}")
-        kept.event(f"fault: {demand}")
+        recording.event(f"fault: {demand}")
 
     def passed() -> None:
-        _tell(passage, file)
-        kept.event(passage.summary)
+        _say(passage.summary)
+        if file is not None:
+            try:
+                file.touch()
+            except OSError as error:
+                _say(f"--passed: expected to make {file}, found: {reason(error)}")
+        recording.event(passage.summary)
 
     def returned() -> None:
         passage.reset()
-        kept.event("carried back to the start")
+        recording.event("carried back to the start")
 
     def tick(world: World) -> None:
-        for watcher in kept.watchers:
+        for watcher in recording.watchers:
             watcher(world)
 
     faults.on_begin, passage.on_pass = began, passed
@@ -226,7 +241,7 @@ def _require_of_servos(config: TwinConfig, places: Places) -> None:
         if path not in _OF_SERVOS:
             raise ConfigError(
                 f"{flag_of(path.split('.'))}: expected none beside --servos, as it is for a robot, "
-                f"found {found(value)}"
+                f"found {as_typed(value)}"
             )
 
 
@@ -238,12 +253,12 @@ def _until(
     Only then does it answer at once: what takes a while to begin has begun.
     """
     end = float("inf") if config.duration is None else config.duration
-    told = False
+    ready = False
 
     def go_on(t: float) -> bool:
-        nonlocal told
-        if not told:
-            told = True
+        nonlocal ready
+        if not ready:
+            ready = True
             sys.stdout.write(json.dumps(paths) + "\n")
             sys.stdout.flush()
         return t < end and sound()
@@ -252,19 +267,11 @@ def _until(
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
+    write(f"{text}\n")
 
 
-def _tell(passage: Passage, file: Path | None) -> None:
-    """The head has passed the exit."""
-    sys.stderr.write(f"{passage.summary}\n")
-    sys.stderr.flush()
-    if file is not None:
-        try:
-            file.touch()
-        except OSError as error:
-            sys.stderr.write(f"--passed: expected to make {file}, found: {reason(error)}\n")
+def _say_lost(failure: str) -> None:
+    _say(f"log: {failure}; the twin goes on without it")
 
 
 def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
@@ -298,3 +305,93 @@ def _place(flag: str, text: str) -> tuple[str, int]:
             f"{flag}: expected [HOST:]PORT with a port of 0 to {_LAST_PORT}, found {text!r}"
         )
     return host or "127.0.0.1", int(port)
+
+
+class Recording:
+    """Log and film of a twin; a context, to be left when nobody is served any more.
+
+    That a log cannot be written any more is said at once, and ends nothing; it is an error when the
+    twin has ended. No file is made before `begin`, when all else is ready.
+
+    Attributes:
+        watchers: What is to be called with the world after each tick.
+    """
+
+    def __init__(self, options: RecordOptions, robot: TwinRobot) -> None:
+        self.watchers: list[Callable[[World], None]] = []
+        self._options, self._robot = options, robot
+        self._log: TwinLog | None = None
+        self._film: TwinFilm | None = None
+        for flag, path, ending in (
+            ("--log", options.log, ".mcap"),
+            ("--video", options.video, ".mp4"),
+        ):
+            if path is not None and path.suffix != ending:
+                raise ConfigError(f"{flag}: expected a name with {ending}, found {path}")
+        if (film := options.video) is not None:
+            if film.exists():
+                raise ConfigError(
+                    f"--video: expected no such file yet, found {film}; choose another name"
+                )
+            if not film.parent.is_dir():
+                raise ConfigError(f"--video: expected a folder for {film}, found none")
+            from antennate.telemetry.film import require_video  # slow to import
+
+            require_video()
+
+    def begin(self, passage: Passage, config: TwinConfig) -> None:
+        """Begin to keep what is served."""
+        if self._options.log is not None:
+            path, start = self._options.log, time.time_ns()
+            self._log = TwinLog(path, self._robot, config, start, _say_lost)
+            self.watchers.append(self._log.take)
+        if self._options.video is not None:
+            from antennate.telemetry.twin_film import TwinFilm  # slow to import
+
+            self._film = TwinFilm(self._robot, passage, config)
+            self.watchers.append(self._film.take)
+
+    def event(self, text: str) -> None:
+        """Keep in the log what happened now."""
+        if self._log is not None:
+            self._log.event(text, self._robot.t)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        failure = ""
+        if self._log is not None:
+            wrong = self._log.close()
+            failure = self._log.failure
+            if not failure:
+                _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
+        if self._film is not None and self._options.video is not None:
+            _draw(self._film, self._options.video)
+        if failure and isinstance(error, KeyboardInterrupt | None):
+            raise LogError(failure) from None
+
+
+def _draw(recorded: TwinFilm, path: Path) -> None:
+    """Draw the film; a second Ctrl-C gives it up."""
+    from antennate.telemetry.film import MOST_PICTURES, RATE, encoded
+
+    film = recorded.film()
+    if film is None:
+        _say("video: no servo had torque, so there is nothing to show")
+        return
+    if recorded.full:
+        _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
+    try:
+        with progress("pictures of the film") as step, stop_signals():
+            data = encoded(film, step)
+    except KeyboardInterrupt:
+        _say("video: interrupted: no film was written")
+        return
+    write_whole(path, data)
+    _say(f"video: {path}")

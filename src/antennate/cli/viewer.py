@@ -1,6 +1,7 @@
-"""The other process of `antennate drive`: it keeps the log and shows one line.
+"""What is shown of a drive: a line while it lasts, a table and what came out at its end.
 
-It reads from its standard input what a `Feed` sends, and nobody waits for it. On its standard
+Run as a module it is the other process of `antennate drive`, which keeps the log and shows the
+line. It reads from its standard input what a `Feed` sends, and nobody waits for it. On its standard
 output it says once whether the log has begun, and why it cannot be written any more.
 """
 
@@ -14,13 +15,20 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from antennate.cli.status import StatusLine, write
+from antennate.cli.terminal import StatusLine, write
+from antennate.control.readings import short_names
 from antennate.errors import AntennateError, LogError
+from antennate.hardware.driving.lateness import late_sentence
+from antennate.hardware.driving.priority import Priority
 from antennate.hardware.driving.signals import STOPS
+from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.cures import what_to_do
 from antennate.messages import one_line
+from antennate.studies.measures import Measure, Table
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
@@ -29,6 +37,8 @@ from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.writer import SYNC, LogWriter
 from antennate.types import Maneuver
 
+MODULE = "antennate.cli.viewer"
+"""What Python runs as the process beside a drive."""
 REQUIRED, PAGE = "required", "page="
 _STDOUT = 1
 _BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
@@ -109,11 +119,6 @@ class _Page:
             self._channel.send(TICK, message.content)
 
 
-def _page_of(folder: Path, words: Sequence[str]) -> _Page | None:
-    files = [word.removeprefix(PAGE) for word in words if word.startswith(PAGE)]
-    return _Page(int(files[0]), folder) if files else None
-
-
 class _Log:
     """The log, while it can be written; why it cannot is said once, here and to the loop.
 
@@ -128,7 +133,7 @@ class _Log:
     def __init__(self, path: Path, required: bool) -> None:
         self._path, self._required = path, required
         self._writer: LogWriter | None = None
-        self._taken, self.keeps = 0, False
+        self._count, self.keeps = 0, False
 
     def begin(self, first: Message) -> None:
         """Begin it; the robot walks on without one that cannot be written."""
@@ -145,12 +150,12 @@ class _Log:
     @property
     def unkept(self) -> int:
         """Ticks that came and that it lacks; those that it holds back for a moment are none."""
-        kept = 0 if self._writer is None else self._writer.kept
-        return 0 if self.keeps else self._taken - kept
+        written = 0 if self._writer is None else self._writer.kept
+        return 0 if self.keeps else self._count - written
 
     def write(self, tick: Tick) -> None:
         """Take one tick."""
-        self._taken += 1
+        self._count += 1
         self._carry_out(lambda writer: writer.write(tick))
 
     def settle(self) -> None:
@@ -195,7 +200,8 @@ def main() -> int:
     display = Display()
     required = REQUIRED in sys.argv[2:]
     log = _Log(Path(sys.argv[1]), required)
-    page = _page_of(Path(sys.argv[1]).parent, sys.argv[2:])
+    files = [int(word.removeprefix(PAGE)) for word in sys.argv[2:] if word.startswith(PAGE)]
+    page = _Page(files[0], Path(sys.argv[1]).parent) if files else None
     stream = messages(sys.stdin.buffer.raw, log.settle)  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
@@ -218,10 +224,107 @@ def main() -> int:
     return int(not log.keeps)
 
 
-def say(error: AntennateError) -> bool:
-    """Show an error of the log on stderr, below the status line; always False."""
+def say(error: AntennateError) -> None:
+    """Show an error of the log on stderr, below the status line."""
     write(f"\nantennate drive: {one_line(str(error))}\n")
-    return False
+
+
+MEASURES = (
+    Measure("pace.ticks", "ticks", form="d"),
+    Measure("pace.missed_cycles", "missed ticks", form="d"),
+    Measure("pace.missed_share", "missed", "%", scale=100.0),
+    Measure("walking.missed_share", "missed since the walk began", "%", scale=100.0),
+    Measure("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
+    Measure("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
+    Measure("frames", "frames", form="d"),
+    Measure("crc_errors", "crc errors", form="d"),
+    Measure("lost_samples", "lost samples", form="d"),
+    Measure("resets", "resets", form="d"),
+    Measure("missed_answers", "missed answers", form="d"),
+    Measure("stale_answers", "stale answers", form="d"),
+    Measure("unlogged", "unlogged ticks", form="d"),
+    Measure("commands_sent", "commands sent", form="d"),
+    Measure("commands_refused", "commands refused", form="d"),
+    Measure("priority", "priority"),
+)
+
+
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The table of a drive."""
+    name = result["controller"]
+    return (Table.of("Drive", {short_names([name])[name]: result}, MEASURES, _note(result)),)
+
+
+def sentences(result: Mapping[str, Any]) -> str:
+    """What came out, how late the loop was, and the cure of what went wrong."""
+    held = result["worst_state"] == State.HOLD.name and result.get("worst_s", 0.0) >= _LONG
+    causes = f"{result['refusal']}; {result['why']}" if held or failed(result) else ""
+    return "\n".join([_sentence(result), *late_sentence(result), *what_to_do(causes)])
+
+
+_LONG = 1.0
+"""Time in HOLD from which on somebody should look at its cause [s] (assumed)."""
+
+
+def failed(result: Mapping[str, Any]) -> bool:
+    """Whether a drive ends with exit code 2, its log apart."""
+    fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
+    return fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
+
+
+def _idle(result: Mapping[str, Any]) -> bool:
+    """It was to walk, and never did."""
+    return result["armed"] and not result["commands_sent"]
+
+
+def _note(result: Mapping[str, Any]) -> str:
+    lines: list[str] = []
+    if result["priority"] == Priority.ORDINARY.value:
+        lines.append("Real-time priority was not allowed; a busy machine will make it miss ticks.")
+    if result.get("echoes"):  # results of older versions have none
+        lines.append(
+            "The adapter of the servo bus sends back what it gets (an echo); that was dropped."
+        )
+    if not result["log_complete"] and result["logs"]:
+        files = f"Its files: {', '.join(result['logs'])}."
+        lines.append(f"The log is not complete: {log_failure(result)}. {files}")
+    return "\n".join(lines)
+
+
+def log_failure(result: Mapping[str, Any]) -> str:
+    """Why the log is not complete; results of older versions do not say."""
+    return result.get("log_failure") or "nothing is known of the reason"
+
+
+def _sentence(result: Mapping[str, Any]) -> str:
+    """What came out, in one sentence."""
+    state = result["worst_state"]
+    causes = [cause.removeprefix(f"{state} ") for cause in result["why"].split("; ")]
+    why = f" ({'; '.join(causes)})" if result["why"] else ""
+    lasted = result.get("worst_s")  # results of older versions have none
+    worst = f"worst state {state}{f' for {lasted:.1f} s' if lasted else ''}{why}"
+    torque, ended = _torque(result), f"ended by {result['ended']}"
+    if result["refusal"]:
+        more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
+        return f"The robot was not armed: {result['refusal']}{more}; {torque}."
+    if not result["armed"]:
+        dry = "A dry run: nothing was written to the servos"
+        return f"{dry}, {worst}; {ended}; --arm lets the robot walk."
+    if _idle(result):
+        return f"The robot never walked, no command was sent; {worst}; {ended}; {torque}."
+    sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"
+    shares = ", ".join(f"{name} {100 * s:.0f} %" for name, s in result["shares"].items() if s)
+    walked = f"The robot walked for {result['walked_s']:.1f} s ({shares}): {sent}"
+    return f"{walked}, {worst}; {ended}; {torque}."
+
+
+def _torque(result: Mapping[str, Any]) -> str:
+    if result["torque_off"] is None:
+        return "torque never came on"
+    if not result["servos_on"]:
+        return "torque is off, verified"
+    names = ", ".join(map(str, result["servos_on"]))
+    return f"torque is NOT confirmed off: servos {names}; switch their supply off"
 
 
 if __name__ == "__main__":

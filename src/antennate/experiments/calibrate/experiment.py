@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from antennate import figures as style
+from antennate.antenna.curves import Samples
 from antennate.antenna.fitting import FEWEST_PUSHES
-from antennate.antenna.next_push import RECORDED
+from antennate.antenna.next_push import RECORDED, Pushes, branches
 from antennate.antenna.plateau import Plateau
-from antennate.errors import ConfigError
-from antennate.experiments.bench import bench_films
 from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import conversion_sentence
-from antennate.sim.bench import Watch
+from antennate.experiments.calibrate.run import CalibrateOutcome
 from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
+from antennate.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _95 = "  95 %"
 _MUCH = 0.1
@@ -55,6 +62,7 @@ NEXT = (
     Measure("relaxation.mean_95", _95, form="+.1f", scale=100.0),
     Measure("relaxation.time", "  length of a hold", "s", form=".2g"),
 )
+_BINS = 12
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -105,10 +113,10 @@ def _handled(result: Mapping[str, Any]) -> str:
     if not handled:
         return ""
     rows, far = handled["rows"], len(handled["outliers"])
-    kept = "kept, as they are many" if handled["outliers_kept"] else "left out"
+    fate = "kept, as they are many" if handled["outliers_kept"] else "left out"
     counted = (
         (handled["damaged"], f"{handled['damaged']} damaged left out"),
-        (far, f"{far} outlier{'s' * (far > 1)} {kept}"),
+        (far, f"{far} outlier{'s' * (far > 1)} {fate}"),
         (len(handled["wraps"]), "a clock that wraps unwrapped"),
     )
     said = ", ".join(text for number, text in counted if number)
@@ -217,7 +225,7 @@ def _relaxing(known: Mapping[str, Any]) -> str:
     )
 
 
-def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
+def _files(outcome: CalibrateOutcome) -> Mapping[str, str]:
     return {
         "calibration.json": outcome.calibration.to_json(),
         "conditioning.toml": outcome.conditioning_toml(),
@@ -225,21 +233,121 @@ def _files(outcome: calibrate.CalibrateOutcome) -> Mapping[str, str]:
     }
 
 
-_SPEED = 0.2
-"""Speed of a film over that of the rod: the fastest push takes a third of a second."""
+@style.styled
+def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
+    """Readings against bends with the curve, residuals, both directions, and rival curves."""
+    result, samples = outcome.result(), outcome.recording.samples
+    known = result["assessment"]
+    drawn = [part for part in ("hysteresis", "rivals") if known[part] and any(known[part].values())]
+    heights = (5.2, 2.6 * len(drawn))[: 1 + bool(drawn)]
+    figure = style.canvas(style.WIDTH, sum(heights))
+    upper, *lower = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    above, below = upper.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    _draw_speeds(above, below, samples, outcome.levels())
+    _draw_curve(above, result["calibration"])
+    if known["new_push"] is not None and known["new_push"]["error_95"] is not None:
+        ends = known["new_push"]["error_95"]
+        below.axhspan(*ends, color=style.FAINT, alpha=0.6, linewidth=0, zorder=0)
+        below.set_title("grey: 95 % of the readings of a new push")
+    below.axhline(0, color=style.MUTED, linewidth=0.8)
+    below.set(xlabel="reading [counts]", ylabel="level − bend")
+    if drawn:
+        panels = lower[0].subplots(len(drawn), 1, squeeze=False)[:, 0]
+        for panel, part in zip(panels, drawn, strict=True):
+            if part == "hysteresis":
+                _draw_loop(panel, known[part], samples)
+            else:
+                _draw_rivals(panel, known)
+    return {"calibrate": figure}
 
 
-def _filmed_speeds(config: calibrate.CalibrateConfig) -> list[str]:
-    if config.recording is not None:
-        raise ConfigError("video: expected the rig, which alone can be filmed, found a recording")
-    return [f"{speed:g} m_s" for speed in config.rig.speeds]
+def _draw_speeds(above: Axes, below: Axes, s: Samples, level: Floats) -> None:
+    keys = np.where(np.isnan(s.speed), -1.0, s.speed)
+    known = np.unique(keys).tolist()
+    for key, colour in zip(known, style.series(len(known)), strict=True):
+        rows = keys == key
+        name = "all" if key < 0 else f"{100 * key:g} cm/s"
+        label = f"{name}, {rows.sum()} readings"
+        _draw_bins(above, s.counts[rows], s.level[rows], colour, label)
+        _draw_bins(below, s.counts[rows], (level - s.level)[rows], colour, "")
 
 
-def _film(config: calibrate.CalibrateConfig, speed: str, trial: int, watch: Watch) -> str:
-    """Push once at one of the speeds for its film, the first time; the title."""
-    first = _filmed_speeds(config).index(speed) * config.rig.pushes
-    calibrate.push(config, first, watch)
-    return f"{speed.replace('_', '/')}, {1 / _SPEED:g} times slower"
+def _draw_curve(panel: Axes, curve: Mapping[str, Any]) -> None:
+    low, high = curve["valid_counts"]
+    axis = np.linspace(low, high, 300)
+    x = (axis - curve["counts_low"]) / (curve["counts_high"] - curve["counts_low"])
+    z = curve["polarity"] * curve["slope"] * (x - curve["midpoint"])
+    panel.plot(
+        axis,
+        1 / (1 + np.exp(-z)),
+        color=style.INK,
+        label=f"one sigmoid, R² {curve['r2']:.3f}",
+        zorder=3,
+    )
+    panel.set_ylabel("bend, 0 straight, 1 full")
+    panel.set_title(
+        f"{curve['sensor_id']}: {curve['trials']} pushes;\nmean ± standard deviation of each bin"
+    )
+    panel.legend(fontsize=8)
+
+
+def _draw_loop(panel: Axes, loop: Mapping[str, Any], samples: Samples) -> None:
+    bend, *ways = branches(samples, Pushes.of(samples))
+    for name, counts, colour in zip(("loading", "unloading"), ways, style.series(2), strict=True):
+        known = np.isfinite(counts).any(axis=0)
+        panel.plot(bend[known], np.nanmean(counts[:, known], axis=0), color=colour, label=name)
+    panel.axvline(loop["at_bend"], color=style.MUTED, linewidth=0.8)
+    panel.set(xlabel="bend", ylabel="mean reading [counts]")
+    panel.set_title(
+        f"Hysteresis: mean {100 * abs(loop['mean']):.1f} %,\nlargest "
+        f"{100 * abs(loop['largest']):.1f} % of the span"
+    )
+    panel.legend()
+
+
+def _draw_rivals(panel: Axes, known: Mapping[str, Any]) -> None:
+    rivals = known["rivals"]
+    checks = list(next(iter(rivals.values())))
+    for i, (name, colour) in enumerate(zip(rivals, style.series(len(rivals)), strict=True)):
+        rows = [rivals[name][check] for check in checks]
+        middle = np.array([row["mean"] for row in rows])
+        ends = np.array([row["interval_95"] for row in rows]).T
+        panel.errorbar(
+            middle,
+            -np.arange(len(checks)) - 0.2 * i,
+            xerr=abs(ends - middle),
+            color=colour,
+            label=name,
+            marker="o",
+            markersize=4,
+            linestyle="",
+            capsize=2.5,
+        )
+    panel.axvline(0, color=style.MUTED, linewidth=0.8)
+    panel.set_yticks(-np.arange(len(checks)) - 0.1, checks)
+    panel.set_xlabel("gain: error of the sigmoid minus the rival's")
+    named = " and ".join(known["named"]) or "none"
+    panel.set_title(f"Beats the sigmoid under every check:\n{named}")
+    panel.set_ylim(-len(checks) + 0.4, 0.4)
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.35), ncols=2)
+
+
+def _draw_bins(panel: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:
+    edges = np.linspace(x.min(), x.max(), _BINS + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, _BINS - 1)
+    bins = [b for b in range(_BINS) if (place == b).sum() >= 2]
+    panel.errorbar(
+        [float(x[place == b].mean()) for b in bins],
+        [float(y[place == b].mean()) for b in bins],
+        [float(y[place == b].std()) for b in bins],
+        color=colour,
+        marker="o",
+        markersize=4,
+        linewidth=0.0,
+        elinewidth=1.2,
+        capsize=2,
+        label=label,
+    )
 
 
 EXPERIMENT = Experiment.of_folder(
@@ -248,10 +356,11 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: calibrate.run(config, workers, on_step),
     tables,
     sentence,
-    films=bench_films(_filmed_speeds, _film, "rod", _SPEED),
+    films=calibrate.films,
     files=_files,
     check=require_solver,
     parts="pushes",
+    figures=figures,
     captions={
         "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
         "against unloading, and rival curves.",

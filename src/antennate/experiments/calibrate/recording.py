@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from antennate.antenna.curves import Samples
-from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit_of
+from antennate.csv_files import LARGEST_WHOLE, column, csv_rows, number_of, unit_of, wrong_count
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.readings import (
     BEND,
@@ -253,14 +253,10 @@ def _units(
     path: Path, header: list[str], places: list[int | None], params: RecordingParams
 ) -> tuple[str, ...]:
     """Sentences on units that are declared against those in the names of their columns."""
-    columns = (
-        (places[1], SPEED_UNITS, "speed_unit"),
-        (places[2], TIME_UNITS, "time_unit"),
-        (places[3], (*READING_UNITS, "%"), "reading_unit"),
-        (places[4], BEND_UNITS, "bend_unit"),
-    )
+    units = (SPEED_UNITS, TIME_UNITS, (*READING_UNITS, "%"), BEND_UNITS)
+    names = ("speed_unit", "time_unit", "reading_unit", "bend_unit")
     sentences = list[str]()
-    for place, known, field in columns:
+    for place, known, field in zip(places[SPEED:], units, names, strict=True):
         if place is None:
             continue
         named, declared = unit_of(header[place], known), getattr(params, field)
@@ -282,13 +278,9 @@ def _values(
     header: list[str], cells: list[str], places: list[int | None], params: RecordingParams
 ) -> list[float] | str:
     """Numbers of a row, or what was expected of it and found."""
-    if len(cells) != len(header):
-        why = "; are there decimal commas? write points"
-        if len(cells) < len(header):
-            why = " (truncated); delete the row"
-        elif any("." in cell for cell in cells):
-            why = "; is it merged with another, or a column without a name?"
-        return f"expected {len(header)} cells, found {len(cells)}{why}"
+    surplus = "; is it merged with another, or a column without a name?"
+    if why := wrong_count(header, cells, surplus):
+        return why
     values = list[float]()
     for i, place in enumerate(places):
         if place is None:

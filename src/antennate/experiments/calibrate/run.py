@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import functools
 import hashlib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -22,7 +23,7 @@ from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.plateau import plateau_of, white_noise
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
-from antennate.errors import CalibrationError
+from antennate.errors import CalibrationError, ConfigError
 from antennate.experiments.bench import mean_since
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
@@ -38,8 +39,13 @@ from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
+if TYPE_CHECKING:
+    from antennate.telemetry.film import Film
+
 _BETTER = 0.2
 """How much more of the level each direction alone explains where hysteresis is asked about."""
+_FILM_SPEED = 0.2
+"""Speed of a film over that of the rod: the fastest push takes a third of a second."""
 _OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
 
 
@@ -232,6 +238,28 @@ def record(
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
     return replace(whole, sha256=hashlib.sha256(write(whole).encode()).hexdigest())
+
+
+def films(config: CalibrateConfig, trial: int) -> dict[str, Callable[[], Film]]:
+    """A film of the first push at each speed, in slow motion.
+
+    Raises:
+        ConfigError: There is a recording, and so no rig.
+    """
+    if config.recording is not None:
+        raise ConfigError("video: expected the rig, which alone can be filmed, found a recording")
+    speeds = enumerate(config.rig.speeds)
+    return {f"{speed:g} m_s": functools.partial(_film, config, i) for i, speed in speeds}
+
+
+def _film(config: CalibrateConfig, which: int) -> Film:
+    """A film of a push at one of the speeds."""
+    from antennate.experiments.bench import BenchRecorder  # slow to import
+
+    recorder = BenchRecorder(config.antenna, _FILM_SPEED)
+    push(config, which * config.rig.pushes, recorder.watch)
+    speed = config.rig.speeds[which]
+    return recorder.film(f"{speed:g} m/s, {1 / _FILM_SPEED:g} times slower", "rod")
 
 
 def averaged(recording: Recording, averaging_time: float) -> Recording:

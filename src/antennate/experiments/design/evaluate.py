@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.design.config import OF_SUCCESSES, Axis, DesignConfig, Evaluation
-from antennate.experiments.study import labels
-from antennate.experiments.study.measures import SUCCESS
+from antennate.experiments.study import measures
+from antennate.experiments.study.effects import SUCCESS
 from antennate.experiments.study.run import holds, with_status
 from antennate.experiments.study.subject import (
     OF_TRIALS,
+    OUTCOME,
     Columns,
-    among,
     columns_of,
     find,
     nested,
@@ -31,7 +31,6 @@ from antennate.studies.pool import Workers
 
 FRESH = 1_000_000
 """Added to a seed, it gives one that no trial of a search has."""
-OUTCOME = "outcome"
 OF_DESIGN = ("design", "name", "phase", "evaluation")
 """Columns that a search fills itself, beside those of a study."""
 Row = dict[str, Any]
@@ -65,7 +64,8 @@ class Evaluator:
 
     Attributes:
         judged: Columns that objectives are made of.
-        reads: Names among those that are parameters of this experiment.
+        leaves: All parameters of this experiment, dotted.
+        reads: Names of a design that are among them.
 
     Raises:
         BadInputError: There is no such experiment, a name could mean several parameters, or a
@@ -82,18 +82,16 @@ class Evaluator:
             self._subject = find(self.name)
         except BadInputError as error:
             raise ConfigError(f"evaluate.{label}.{error}") from None
-        known = self.name in experiments.names()
-        self._whole = known and experiments.load(self.name).trials is None
-        self._asked_for: dict[str, str] = {}
+        judged: list[str] = []
         for objective in asked.objectives(label):
-            column = OUTCOME if objective.measure == SUCCESS else objective.column
-            for each in (column, *([OUTCOME] if objective.of_successes else [])):
-                self._asked_for.setdefault(each, objective.measure)
-        self.judged = tuple(self._asked_for)
+            judged.append(OUTCOME if objective.measure == SUCCESS else objective.column)
+            judged += [OUTCOME] if objective.of_successes else []
+        self.judged = tuple(dict.fromkeys(judged))
         model = self._subject.model
-        paths = None if model is None else [p for p in _leaves(model) if p not in model.unread]
-        found = {name: name if paths is None else self._path(name, paths) for name in names}
-        self._paths = {name: path for name, path in found.items() if path is not None}
+        self.leaves = [] if model is None else list(_leaves(model))
+        paths = None if model is None else [p for p in self.leaves if p not in model.unread]
+        known_as = {name: name if paths is None else self._path(name, paths) for name in names}
+        self._paths = {name: path for name, path in known_as.items() if path is not None}
         self._require_once()
 
     @property
@@ -107,6 +105,7 @@ class Evaluator:
         return self._subject.most
 
     def _require_once(self) -> None:
+        """Refuse a parameter that is searched twice, or searched and set."""
         names: dict[str, str] = {}
         for name, path in self._paths.items():
             if path in names:
@@ -148,11 +147,11 @@ class Evaluator:
             ConfigError: A value is out of bounds, or does not fit another one.
         """
         values = {self._paths[n]: v for n, v in point.items() if n in self._paths}
-        found = put_over(self._asked.settings, nested(values))
-        if self._asked.trials is not None and not self._whole:
-            found = put_over(found, {"trials": self._asked.trials})
+        settings = put_over(self._asked.settings, nested(values))
+        if self._asked.trials is not None and not self._subject.whole:
+            settings = put_over(settings, {"trials": self._asked.trials})
         try:
-            return self._subject.configured(found)
+            return self._subject.configured(settings)
         except ConfigError as error:
             if table_of(str(error), self._asked.settings, self._subject) == "settings":
                 where = f"evaluate.{self.label}.settings: "
@@ -163,12 +162,12 @@ class Evaluator:
     def bounds(self, point: Point) -> dict[str, tuple[float, float, bool]]:
         """Between which values those of each objective lie, and whether the upper is a failure."""
         values = dict(self.configured(point))
-        found: dict[str, tuple[float, float, bool]] = {}
+        limits: dict[str, tuple[float, float, bool]] = {}
         for objective in self._asked.objectives(self.label):
-            of = labels.measure_of(self.name, objective.column)
-            least, most, failure = labels.bounds(of, self.name, values)
-            found[objective.name] = (least, most, failure and not objective.of_successes)
-        return found
+            of = measures.measure_of(self.name, objective.column)
+            least, most, failure = measures.bounds(of, self.name, values)
+            limits[objective.name] = (least, most, failure and not objective.of_successes)
+        return limits
 
     def check(self, point: Point) -> None:
         """Find what cannot be run.
@@ -178,13 +177,13 @@ class Evaluator:
         """
         config = self.configured(point)
         self._subject.check(config)
-        conditions = dict.fromkeys(name for name, _ in self._subject.every(config))
+        conditions = dict.fromkeys(name for name, _ in self._subject.trials(config))
         if len(conditions) > 1:
             raise ConfigError(
                 f"evaluate.{self.label}.settings: expected one {self._subject.condition}, found "
                 f"{shortened(', '.join(conditions))}"
             )
-        if self._whole and "seed" not in type(config).model_fields and self._asked.trials:
+        if self._subject.whole and "seed" not in type(config).model_fields and self._asked.trials:
             raise ConfigError(
                 f"evaluate.{self.label}.trials: expected none, as {self.name} has no seed, found "
                 f"{self._asked.trials}"
@@ -198,17 +197,9 @@ class Evaluator:
         Raises:
             ConfigError: There is none.
         """
-        every, known = columns.every, columns.numbers
-        for column in self.judged:
-            if column not in (every if column == OUTCOME else known):
-                of_successes = [n + OF_SUCCESSES for n in known] if OUTCOME in every else []
-                known = [SUCCESS, *known] if OUTCOME in every else known
-                wanted = self._asked_for[column]
-                hint = nearest(wanted, [*known, *of_successes])
-                raise ConfigError(
-                    f"evaluate.{self.label}: expected a measure of {self.name}{hint}, "
-                    f"{among(known)}; found {shortened(wanted)}"
-                )
+        successes = [n + OF_SUCCESSES for n in columns.numbers if OUTCOME in columns.names]
+        for objective in self._asked.objectives(self.label):
+            columns.require(objective.measure, f"evaluate.{self.label}", self.name, successes)
 
     def trials(self, point: Point, times: int = 1, fresh: bool = False) -> list[tuple[Any, Trial]]:
         """Configuration and trial of everything that is run of a design.
@@ -223,7 +214,7 @@ class Evaluator:
             count = times * config.get("trials", 1)
             return [(config, ("", first + i)) for i in range(count)]
         start = getattr(config, "seed", None)
-        if self._whole:
+        if self._subject.whole:
             if start is None:
                 return [(config, ("", 0))]
             count = times * (self._asked.trials or 1)
@@ -232,7 +223,7 @@ class Evaluator:
         changes = {"trials": times * getattr(config, "trials", 1)}
         changes |= {} if start is None else {"seed": start + first}
         config = config.model_copy(update=changes)
-        return [(config, trial) for trial in self._subject.every(config)]
+        return [(config, trial) for trial in self._subject.trials(config)]
 
 
 def evaluators(config: DesignConfig) -> list[Evaluator]:
@@ -244,18 +235,18 @@ def evaluators(config: DesignConfig) -> list[Evaluator]:
     names = list(
         dict.fromkeys([*config.search, *(n for r in config.reference.values() for n in r)])
     )
-    found = [Evaluator(label, asked, names) for label, asked in config.evaluate.items()]
+    judges = [Evaluator(label, asked, names) for label, asked in config.evaluate.items()]
     for name in names:
         where = "search" if name in config.search else "reference"
         if name.rpartition(".")[2] in OF_TRIALS and "." not in name:
             raise ConfigError(f"{where}.{name}: expected a parameter of a design, found {name}")
-        if not any(name in evaluator.reads for evaluator in found):
-            paths = [p for e in found for p in _known(e.name)]
+        if not any(name in evaluator.reads for evaluator in judges):
+            paths = [path for evaluator in judges for path in evaluator.leaves]
             raise ConfigError(
-                f"{where}: expected a parameter of {', '.join(e.name for e in found)}"
+                f"{where}: expected a parameter of {', '.join(e.name for e in judges)}"
                 f"{nearest(name, paths)}, found {shortened(name)}"
             )
-    return found
+    return judges
 
 
 def ends_of(config: DesignConfig) -> Iterator[tuple[str, Any]]:
@@ -279,8 +270,9 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
         groups.setdefault((task.design, task.label), []).append(index)
     for indices in groups.values():
         first = tasks[indices[0]]
-        known = first.experiment in experiments.names()
-        if known and experiments.load(first.experiment).trials is None:
+        columns = () if isinstance(first.config, Params) else (*OF_DESIGN, *first.config)
+        subject = find(first.experiment, columns)
+        if subject.whole:
             for index in indices:
                 emit(index, (tasks[index].place, _run_whole(tasks[index])))
             continue
@@ -290,23 +282,17 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
             emit(indices[i], (task.place, with_status(rows[0], task.judged)))
 
         trials = [tasks[index].trial for index in indices]
-        taken = () if isinstance(first.config, Params) else (*OF_DESIGN, *first.config)
-        find(first.experiment, taken).run(first.config, trials, take)
+        subject.run(first.config, trials, take)
 
 
 def _run_whole(task: Task) -> Row:
     """An experiment without trials of its own, as one row: what is judged, or all if that lacks."""
     outcome = experiments.load(task.experiment).run(task.config, Workers(1), no_step, no_row)
-    found = numbers(outcome.result())
-    judged = {name: found[name] for name in task.judged if name in found}
-    row = judged if len(judged) == len(set(task.judged)) else found
+    known = numbers(outcome.result())
+    judged = {name: known[name] for name in task.judged if name in known}
+    row = judged if len(judged) == len(set(task.judged)) else known
     start = {"seed": task.config.seed} if hasattr(task.config, "seed") else {}
     return with_status({"trial": task.trial[1], **start, **row}, task.judged)
-
-
-def _known(name: str) -> list[str]:
-    model = find(name).model
-    return [] if model is None else list(_leaves(model))
 
 
 def _leaves(model: Any, path: str = "") -> Iterator[str]:

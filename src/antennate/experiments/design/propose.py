@@ -32,8 +32,12 @@ Space = Mapping[str, Sequence[Any] | Axis]
 
 
 @dataclass(frozen=True)
-class Told:
-    """What became of a proposal: each objective, None if it has no value; None if it failed."""
+class Proposal:
+    """What was drawn, and what became of it.
+
+    Attributes:
+        values: Each objective, None if it has no value; None if the design failed.
+    """
 
     drawn: Drawn
     values: Sequence[float | None] | None
@@ -58,26 +62,26 @@ def package() -> Any:
 
 def point_of(space: Space, drawn: Drawn) -> Point:
     """The values of the parameters that were drawn."""
-    found: Point = {}
+    point: Point = {}
     for name, axis in space.items():
         if not isinstance(axis, Axis):
-            found[name] = axis[int(drawn[name])]
+            point[name] = axis[int(drawn[name])]
         elif axis.entries is None:
-            found[name] = drawn[name]
+            point[name] = drawn[name]
         else:
             values = [drawn[_entry(name, i)] for i in range(int(drawn[_count(name)]))]
-            found[name] = sorted(values) if axis.rising else values
-    return found
+            point[name] = sorted(values) if axis.rising else values
+    return point
 
 
 def propose(
-    space: Space, told: Sequence[Told], goals: Sequence[Goal], count: int, seed: int
+    space: Space, past: Sequence[Proposal], goals: Sequence[Goal], count: int, seed: int
 ) -> list[Drawn]:
     """The next proposals.
 
     Args:
         space: What is searched.
-        told: All proposals before, in order.
+        past: All proposals before, in order.
         goals: Of each objective.
         count: How many are wanted.
         seed: Seed of the search.
@@ -86,19 +90,19 @@ def propose(
         MissingPackageError: Optuna is not installed.
     """
     optuna = package()
-    number = int(np.random.SeedSequence([seed, len(told)]).generate_state(1)[0])
+    number = int(np.random.SeedSequence([seed, len(past)]).generate_state(1)[0])
     with _quiet(optuna):
         sampler = optuna.samplers.TPESampler(seed=number, n_ei_candidates=_CANDIDATES, **_SAMPLER)
         study = optuna.create_study(directions=list(goals), sampler=sampler)
-        worst = _worst(told, goals)
-        for each in told:
-            study.add_trial(_finished(optuna, space, each, worst))
-        found: list[Drawn] = []
+        worst = _worst(past, goals)
+        for proposal in past:
+            study.add_trial(_finished(optuna, space, proposal, worst))
+        proposals: list[Drawn] = []
         for _ in range(count):
             trial = study.ask()
             _walk(optuna, space, functools.partial(_suggested, trial))
-            found.append(dict(trial.params))
-        return found
+            proposals.append(dict(trial.params))
+        return proposals
 
 
 @contextlib.contextmanager
@@ -142,34 +146,35 @@ def _suggested(trial: Any, name: str, kind: Any) -> Any:
     return suggest(name, kind.low, kind.high, log=kind.log)
 
 
-def _worst(told: Sequence[Told], goals: Sequence[Goal]) -> list[float]:
+def _worst(past: Sequence[Proposal], goals: Sequence[Goal]) -> list[float]:
     """The worst value known of each objective.
 
     It is told of a proposal without a value: Optuna takes no NaN, and with an infinite value it no
     longer weighs what lies on the front.
     """
-    found: list[float] = []
-    for place, goal in enumerate(goals):
-        every = [each.values[place] for each in told if each.values is not None]
-        known = [value for value in every if value is not None]
-        found.append((max if goal == "minimize" else min)(known, default=0.0))
-    return found
+    columns = zip(*(p.values for p in past if p.values is not None), strict=True)
+    known = [[value for value in column if value is not None] for column in columns]
+    known = known or [[] for _ in goals]
+    return [
+        (max if goal == "minimize" else min)(values, default=0.0)
+        for goal, values in zip(goals, known, strict=True)
+    ]
 
 
-def _finished(optuna: Any, space: Space, told: Told, worst: Sequence[float]) -> Any:
+def _finished(optuna: Any, space: Space, proposal: Proposal, worst: Sequence[float]) -> Any:
     """A proposal and its values as Optuna keeps them."""
     kinds: dict[str, Any] = {}
 
     def look(name: str, kind: Any) -> int | float:
         kinds[name] = kind
-        return told.drawn[name]
+        return proposal.drawn[name]
 
     _walk(optuna, space, look)
     came = {"state": optuna.trial.TrialState.FAIL}
-    if told.values is not None:
-        pairs = zip(told.values, worst, strict=True)
+    if proposal.values is not None:
+        pairs = zip(proposal.values, worst, strict=True)
         came = {"values": [least if value is None else value for value, least in pairs]}
-    return optuna.trial.create_trial(params=told.drawn, distributions=kinds, **came)
+    return optuna.trial.create_trial(params=proposal.drawn, distributions=kinds, **came)
 
 
 def _count(name: str) -> str:

@@ -10,7 +10,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from antennate import experiments
 from antennate.experiments.reproduce.antenna_claims import ANTENNA
@@ -21,8 +23,8 @@ from antennate.experiments.reproduce.verdict import (
     Claim,
     Finding,
     Row,
-    verdict,
 )
+from antennate.figures import INK, SERIES, canvas, styled
 from antennate.messages import command_words
 from antennate.params.base import Params, number
 from antennate.params.control import ConditioningParams
@@ -30,6 +32,9 @@ from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_s
 from antennate.studies.measures import Table
 from antennate.studies.pool import Workers, workers_from
 from antennate.studies.run_files import REPORT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)
 """All claims, in the order of the page."""
@@ -63,6 +68,8 @@ _LOOK = {
     "not_reproduced": "bad",
     "undecided": "muted",
 }
+_WIDE = 100.0
+"""Numbers that span more than this are drawn on a logarithmic axis."""
 
 
 class ReproduceConfig(Params):
@@ -87,7 +94,7 @@ class ReproduceOutcome:
         """One row a claim."""
         return [
             Row(
-                *(c.claim, c.criterion, c.rival, c.paper, f.ours, verdict(f.holds, c.best)),
+                *(c.claim, c.criterion, c.rival, c.paper, f.ours, c.verdict(f)),
                 *(f.reason, command(c.experiment, self.config)),
             )
             for c, f in self.judged
@@ -253,6 +260,50 @@ def _section(row: Mapping[str, Any], name: str, rule: str, figure: str) -> str:
     )
 
 
+def figures(outcome: ReproduceOutcome) -> Mapping[str, Figure]:
+    """One figure a claim, by its name."""
+    return {claim.name: draw(claim, finding) for claim, finding in outcome.judged}
+
+
+@styled
+def draw(claim: Claim, finding: Finding) -> Figure:
+    """Dots with their intervals, the first at the top; the paper's are drawn hollow."""
+    bars = finding.bars
+    figure = canvas(5.2, 0.65 + 0.28 * len(bars))
+    panel = figure.subplots()
+    for place, bar in enumerate(bars):
+        colour = INK if bar.label.startswith("paper") else SERIES[0]
+        if bar.interval is not None:
+            panel.plot(bar.interval, (place, place), color=colour, linewidth=1.4)
+        face = "white" if bar.label.startswith("paper") else colour
+        panel.plot(bar.value, place, "o", color=colour, markerfacecolor=face, markersize=6)
+        panel.annotate(
+            f"{bar.value:,.0f}" if bar.value >= 1000 else f"{bar.value:.3g}",
+            (bar.value, place),
+            (0, 5),
+            textcoords="offset points",
+            ha="center",
+        )
+    values = np.array([bar.value for bar in bars])
+    if len(values) and (values > 0).all() and values.max() > _WIDE * values.min():
+        panel.set_xscale("log")
+    elif (values >= 0).all():
+        panel.set_xlim(left=min(0.0, *panel.get_xlim()))
+    panel.margins(x=0.08)
+    panel.set_yticks(range(len(bars)), [bar.label for bar in bars])
+    panel.set_ylim(len(bars) - 0.4, -0.75)
+    panel.set_xlabel(claim.unit)
+    panel.grid(visible=False, axis="y")
+    return figure
+
+
 EXPERIMENT = Experiment.of_folder(
-    __name__, ReproduceConfig, run, tables, sentence, body=body, parts="parts of 9 experiments"
+    __name__,
+    ReproduceConfig,
+    run,
+    tables,
+    sentence,
+    figures=figures,
+    body=body,
+    parts="parts of 9 experiments",
 )

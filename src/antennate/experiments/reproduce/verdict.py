@@ -23,25 +23,13 @@ MEANINGS: Mapping[Verdict, str] = {
     "undecided": "the 95 % interval holds both sides of the criterion, or there are too few trials "
     "for one",
 }
-"""The rule of the verdicts; `verdict` applies it to every claim."""
+"""The rule of the verdicts; `Claim.verdict` applies it."""
 ENOUGH_TO_STAY = 20
 """Trials from which a largest value that stays below a limit says something: the paper's number."""
 _Z95 = 1.959963984540054
 """The 97.5 % quantile of the normal distribution."""
 Ends = tuple[float, float]
 """Lower and upper end of a 95 % interval."""
-
-
-def verdict(holds: bool | None, best: Best) -> Verdict:
-    """The verdict on a claim.
-
-    Args:
-        holds: Whether its criterion is met; None if the trials decide neither.
-        best: What the claim can be at best.
-    """
-    if holds is None:
-        return "undecided"
-    return best if holds else "not_reproduced"
 
 
 def above(interval: Ends | None, limit: float) -> bool | None:
@@ -181,9 +169,11 @@ class Claim:
     unit: str
     judge: Callable[[Mapping[str, Any]], Finding]
 
-    def verdict(self, result: Mapping[str, Any]) -> Verdict:
-        """The verdict on a result of its experiment."""
-        return verdict(self.judge(result).holds, self.best)
+    def verdict(self, finding: Finding) -> Verdict:
+        """The verdict by what was found: undecided if the trials decide neither."""
+        if finding.holds is None:
+            return "undecided"
+        return self.best if finding.holds else "not_reproduced"
 
     @property
     def rule(self) -> str:

@@ -118,7 +118,9 @@ def _goals(ticks: list[Tick], place: int) -> Floats:
 def _torque(path: Path, ticks: list[Tick], near: Bools) -> tuple[Bools, Bools]:
     """Whether goals counted, and whether it is known what the servo was told, at each tick."""
     on = np.array([tick.state not in _WITHOUT_TORQUE for tick in ticks])
-    lost = np.array([_loses(tick.causes) for tick in ticks])
+    lost = np.array(
+        [any(c.partition(":")[0].endswith(_LOST) for c in tick.causes) for tick in ticks]
+    )
     follows, before = np.zeros(len(ticks), bool), 0
     for i, tick in enumerate(ticks):
         faulty = tick.state == _FAULT
@@ -132,11 +134,6 @@ def _torque(path: Path, ticks: list[Tick], near: Bools) -> tuple[Bools, Bools]:
             "them nowhere while torque was on"
         )
     return follows, follows | ~(on | lost)
-
-
-def _loses(causes: tuple[str, ...]) -> bool:
-    """Whether one of the causes, as a tick says them, is that servos may not hold their goals."""
-    return any(cause.partition(":")[0].endswith(_LOST) for cause in causes)
 
 
 def _hash(path: Path) -> str:

@@ -213,8 +213,8 @@ def errors(data: Data, values: Floats, parts: Floats) -> Floats:
     weight = (_spread(data, parts) > 0) & counts[:, None]
     time = weight.sum(axis=0)
     with np.errstate(invalid="ignore"):
-        each = np.where(weight, away, 0.0).sum(axis=0) / time
-    return np.asarray(np.nanmean(np.where(time > 0, each, np.nan), axis=1))
+        means = np.where(weight, away, 0.0).sum(axis=0) / time
+    return np.asarray(np.nanmean(np.where(time > 0, means, np.nan), axis=1))
 
 
 def fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
@@ -227,7 +227,7 @@ def fit(data: Data, start: Floats, free: Bools, parts: Floats) -> Floats:
         parts: Weight of every piece in every fit, shape (B, F, K).
     """
     cuts = range(_CHUNK, len(start), _CHUNK)
-    chunks = zip(*(np.split(each, cuts) for each in (start, free, parts)), strict=True)
+    chunks = zip(*(np.split(array, cuts) for array in (start, free, parts)), strict=True)
     return np.concatenate([_fit(data, *chunk) for chunk in chunks])
 
 

@@ -122,6 +122,8 @@ class ServoOutcome:
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
+        by_file = _by_file(self.recordings)
+        count = len(fitting.left_out(self.data.parts(), by_file))
         return {
             "schema": 1,
             "command": "servo",
@@ -131,7 +133,7 @@ class ServoOutcome:
                 _about(recording) | asdict(row)
                 for recording, row in zip(self.recordings, self.rows, strict=True)
             ],
-            "interval_over": self._interval_over(),
+            "interval_over": f"{count} {'' if by_file else 'stretches of the '}recordings",
             "models": [self._model(i, model) for i, model in enumerate(self.models)],
         }
 
@@ -151,11 +153,6 @@ class ServoOutcome:
                 if name in model.free and np.isfinite(pair).all()
             },
         }
-
-    def _interval_over(self) -> str:
-        by_file = _by_file(self.recordings)
-        count = len(fitting.left_out(self.data.parts(), by_file))
-        return f"{count} recordings" if by_file else f"{count} stretches of the recordings"
 
     def traces(self) -> Floats:
         """Positions that each model gives [rad], shape (T / 10, M, F)."""
@@ -292,7 +289,11 @@ def _recording_rows(
     """
     away = np.degrees(abs(positions - data.course.position[::EVERY]))
     counts = (data.known & data.course.torque)[::EVERY]
-    lifted = max(map(_lifted, recordings))
+    lifted = 0.0  # largest torque of a weight that was held at rest with drive to spare
+    for recording in recordings:
+        spare = abs(recording.drive) < _BELOW * FULL_DRIVE
+        held = recording.torque & spare & _rests(recording)
+        lifted = max(lifted, float(abs(_weight(recording))[held].max(initial=0.0)))
     return [
         _row(recording, away[:, i], counts[:, i], lifted, STEP * EVERY)
         for i, recording in enumerate(recordings)
@@ -343,12 +344,6 @@ def _rests(recording: Recording) -> Bools:
 def _weight(recording: Recording) -> Floats:
     """Torque of the weight at the shaft [N·m], shape (n,)."""
     return recording.mass * GRAVITY * recording.length * np.sin(recording.position)
-
-
-def _lifted(recording: Recording) -> float:
-    """Largest torque of the weight that is held at rest with drive to spare [N·m]."""
-    spare = recording.torque & (abs(recording.drive) < _BELOW * FULL_DRIVE) & _rests(recording)
-    return float(abs(_weight(recording))[spare].max(initial=0.0))
 
 
 def _mean(values: Floats) -> float:

@@ -66,7 +66,7 @@ class StudyConfig(Params):
             ConfigError: Assumed numbers cannot vary in this plan, or there is none that is left
                 out.
         """
-        found: dict[str, Any] = dict(self.vary)
+        axes: dict[str, Any] = dict(self.vary)
         if self.assumed is not None and model is not None:
             if self.plan in ("grid", "list"):
                 raise ConfigError(
@@ -82,9 +82,9 @@ class StudyConfig(Params):
                     )
             for name, range_ in assumed_ranges(model, self.assumed):
                 left_out = any(f"{name}.".startswith(f"{group}.") for group in self.leave_out)
-                if not left_out and name not in found:
-                    found[name] = range_
-        return found
+                if not left_out and name not in axes:
+                    axes[name] = range_
+        return axes
 
 
 def assumed_ranges(model: type[Params], share: float) -> Iterator[tuple[str, Range]]:
@@ -112,12 +112,8 @@ def assumed_fields(group: Params, path: str = "") -> Iterator[tuple[str, Any, Fi
 
 def _bounds(field: FieldInfo) -> tuple[float, float]:
     """The least and the largest value that a field takes."""
-    low, high = -math.inf, math.inf
+    bounds = {"ge": -math.inf, "gt": -math.inf, "le": math.inf, "lt": math.inf}
     for bound in field.metadata:
-        for name, towards in (("ge", None), ("gt", math.inf)):
-            if (limit := getattr(bound, name, None)) is not None:
-                low = limit if towards is None else math.nextafter(limit, towards)
-        for name, towards in (("le", None), ("lt", -math.inf)):
-            if (limit := getattr(bound, name, None)) is not None:
-                high = limit if towards is None else math.nextafter(limit, towards)
-    return low, high
+        bounds |= {n: limit for n in bounds if (limit := getattr(bound, n, None)) is not None}
+    low = max(bounds["ge"], math.nextafter(bounds["gt"], math.inf))
+    return low, min(bounds["le"], math.nextafter(bounds["lt"], -math.inf))

@@ -1,19 +1,24 @@
-"""Effects of the parameters, and how large they come out where nothing has an effect."""
+"""Effects of the parameters, and how large they come out where nothing has an effect.
+
+Of a Morris plan they are mean sizes of elementary effects, of a random or a Sobol plan slopes over
+the range of each parameter.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.regression import slopes
+from antennate.jackknife import student95
 from antennate.studies import statistics
-from antennate.studies.plan import Axes, Point, elementary_effects
+from antennate.studies.plan import Axes, Point, Range, elementary_effects
 from antennate.types import Floats
 
 SUCCESS = "success_share"
@@ -21,9 +26,9 @@ SUCCESS = "success_share"
 CHANCE = 0.05
 """Share of studies without any effect in which one is found, over all that is compared."""
 _DRAWS = 1000
-"""How often trials are shuffled."""
+"""How often trials are shuffled, or signs drawn."""
 _AT_ONCE = 2_000_000
-"""Trials shuffled at once, to bound the memory."""
+"""Trials shuffled, or signs drawn, at once, to bound the memory."""
 _ROUNDING = 1e-9
 Row = Mapping[str, Any]
 
@@ -34,8 +39,8 @@ def value(row: Row, response: str | None) -> float:
         return math.nan
     if response == SUCCESS:
         return float(row.get("outcome") == "success")
-    found = row.get(response or "")
-    return float(found) if isinstance(found, float | int) and math.isfinite(found) else math.nan
+    cell = row.get(response or "")
+    return float(cell) if isinstance(cell, float | int) and math.isfinite(cell) else math.nan
 
 
 def effects(
@@ -48,8 +53,7 @@ def effects(
 ) -> list[dict[str, Any]]:
     """The effects of each parameter, on conditions, which are `names`, and on their differences.
 
-    Of a random and a Sobol plan they are slopes (`regression.slopes`), of a grid and a list there
-    are none.
+    Of a random and a Sobol plan they are those of `slopes`, of a grid and a list there are none.
 
     Of a Morris plan each has `noise`: the size that the largest effect of a study stays below if
     nothing has an effect, in all but `CHANCE` of such studies over all targets (Bonferroni). Then a
@@ -64,13 +68,13 @@ def effects(
         return []
     values = _values(by_cell, len(points), names, response)
     if config.plan != "morris":
-        return slopes(axes, points, _targets(_mean(values), names), CHANCE)
+        return slopes(axes, points, _targets(_mean(values), names))
     plan = (len(axes), config.points, config.seed)
     noise = _noise(values, names, plan)
     return [
-        {"of": target, "parameter": name, **_spread(found, noise[target])}
+        {"of": target, "parameter": name, **_spread(sizes, noise[target])}
         for target, means in _targets(_mean(values), names).items()
-        for name, found in zip(axes, elementary_effects(*plan, means), strict=True)
+        for name, sizes in zip(axes, elementary_effects(*plan, means), strict=True)
     ]
 
 
@@ -87,17 +91,17 @@ def _values(
     response: str,
 ) -> Floats:
     """The response of every trial, NaN where it is missing: (conditions, trials, points)."""
-    found: dict[tuple[int, Any], Floats] = {}
+    trials: dict[tuple[int, Any], Floats] = {}
     for (point, name), rows in by_cell.items():
         times: Counter[Any] = Counter()
         for row in rows:
             trial = row.get("trial")
             key = times[trial], trial
-            if key not in found:
-                found[key] = np.full((len(names), points), np.nan)
-            found[key][names.index(name), point] = value(row, response)
+            if key not in trials:
+                trials[key] = np.full((len(names), points), np.nan)
+            trials[key][names.index(name), point] = value(row, response)
             times[trial] += 1
-    return np.stack(list(found.values()), axis=1)
+    return np.stack(list(trials.values()), axis=1)
 
 
 def _mean(values: Floats) -> Floats:
@@ -109,10 +113,10 @@ def _mean(values: Floats) -> Floats:
 
 def _targets(means: Floats, names: Sequence[str]) -> dict[str, Floats]:
     """Responses of the points, (conditions, ..., points), and those of each difference."""
-    found = dict(zip(names, means, strict=True))
+    targets = dict(zip(names, means, strict=True))
     for first, second in combinations(names, 2):
-        found[f"{second} minus {first}"] = found[second] - found[first]
-    return found
+        targets[f"{second} minus {first}"] = targets[second] - targets[first]
+    return targets
 
 
 def _noise(
@@ -139,9 +143,9 @@ def _noise(
     return {name: float(np.quantile(v, share, method="higher")) for name, v in largest.items()}
 
 
-def _spread(found: Floats, noise: float | None) -> dict[str, Any]:
+def _spread(effects: Floats, noise: float | None) -> dict[str, Any]:
     """Morris's measures: mean size of the effects, their mean and their standard deviation."""
-    known = found[np.isfinite(found)]
+    known = effects[np.isfinite(effects)]
     if not len(known):
         empty = ("mu_star", "mu_star95", "noise", "above_noise", "mu", "sigma")
         return {**dict.fromkeys(empty), "noise": noise}
@@ -154,3 +158,95 @@ def _spread(found: Floats, noise: float | None) -> dict[str, Any]:
         "mu": float(known.mean()),
         "sigma": float(known.std(ddof=1)) if len(known) > 1 else None,
     }
+
+
+def slopes(
+    axes: Axes, points: Sequence[Point], targets: Mapping[str, Floats]
+) -> list[dict[str, Any]]:
+    """Least squares over all parameters at once: the change of each target over a whole range.
+
+    A choice is compared with the first one of its list. The interval holds also where the spread
+    differs from point to point (HC3: MacKinnon and White, Journal of Econometrics 29 (1985) 305).
+    `noise` is what the changes of a study stay below, all of them, if nothing has an effect, in all
+    but `CHANCE` of such studies over all targets: what the fit leaves over is given random signs,
+    and the largest change that it makes is taken each time, each over its own standard error (wild
+    bootstrap: Davidson and Flachaire, Journal of Econometrics 146 (2008) 162; maximum: Romano and
+    Wolf, Econometrica 73 (2005) 1237). So a strong cause hides no weak one. What goes up and down
+    within one range is not seen.
+
+    Args:
+        axes: What varies.
+        points: Values of what varies.
+        targets: A response of each point, by name; NaN where it is missing.
+
+    Returns:
+        An entry for each target and parameter; numbers are None where the points do not tell them.
+    """
+    columns = dict(_columns(axes, points))
+    effects: list[dict[str, Any]] = []
+    for target, response in targets.items():
+        known = np.isfinite(response)
+        design = np.column_stack([np.ones(len(points)), *columns.values()])[known]
+        fit = _fit(design, response[known], CHANCE / len(targets))
+        for number, name in enumerate(columns):
+            effects.append({"of": target, "parameter": name, **fit[number]})
+    return effects
+
+
+def _columns(axes: Axes, points: Sequence[Point]) -> Iterator[tuple[str, Floats]]:
+    """Each parameter from 0 to 1 over its range, and each further choice as 0 or 1: (points,)."""
+    for name, axis in axes.items():
+        values = [point[name] for point in points]
+        if isinstance(axis, Range):
+            ends = np.array([axis.low, axis.high, *values], float)
+            low, high, *spread = np.log(ends) if axis.log else ends
+            yield name, (np.array(spread) - low) / (high - low)
+            continue
+        texts = [_text(value) for value in values]
+        for choice in axis[1:]:
+            yield f"{name} = {_text(choice)}", np.array([text == _text(choice) for text in texts])
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, default=str)
+
+
+def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]]:
+    """Slope, interval and noise of each column behind the constant one."""
+    count, width = design.shape
+    unknown = dict.fromkeys(("slope", "slope95", "noise", "above_noise"))
+    if count <= width or np.linalg.matrix_rank(design) < width:
+        return [unknown] * (width - 1)
+    solve: Floats = np.linalg.pinv(design).astype(float)
+    fitted = solve @ response
+    leverage = np.einsum("ij,ji->i", design, solve)
+    if (leverage > 1.0 - _ROUNDING).any():  # one point alone decides a slope: no spread is known
+        return [unknown] * (width - 1)
+    errors = (response - design @ fitted) / (1.0 - leverage)
+    error = np.sqrt((solve**2) @ errors**2)
+    half = student95(count - width) * error
+    noise = _largest(solve[1:], errors, error[1:], chance) * error
+    least = np.maximum(noise, np.abs(response).max() * _ROUNDING)
+    return [
+        {
+            "slope": float(slope),
+            "slope95": (float(slope - h), float(slope + h)),
+            "noise": float(n),
+            "above_noise": bool(abs(slope) > at_least),
+        }
+        for slope, h, n, at_least in zip(fitted[1:], half[1:], noise[1:], least[1:], strict=True)
+    ]
+
+
+def _largest(solve: Floats, errors: Floats, error: Floats, chance: float) -> float:
+    """What the largest slope over its error stays below, errors with random signs; but a share."""
+    if not error.any():
+        return 0.0
+    rng, largest = np.random.default_rng(0), list[float]()
+    scale = np.where(error > 0.0, error, np.inf)[:, None]
+    block = max(1, min(_DRAWS, _AT_ONCE // len(errors)))
+    for first in range(0, _DRAWS, block):
+        signs = rng.choice((-1.0, 1.0), (len(errors), min(block, _DRAWS - first)))
+        slopes = np.abs(solve @ (signs * errors[:, None])) / scale
+        largest += slopes.max(axis=0).tolist()
+    return float(np.quantile(largest, 1.0 - chance, method="higher"))

@@ -5,35 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from antennate.errors import ConfigError, SceneError, SimulationError
 from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.rows import OF_STUDY
 from antennate.experiments.study.subject import (
-    Columns,
+    OF_STUDY,
     EmitRows,
     Rows,
     Subject,
-    among,
     columns_in,
     columns_of,
     configurations,
     find,
 )
-from antennate.messages import nearest, shortened
+from antennate.messages import shortened
 from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.plan import Axes, Point
 from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure
 
 STATUS, REASON = "status", "reason"
-_Task = tuple[str, Sequence[str], int, Any, Trial]
-"""What is run, what varies, number of the point, its configuration, the trial."""
-_Name = tuple[int, str, int]
+_Key = tuple[int, str, int]
 """What a task is, whatever the number of trials: its point, condition and trial."""
-_Emit = Callable[[int, tuple[_Name, Rows]], None]
+_Emit = Callable[[int, tuple[_Key, Rows]], None]
+
+
+class _Task(NamedTuple):
+    """A trial of what is studied, which varies in some axes: at a point, with its configuration."""
+
+    experiment: str
+    axes: Sequence[str]
+    point: int
+    config: Any
+    trial: Trial
+
+    @property
+    def key(self) -> _Key:
+        return self.point, *self.trial
 
 
 @dataclass(frozen=True)
@@ -82,14 +92,15 @@ def check(config: StudyConfig) -> None:
     """
     subject = find(config.experiment)
     _require_names(config, subject)
-    _require_each_used(config, subject)
+    _require_use(config, subject)
     (_, first), *_ = configurations(config, subject)
     try:
         subject.check(first)
     except ConfigError as error:
         raise ConfigError(f"{config.experiment}: {error}") from None
-    if (known := columns_of(config.experiment)) is not None:
-        _require_response(config, known)
+    columns = columns_of(config.experiment)
+    if columns is not None and config.response is not None:
+        columns.require(config.response, "response", config.experiment)
 
 
 def _require_names(config: StudyConfig, subject: Subject) -> None:
@@ -100,7 +111,7 @@ def _require_names(config: StudyConfig, subject: Subject) -> None:
             raise ConfigError(f"vary.{shortened(name)}: expected another name, {why}")
 
 
-def _require_each_used(config: StudyConfig, subject: Subject) -> None:
+def _require_use(config: StudyConfig, subject: Subject) -> None:
     """Check that nothing is given that another value overrides or that the plan does not read."""
     drawn = StudyConfig.model_fields
     for name in ("points", "seed") if config.plan in ("grid", "list") else ():
@@ -142,17 +153,7 @@ def holds(settings: Mapping[str, Any], name: str) -> bool:
     return True
 
 
-def _require_response(config: StudyConfig, columns: Columns) -> None:
-    """Check that there is a column for the response, with numbers."""
-    known = [*([measures.SUCCESS] if "outcome" in columns.every else []), *columns.numbers]
-    if config.response is not None and config.response not in known:
-        raise ConfigError(
-            f"response: expected a measure of {config.experiment}"
-            f"{nearest(config.response, known)}, {among(known)}; found {shortened(config.response)}"
-        )
-
-
-def every(config: StudyConfig) -> list[tuple[Any, ...]]:
+def planned(config: StudyConfig) -> list[tuple[Any, ...]]:
     """What each task is: all trials, point by point."""
     subject = find(config.experiment)
     return [
@@ -167,14 +168,10 @@ def _tasks(
 ) -> list[_Task]:
     axes = list(config.axes(subject.model))
     return [
-        (config.experiment, axes, number, configured, trial)
+        _Task(config.experiment, axes, number, configured, trial)
         for number, (_, configured) in enumerate(points)
-        for trial in subject.every(configured)
+        for trial in subject.trials(configured)
     ]
-
-
-def _name(task: _Task) -> _Name:
-    return task[2], *task[4]
 
 
 def run(
@@ -193,24 +190,25 @@ def run(
     points = configurations(config, subject)
     axes = config.axes(subject.model)
     tasks = _tasks(config, subject, points)
-    found: list[tuple[_Name, Rows]] = []
-    checked = False
+    ended: dict[_Key, Rows] = {}
+    checked = config.response is None
 
-    def lost(place: int, failure: Failure) -> tuple[_Name, Rows]:
-        condition, trial = tasks[place][4]
+    def lost(place: int, failure: Failure) -> tuple[_Key, Rows]:
+        condition, trial = tasks[place].trial
         row = {"trial": trial, STATUS: failure.status, REASON: failure.reason}
-        return _name(tasks[place]), [
+        return tasks[place].key, [
             ({subject.condition: condition} if subject.condition else {}) | row
         ]
 
-    def take(item: tuple[_Name, Rows]) -> None:
-        found.append(item)
-        for row in item[1]:
-            nonlocal checked
+    def take(item: tuple[_Key, Rows]) -> None:
+        nonlocal checked
+        key, rows = item
+        ended[key] = rows
+        for row in rows:
             if not checked and row[STATUS] in ("ok", "nan"):
-                _require_response(config, columns_in(row))
+                columns_in(row).require(str(config.response), "response", config.experiment)
                 checked = True
-            on_row({"point": item[0][0], **row})
+            on_row({"point": key[0], **row})
 
     chunk = chunk_of(len(tasks), workers, subject.most)
     interrupted = False
@@ -224,34 +222,37 @@ def run(
         )
     except KeyboardInterrupt:
         interrupted = True
-    rows = _table(subject, [point for point, _ in points], tasks, found)
+    rows = [  # in the order of the plan
+        {"point": task.point, **cells(points[task.point][0]), **row}
+        for task in tasks
+        for row in ended.get(task.key, ())
+    ]
     return StudyOutcome(
-        *(config, [point for point, _ in points], subject.condition, axes, rows, len(tasks)),
-        ended=len(found),
-        interrupted=interrupted,
+        *(config, [point for point, _ in points], subject.condition, axes, aligned(rows)),
+        *(len(tasks), len(ended), interrupted),
     )
 
 
 def _run(tasks: Sequence[_Task], emit: _Emit) -> None:
     """Run some trials, those of one point at once."""
-    subject = find(tasks[0][0], tasks[0][1])
+    subject = find(tasks[0].experiment, tasks[0].axes)
     for _, config, trials, take in _by_point(tasks, emit):
         subject.run(config, trials, take)
 
 
 def _run_batched(tasks: Sequence[_Task], emit: _Emit, fail: Fail, device: str | None) -> None:
     """The same on a GPU, a batch for each point; a point that cannot be run fails alone."""
-    subject, ended = find(tasks[0][0], tasks[0][1]), set[int]()
+    subject, ended = find(tasks[0].experiment, tasks[0].axes), set[int]()
 
-    def take(index: int, result: tuple[_Name, Rows]) -> None:
+    def note(index: int, result: tuple[_Key, Rows]) -> None:
         ended.add(index)
         emit(index, result)
 
-    for indices, config, trials, keep in _by_point(tasks, take):
+    for indices, config, trials, take in _by_point(tasks, note):
         try:
-            subject.run_on_device(config, trials, keep, device)
+            subject.run_on_device(config, trials, take, device)
         except (SceneError, SimulationError) as error:
-            for index in [each for each in indices if each not in ended]:
+            for index in [i for i in indices if i not in ended]:
                 fail(index, Failure("failed", str(error), error))
 
 
@@ -259,15 +260,15 @@ def _by_point(
     tasks: Sequence[_Task], emit: _Emit
 ) -> Iterator[tuple[list[int], Any, list[Trial], EmitRows]]:
     """For each point indices of its tasks, configuration, trials, and what takes their rows."""
-    by_point: dict[int, list[int]] = {}
+    points: dict[int, list[int]] = {}
     for index, task in enumerate(tasks):
-        by_point.setdefault(task[2], []).append(index)
-    for indices in by_point.values():
+        points.setdefault(task.point, []).append(index)
+    for indices in points.values():
 
         def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
-            emit(indices[i], (_name(tasks[indices[i]]), [with_status(row) for row in rows]))
+            emit(indices[i], (tasks[indices[i]].key, [with_status(row) for row in rows]))
 
-        yield indices, tasks[indices[0]][3], [tasks[index][4] for index in indices], take
+        yield indices, tasks[indices[0]].config, [tasks[index].trial for index in indices], take
 
 
 def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[str, Any]:
@@ -282,22 +283,6 @@ def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[st
     status = "invalid" if row.get("outcome") == "invalid" else "nan" if bad else "ok"
     reason = row.get(REASON) or (f"not finite: {', '.join(bad)}" if status == "nan" else "")
     return {**row, STATUS: status, REASON: reason}
-
-
-def _table(
-    subject: Subject,
-    points: Sequence[Point],
-    tasks: Sequence[_Task],
-    found: Sequence[tuple[_Name, Rows]],
-) -> Rows:
-    """All rows in the order of the plan, each with the same columns."""
-    rows = dict(found)
-    whole = [
-        {"point": task[2], **cells(points[task[2]]), **row}
-        for task in tasks
-        for row in rows.get(_name(task), ())
-    ]
-    return aligned(whole)
 
 
 def aligned(rows: Rows) -> Rows:

@@ -4,27 +4,33 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.rows import own_row
+from antennate.experiments.study.effects import SUCCESS
+from antennate.files import in_units
 from antennate.lookup import Registry
-from antennate.messages import shown
+from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params
 from antennate.params.faults import describe
 from antennate.params.reading import put_over, with_bases
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
+from antennate.studies.formats import dumped
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
 
 Rows = list[dict[str, Any]]
+OUTCOME = "outcome"
+"""Column that tells whether a trial succeeded."""
 OF_TRIALS = ("trials", "trial", "seed")
 """Parameters and columns that say which trials there are."""
 MOST_TRIALS = 1_000_000
@@ -34,8 +40,10 @@ _LONGEST = 100
 """Most entries of a list in a result that have columns."""
 FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.trials", {})
 """Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
-
-
+OF_STUDY = ("point", "trial", "seed", "status", "reason")
+"""Columns that a study fills itself."""
+LARGEST_ROW = 1_000_000
+"""Most bytes of a row as JSON: a million rows of a hundred numbers have 2 kB each (assumed)."""
 EmitRows = Callable[[int, Rows], None]
 
 
@@ -50,9 +58,9 @@ def find(name: str, axes: Collection[str] = ()) -> Subject:
         BadInputError: There is no such experiment or function.
     """
     if name in experiments.names():
-        return _OfExperiment(experiments.load(name))
+        return _ExperimentSubject(experiments.load(name))
     if ":" in name or name in FUNCTIONS.added:
-        return _OfFunction(name, axes)
+        return _FunctionSubject(name, axes)
     raise BadInputError(f"experiment: {experiments.unknown(name)}")
 
 
@@ -66,17 +74,17 @@ def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, A
     settings = put_over(config.settings, {} if config.trials is None else {"trials": config.trials})
     for name in config.vary:
         _require_groups(settings, name)
-    found: list[tuple[Point, Any]] = []
+    pairs: list[tuple[Point, Any]] = []
     assumed = config.axes(subject.model).keys() - config.vary.keys()
     points = config.points_of(subject.model)
     if (count := len(points) * (config.trials or 1)) > MOST_TRIALS:
         raise ConfigError(f"trials: expected at most {MOST_TRIALS} at all points, found {count}")
     for point in points:
         try:
-            found.append((point, subject.configured(put_over(settings, nested(point)), assumed)))
+            pairs.append((point, subject.configured(put_over(settings, nested(point)), assumed)))
         except ConfigError as error:
             raise ConfigError(f"{table_of(str(error), settings, subject)}: {error}") from None
-    return found
+    return pairs
 
 
 def _require_groups(settings: Mapping[str, Any], name: str) -> None:
@@ -107,12 +115,32 @@ class Columns:
     """Names of the columns of rows.
 
     Attributes:
-        every: All of them.
+        names: All of them.
         numbers: Those of numbers that are measured.
     """
 
-    every: Sequence[str]
+    names: Sequence[str]
     numbers: Sequence[str]
+
+    def require(self, measure: str, where: str, of: str, more: Sequence[str] = ()) -> None:
+        """Check that a measure is a column of numbers, or the share of successes.
+
+        Args:
+            measure: Its name.
+            where: Where it is asked for.
+            of: The experiment.
+            more: Further names that are measures.
+
+        Raises:
+            ConfigError: There is no such measure.
+        """
+        known = [SUCCESS, *self.numbers] if OUTCOME in self.names else self.numbers
+        if measure not in (*known, *more):
+            listed = f"{', '.join(known[:_MOST_NAMED])}{', ...' * (len(known) > _MOST_NAMED)}"
+            raise ConfigError(
+                f"{where}: expected a measure of {of}{nearest(measure, [*known, *more])}, one of "
+                f"{listed}; found {shortened(measure)}"
+            )
 
 
 def columns_of(name: str) -> Columns | None:
@@ -120,7 +148,10 @@ def columns_of(name: str) -> Columns | None:
     trials = experiments.load(name).trials if name in experiments.names() else None
     if trials is None or trials.row is None:
         return None
-    kinds = {field.name: _kind(field.type) for field in fields(trials.row)}
+    kinds: dict[str, str] = {}
+    for field in fields(trials.row):
+        text = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
+        kinds[field.name] = text.partition(" ")[0]
     numbers = [n for n, k in kinds.items() if k in ("float", "int") and n not in OF_TRIALS]
     return Columns(list(kinds), numbers)
 
@@ -131,33 +162,24 @@ def columns_in(row: Mapping[str, Any]) -> Columns:
     return Columns(list(row), [n for n in numbers if n not in OF_TRIALS])
 
 
-def _kind(annotation: Any) -> str:
-    text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", "")
-    return text.partition(" ")[0]
-
-
-def among(names: Sequence[str]) -> str:
-    """The first names of those that may be chosen."""
-    return f"one of {', '.join(names[:_MOST_NAMED])}" + (", ..." * (len(names) > _MOST_NAMED))
-
-
 def nested(point: Point) -> dict[str, Any]:
     """Dotted names as nested tables."""
-    found: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
     for name, value in point.items():
         inner = value
         for part in reversed(name.split(".")):
             inner = {part: inner}
-        found = put_over(found, inner)
-    return found
+        tables = put_over(tables, inner)
+    return tables
 
 
-class _OfExperiment:
+class _ExperimentSubject:
     """An experiment, trial by trial if it has trials, else as a whole.
 
     Attributes:
         condition: Column of its rows that tells the condition; empty without.
         most: Trials that may be run at once.
+        whole: Whether it has no trials of its own.
     """
 
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
@@ -165,6 +187,7 @@ class _OfExperiment:
         self.model: type[Params] | None = experiment.config
         self.condition = self._trials.condition if self._trials else ""
         self.most = self._trials.most if self._trials else 1
+        self.whole = self._trials is None
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
         """Its configuration from nested values; `allowed` may differ though nothing reads them."""
@@ -179,13 +202,14 @@ class _OfExperiment:
     def check(self, config: Any) -> None:
         self._experiment.check(config)
 
-    def every(self, config: Any) -> Sequence[Trial]:
+    def trials(self, config: Any) -> Sequence[Trial]:
+        """All of them, in the order of its table."""
         return self._trials.every(config) if self._trials else [("", 0)]
 
     def tasks(self, config: Any) -> Sequence[Any]:
         """What each trial is, whatever the number of trials."""
-        named = self._experiment.tasks if self._trials else None
-        return named(config) if named else self.every(config)
+        tasks = self._experiment.tasks if self._trials else None
+        return tasks(config) if tasks else self.trials(config)
 
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
         """Run some trials; emit the index and the rows of each."""
@@ -204,12 +228,13 @@ class _OfExperiment:
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 
 
-class _OfFunction:
+class _FunctionSubject:
     """A function trial(config, seed) -> row; it takes any parameters."""
 
     model: type[Params] | None = None
     condition = ""
     most = 1
+    whole = False
 
     def __init__(self, name: str, axes: Collection[str]) -> None:
         self._function, self._axes = FUNCTIONS.find(name), axes
@@ -222,16 +247,16 @@ class _OfFunction:
     def check(self, config: Any) -> None:
         pass
 
-    def every(self, config: Any) -> Sequence[Trial]:
+    def trials(self, config: Any) -> Sequence[Trial]:
         return [("", seed) for seed in range(config.get("trials", 1))]
 
     def tasks(self, config: Any) -> Sequence[Any]:
-        return self.every(config)
+        return self.trials(config)
 
     def run(self, config: Any, trials: Sequence[Trial], emit: EmitRows) -> None:
-        given = {name: value for name, value in config.items() if name != "trials"}
+        values = {name: value for name, value in config.items() if name != "trials"}
         for i, (_, seed) in enumerate(trials):
-            emit(i, [{"trial": seed, **own_row(self._function(given, seed), self._axes)}])
+            emit(i, [{"trial": seed, **own_row(self._function(values, seed), self._axes)}])
 
     def run_on_device(
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
@@ -239,7 +264,7 @@ class _OfFunction:
         raise ConfigError(f"{NO_BATCHES}; a function of your own has none")
 
 
-Subject = _OfExperiment | _OfFunction
+Subject = _ExperimentSubject | _FunctionSubject
 """What is run at each point."""
 
 
@@ -254,12 +279,100 @@ def plain(values: Any) -> Any:
 
 def numbers(result: Mapping[str, Any], path: str = "") -> dict[str, Any]:
     """Numbers and texts of a result as one row, by dotted name; entries of lists count from 0."""
-    found: dict[str, Any] = {}
+    row: dict[str, Any] = {}
     for key, value in result.items():
         if isinstance(value, list | tuple) and len(value) <= _LONGEST:
-            found |= numbers({str(i): item for i, item in enumerate(value)}, f"{path}{key}.")
+            row |= numbers({str(i): item for i, item in enumerate(value)}, f"{path}{key}.")
         elif isinstance(value, Mapping):
-            found |= numbers(value, f"{path}{key}.")
+            row |= numbers(value, f"{path}{key}.")
         elif value is None or isinstance(value, str | int | float):
-            found[path + key] = value
-    return found
+            row[path + key] = value
+    return row
+
+
+def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
+    """What a function returned as a row of plain values.
+
+    Args:
+        result: A dictionary or a dataclass. Scalars of NumPy become numbers, arrays lists.
+        taken: Names of what varies, which are columns of the study as well.
+
+    Raises:
+        BadInputError: It is something else, too large, or has a column or a value that cannot be
+            kept.
+    """
+    if is_dataclass(result) and not isinstance(result, type):
+        result = asdict(result)
+    if not isinstance(result, Mapping):
+        kind = type(result).__name__
+        raise BadInputError(f"expected a row as a dictionary or a dataclass, found {kind}")
+    row: dict[str, Any] = {}
+    for name, value in result.items():
+        if not isinstance(name, str):
+            kind = type(name).__name__
+            raise BadInputError(f"expected names of columns as text, found {kind}")
+        if name in OF_STUDY or name in taken:
+            raise BadInputError(
+                f"column {shortened(name)}: expected another name, as the study has this column"
+            )
+        where = "the name of a column"
+        try:
+            key, where = _text(name), f"column {shortened(name)}"
+            row[key] = _json(value)
+        except ValueError as error:
+            raise BadInputError(f"{where}: {error}") from None
+    if (size := len(dumped(row))) > LARGEST_ROW:
+        raise BadInputError(
+            f"expected a row of at most {in_units(LARGEST_ROW)} as JSON, found {in_units(size)}"
+        )
+    return row
+
+
+def _json(value: Any) -> Any:
+    """A value as JSON has it; a ValueError says what was expected of it."""
+    match value:
+        case Enum():
+            return _json(value.value)
+        case None | bool():
+            return value
+        case np.bool_():
+            return bool(value)
+        case int() | np.integer():
+            return _whole(int(value))
+        case float() | np.floating():
+            return float(value)
+        case str():
+            return _text(value)
+        case np.ndarray():
+            return _json(value.tolist())
+        case list() | tuple():
+            return [_json(item) for item in value]
+        case Mapping():
+            return {_key(key): _json(item) for key, item in value.items()}
+    kind = type(value).__name__  # its own text may be long, or raise
+    raise ValueError(f"expected numbers or text, found an object of type {kind}")
+
+
+def _key(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected keys as text, found {type(value).__name__}")
+    return _text(value)
+
+
+def _whole(value: int) -> int:
+    try:
+        float(value)
+    except OverflowError:
+        bits = value.bit_length()
+        raise ValueError(
+            f"expected a number below 1.8e308, found a whole number of {bits} bits"
+        ) from None
+    return value
+
+
+def _text(value: str) -> str:
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"expected Unicode text, found {value[:40]!a}") from None
+    return str(value)

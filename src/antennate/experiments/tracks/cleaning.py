@@ -117,10 +117,10 @@ def _refuse_far_apart(track: Track) -> None:
 
 def _whole(track: Track, values: Floats) -> Floats:
     """Values with one for each frame from first to last, the first of those that stand twice."""
-    found = np.full((int(track.frames[-1] - track.frames[0]) + 1, *values.shape[1:]), np.nan)
-    kept = np.concatenate([[True], np.diff(track.frames) > 0])
-    found[track.frames[kept] - track.frames[0]] = values[kept]
-    return found
+    whole = np.full((int(track.frames[-1] - track.frames[0]) + 1, *values.shape[1:]), np.nan)
+    first = np.concatenate([[True], np.diff(track.frames) > 0])
+    whole[track.frames[first] - track.frames[0]] = values[first]
+    return whole
 
 
 def frames_of(time: float, rate: float) -> int:
@@ -133,24 +133,24 @@ def _each_frame_once(
     params: CleaningParams, track: Track, counts: dict[str, int]
 ) -> dict[str, Floats]:
     """Points with a row for each frame from first to last; what is not known is NaN."""
-    kept = np.concatenate([[True], np.diff(track.frames) > 0])
+    first = np.concatenate([[True], np.diff(track.frames) > 0])
     cutoff = track.cutoff if params.likelihood is None else params.likelihood
-    counts["unsorted"], counts["duplicated"] = track.unsorted, int((~kept).sum())
-    counts["absent"] = int(track.frames[-1] - track.frames[0] + 1 - kept.sum())
-    found = {}
+    counts["unsorted"], counts["duplicated"] = track.unsorted, int((~first).sum())
+    counts["absent"] = int(track.frames[-1] - track.frames[0] + 1 - first.sum())
+    points: dict[str, Floats] = {}
     for name, raw in track.points.items():
         values = raw.astype(np.float64)
-        gone = np.asarray(~np.isfinite(values).all(axis=1))
+        missing = np.asarray(~np.isfinite(values).all(axis=1))
         low = np.zeros(len(raw), bool)
         if name in track.scores:
-            low = ~gone & ~(track.scores[name] >= cutoff)
-        counts["missing"] += int(gone[kept].sum())
-        counts["low_likelihood"] += int(low[kept].sum())
-        values[gone | low] = np.nan
-        found[name] = _whole(track, values)
-    every = np.hstack(list(found.values()))
-    counts["still"] = int((np.diff(every, axis=0) == 0).all(axis=1).sum())
-    return found
+            low = ~missing & ~(track.scores[name] >= cutoff)
+        counts["missing"] += int(missing[first].sum())
+        counts["low_likelihood"] += int(low[first].sum())
+        values[missing | low] = np.nan
+        points[name] = _whole(track, values)
+    joined = np.hstack(list(points.values()))
+    counts["still"] = int((np.diff(joined, axis=0) == 0).all(axis=1).sum())
+    return points
 
 
 def _exchange(track: Track, body: dict[str, Floats], counts: dict[str, int]) -> None:
@@ -197,16 +197,16 @@ def _refuse_mirrored(track: Track, wrong: Bools, known: Bools, most: float) -> N
 
 def _nearer_if_exchanged(left: Floats, right: Floats, wrong: Bools) -> Bools:
     """Which frames, among the wrong ones, fit the last known tips better if exchanged."""
-    found = np.zeros(len(wrong), bool)
+    nearer = np.zeros(len(wrong), bool)
     last: tuple[Floats, Floats] | None = None
     for i in np.flatnonzero(np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)):
         now = left[i], right[i]
         if last is not None and wrong[i]:
             as_is = np.hypot(*(now[0] - last[0])) + np.hypot(*(now[1] - last[1]))
             exchanged = np.hypot(*(now[1] - last[0])) + np.hypot(*(now[0] - last[1]))
-            found[i] = exchanged < as_is
-        last = (now[1], now[0]) if found[i] else now
-    return found
+            nearer[i] = exchanged < as_is
+        last = (now[1], now[0]) if nearer[i] else now
+    return nearer
 
 
 def _drop_outliers(

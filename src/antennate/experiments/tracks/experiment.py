@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from antennate import figures as style
+from antennate.experiments.tracks import measures
 from antennate.experiments.tracks.config import TracksConfig
-from antennate.experiments.tracks.measures import MOST_BEYOND, SHAPES
-from antennate.experiments.tracks.run import run
+from antennate.experiments.tracks.measures import FREE, MOST_BEYOND, NAMES, SHAPES, UNKNOWN, Antenna
+from antennate.experiments.tracks.run import TracksOutcome, run
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import NONE, Table, few, shown
+from antennate.types import Ints
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 HANDLED = {
     "unsorted": "rows after one of a later frame, sorted",
@@ -32,11 +41,23 @@ UNITS = {
     "duration": ("s", 1.0),
 }
 """Unit in which a criterion is shown, and how many of it are one of the flag's."""
+_MOST_TRIALS = 24
+"""More are not drawn one by one."""
+_LONGEST = 20.0
+"""Time that is drawn [s]."""
+_OUTLINES = 40
+"""Outlines of each shape."""
+_MARKS = dict(zip(SHAPES, ("o", "s", "^", "D"), strict=True))
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The shapes, what depends on each criterion, and what was wrong with the tracks."""
-    frames, trials = result["frames"], result["trials_in_contact"]
+    return _shapes(result), _varied(result), _handled(result)
+
+
+def _shapes(result: Mapping[str, Any]) -> Table:
+    """Shares of the shapes over trials."""
+    trials = result["trials_in_contact"]
     many = "one trial" if trials == 1 else f"the mean over {trials} trials"
     notes = [f"Shares of the frames in contact, {many}."]
     if result["classified_by"] == "direction":
@@ -46,7 +67,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         )
     if _free_air(result):
         notes.append("Without a wall every frame counts as contact.")
-    shapes = Table(
+    return Table(
         "Shapes in contact",
         ["share", "95 %"],
         [
@@ -55,18 +76,28 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         ],
         "\n".join(notes),
     )
-    varied = Table(
+
+
+def _varied(result: Mapping[str, Any]) -> Table:
+    """The same with one criterion changed."""
+    return Table(
         f"The same with each criterion {100 * result['vary']:g} % less and more",
         [*SHAPES, "change"],
         [
             (
-                _criterion(row["criterion"], row["value"]),
+                f"{row['criterion']} [{unit}] {scale * row['value']:.3g}",
                 [*(shown(row["share"][name]) for name in SHAPES), shown(row["change"])],
             )
             for row in result["sensitivity"]
+            for unit, scale in [UNITS[row["criterion"]]]
         ],
     )
-    counts = Table(
+
+
+def _handled(result: Mapping[str, Any]) -> Table:
+    """Frames, animals, and what was wrong."""
+    frames = result["frames"]
+    return Table(
         "What was found in the tracks",
         ["number"],
         [
@@ -76,15 +107,10 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
         ],
     )
-    return shapes, varied, counts
-
-
-def _criterion(name: str, value: float) -> str:
-    unit, scale = UNITS[name]
-    return f"{name} [{unit}] {scale * value:.3g}"
 
 
 def _free_air(result: Mapping[str, Any]) -> bool:
+    """Whether no file has a wall."""
     return all(wall["kind"] == "none" for wall in result["wall"].values())
 
 
@@ -152,6 +178,128 @@ def _unseen(result: Mapping[str, Any]) -> str:
     )
 
 
+@style.styled
+def figures(outcome: TracksOutcome) -> dict[str, Figure]:
+    """Shares by trial and over trials, outlines of each shape, an angle over time, sensitivity."""
+    figure, result = style.canvas(style.WIDTH, 13.0), outcome.result()
+    shares, outlines, angle, change = figure.subplots(4, 1, height_ratios=(1.2, 1.4, 0.9, 1.5))
+    shapes = [measures.shapes_of(outcome.config.criteria, a) for a in outcome.antennae]
+    _draw_shares(shares, outcome, result)
+    _draw_outlines(outlines, outcome, shapes)
+    contact = [int((frames >= 0).sum()) for frames in shapes]
+    most = int(np.argmax(contact))
+    _draw_angle(angle, outcome.antennae[most], shapes[most])
+    _draw_change(change, result)
+    handles = [
+        shares.plot([], [], _MARKS.get(shape, "s"), color=colour, label=shape)[0]
+        for shape, colour in style.SHAPE_COLOURS.items()
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    return {"tracks": figure}
+
+
+def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any]) -> None:
+    """A bar for each trial in contact, and the mean over all with its interval."""
+    table = measures.by_trial(outcome.config.criteria, outcome.antennae)
+    bars = table if len(table) <= _MOST_TRIALS else table[:0]
+    left = 0.0
+    for at, share in enumerate(bars):
+        bottom = 0.0
+        for name, part in zip(SHAPES, share, strict=True):
+            panel.bar(at, part, 0.85, bottom, color=style.SHAPE_COLOURS[name])
+            bottom += part
+        left = at + 1.6
+    for k, (name, row) in enumerate(result["shapes"].items()):
+        style.intervals(
+            panel,
+            [left + k],
+            [row],
+            ("share", "share_95"),
+            len(table),
+            marker=_MARKS[name],
+            color=style.SHAPE_COLOURS[name],
+            markeredgecolor=style.INK,
+            ecolor=style.INK,
+        )
+    ticks = [*range(len(bars)), left + 1.5]
+    names = [str(at + 1) for at in range(len(bars))]
+    panel.set_xticks(
+        ticks, [*names, f"mean of {len(table)},\n{style.interval_note('95 %', len(table))}"]
+    )
+    panel.set_ylim(-0.02, 1.02)
+    panel.set_ylabel("share of frames in contact")
+    panel.set_title("Shapes in contact, by trial and over trials")
+    panel.grid(visible=False, axis="x")
+
+
+def _draw_outlines(panel: Axes, outcome: TracksOutcome, shapes: list[Ints]) -> None:
+    """Antennae as seen from above the body, ahead upwards, of one side each."""
+    rng = np.random.default_rng(0)
+    points = np.concatenate([antenna.points for antenna in outcome.antennae])
+    joined = np.concatenate(shapes)
+    for value, name in enumerate(SHAPES):
+        frames = np.flatnonzero(joined == value)
+        for i in rng.permutation(frames)[:_OUTLINES]:
+            relative = points[i] - points[i, 0]
+            panel.plot(
+                relative[:, 1], relative[:, 0], color=style.SHAPE_COLOURS[name], linewidth=0.7
+            )
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.set_xlabel("outwards / length")
+    panel.set_ylabel("ahead / length")
+    panel.set_title(f"Antennae in contact, up to {_OUTLINES} of each shape")
+
+
+def _draw_angle(panel: Axes, antenna: Antenna, shapes: Ints) -> None:
+    """Direction from base to tip over the time with most contact, coloured by shape."""
+    count = min(len(shapes), round(_LONGEST * antenna.rate))
+    touched = np.concatenate([[0], np.cumsum(shapes >= 0)])
+    start = int(np.argmax(touched[count:] - touched[: len(touched) - count]))
+    at = slice(start, start + count)
+    t, angle = (
+        np.arange(start, start + count) / antenna.rate,
+        np.degrees(antenna.outline.direction[at]),
+    )
+    panel.plot(t, angle, color=style.FAINT, linewidth=0.8, zorder=1)
+    for value, name in NAMES.items():
+        frames = shapes[at] == value
+        if value != UNKNOWN:
+            colour, size = style.SHAPE_COLOURS[name], 3 if value == FREE else 7
+            panel.scatter(t[frames], angle[frames], size, colour, zorder=2, linewidths=0)
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("base to tip [deg]")
+    panel.set_title(f"Angle from the body axis, trial {antenna.trial + 1}, {antenna.side} antenna")
+
+
+def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
+    """Share of every shape with each criterion less and more; equal ones stand side by side."""
+    rows = result["sensitivity"]
+    for k, name in enumerate(SHAPES):
+        usual = result["shapes"][name]["share"]
+        if usual is None or math.isnan(usual):
+            continue
+        colour = style.SHAPE_COLOURS[name]
+        panel.axvline(usual, color=colour, linewidth=1.0)
+        panel.plot(
+            [row["share"][name] for row in rows],
+            np.arange(len(rows)) + 0.15 * (k - 1.5),
+            marker=_MARKS[name],
+            linestyle="",
+            color=colour,
+            markeredgecolor=style.INK,
+        )
+    percent = f"{100 * result['vary']:g} %"
+    signs = ("−", "+") * len(rows)
+    labels = [f"{row['criterion']} {s}{percent}" for row, s in zip(rows, signs, strict=False)]
+    panel.set_yticks(range(len(rows)), labels)
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    panel.margins(x=0.12)
+    panel.set_xlim(left=-0.03)
+    panel.set_xlabel("share, mean over trials")
+    panel.set_title("With one criterion changed; lines: with none changed")
+    panel.grid(visible=False, axis="y")
+
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TracksConfig,
@@ -161,6 +309,7 @@ EXPERIMENT = Experiment.of_folder(
     files=lambda outcome: {"frames.csv": outcome.frames_csv()},
     failed=lambda result: not result["trials_in_contact"],
     parts="files",
+    figures=figures,
     captions={
         "tracks": "Shares of the shapes in each trial and over all, outlines of each shape, an "
         "angle over time, and what other criteria change.",

@@ -272,10 +272,13 @@ def over_trials(criteria: CriteriaParams, antennae: Sequence[Antenna]) -> dict[s
     be seen: its share is None.
     """
     table = by_trial(criteria, antennae)
-    pairs = {name: mean95(column, 0.0, 1.0) for name, column in zip(SHAPES, table.T, strict=True)}
+    means: dict[str, Any] = {}
+    for name, column in zip(SHAPES, table.T, strict=True):
+        mean, ends = mean95(column, 0.0, 1.0)
+        means[name] = {"share": mean, "share_95": ends}
     if antennae and antennae[0].points.shape[1] == 2:
-        pairs[Shape.STRAIGHT.name.lower()] = None, None
-    return {name: {"share": mean, "share_95": ends} for name, (mean, ends) in pairs.items()}
+        means[Shape.STRAIGHT.name.lower()] = {"share": None, "share_95": None}
+    return means
 
 
 def sensitivity(config: TracksConfig, antennae: Sequence[Antenna]) -> list[dict[str, Any]]:

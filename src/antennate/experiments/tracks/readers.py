@@ -120,40 +120,49 @@ def _sleap_analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
     points = np.moveaxis(_picked(tracks, wanted, where[2]), where, (0, 3, 2, 1))
     scores = None
     if "point_scores" in file:
-        held = file["point_scores"]
-        kept = [axis for axis in np.argsort(where) if axis != 1]  # those of tracks without xy
-        order = [kept.index(axis) for axis in (0, 2, 3)]
-        if held.shape == tuple(np.delete(shape, where[1])):
-            _require_room(path, held, len(wanted) / max(1, len(nodes)))
-            scores = np.moveaxis(_picked(held, wanted, order[1]), order, (0, 2, 1))
+        heights = file["point_scores"]
+        axes = [axis for axis in np.argsort(where) if axis != 1]  # those of tracks without xy
+        order = [axes.index(axis) for axis in (0, 2, 3)]
+        if heights.shape == tuple(np.delete(shape, where[1])):
+            _require_room(path, heights, len(wanted) / max(1, len(nodes)))
+            scores = np.moveaxis(_picked(heights, wanted, order[1]), order, (0, 2, 1))
     titles = _texts(file["track_names"]) if "track_names" in file else []
     titles = titles if len(titles) == len(points) else [str(i) for i in range(len(points))]
-    titles = titles if len(points) > 1 else [""]
+    animals = [
+        (title, points[i], None if scores is None else scores[i]) for i, title in enumerate(titles)
+    ]
+    return _sleap_tracks(path, names, animals)
+
+
+def _sleap_tracks(
+    path: Path, names: Sequence[str], animals: Sequence[tuple[str, Floats, Floats | None]]
+) -> list[Track]:
+    """Tracks from points (n, k, 2) and scores (n, k) of the named points of each animal."""
     return [
         Track(
             str(path),
-            title,
-            np.arange(points.shape[1]),
+            title if len(animals) > 1 else "",
+            np.arange(len(points)),
             None,
-            {n: points[i, :, k] for k, n in enumerate(names)},
-            {} if scores is None else {n: scores[i, :, k] for k, n in enumerate(names)},
+            {n: points[:, k] for k, n in enumerate(names)},
+            {} if scores is None else {n: scores[:, k] for k, n in enumerate(names)},
             _SLEAP_CUTOFF,
         )
-        for i, title in enumerate(titles)
+        for title, points, scores in animals
     ]
 
 
-def _require_room(path: Path, held: Any, share: float = 1.0) -> None:
+def _require_room(path: Path, array: Any, share: float = 1.0) -> None:
     """Refuse an array, before it is unpacked, of which a share, or a single chunk, is too large."""
-    size = max(8, held.dtype.itemsize)
-    require_room_for(path, round(share * held.size * size))
-    require_room_for(path, math.prod(held.chunks or (1,)) * size)
+    size = max(8, array.dtype.itemsize)
+    require_room_for(path, round(share * array.size * size))
+    require_room_for(path, math.prod(array.chunks or (1,)) * size)
 
 
-def _picked(held: Any, places: Sequence[int], axis: int) -> Floats:
+def _picked(array: Any, places: Sequence[int], axis: int) -> Floats:
     """Some places along an axis of an array of a file, in this order."""
     before = (slice(None),) * axis
-    return np.stack([np.asarray(held[(*before, i)], np.float64) for i in places], axis)
+    return np.stack([np.asarray(array[(*before, i)], np.float64) for i in places], axis)
 
 
 def _axes(path: Path, file: Any, nodes: int) -> tuple[int, ...]:
@@ -186,15 +195,15 @@ def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
     frames, instances = file["frames"][()], file["instances"][()]
     if len(set(frames["video"].tolist())) > 1:
         raise BadInputError(f"{path}: expected one video, found several; save each on its own")
-    held = (file["points"][()], file["pred_points"][()])
+    sources = (file["points"][()], file["pred_points"][()])
     shift = 0.5 if float(file["metadata"].attrs.get("format_id", 1.2)) < 1.1 else 0.0
     last = int(frames["frame_idx"].max()) + 1 if len(frames) else 0
     tracks: dict[int, tuple[Floats, Floats]] = {}
     for frame in frames:
-        for one in instances[int(frame["instance_id_start"]) : int(frame["instance_id_end"])]:
-            source = held[int(one["instance_type"])]
-            part = source[int(one["point_id_start"]) : int(one["point_id_end"])]
-            number, at, seen = int(one["track"]), int(frame["frame_idx"]), part["visible"]
+        for instance in instances[int(frame["instance_id_start"]) : int(frame["instance_id_end"])]:
+            source = sources[int(instance["instance_type"])]
+            part = source[int(instance["point_id_start"]) : int(instance["point_id_end"])]
+            number, at, seen = int(instance["track"]), int(frame["frame_idx"]), part["visible"]
             if number not in tracks:
                 require_room_for(path, (len(tracks) + 1) * last * len(nodes) * 3 * 8)
                 tracks[number] = (
@@ -212,18 +221,12 @@ def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
                 part["y"][seen] - shift,
             )
             scores[at, seen] = part["score"][seen] if "score" in part.dtype.names else 1.0
-    return [
-        Track(
-            str(path),
-            str(number) if len(tracks) > 1 else "",
-            np.arange(last),
-            None,
-            {n: points[:, nodes.index(n)] for n in names},
-            {n: scores[:, nodes.index(n)] for n in names},
-            _SLEAP_CUTOFF,
-        )
+    wanted = [nodes.index(name) for name in names]
+    animals = [
+        (str(number), points[:, wanted], scores[:, wanted])
         for number, (points, scores) in sorted(tracks.items())
     ]
+    return _sleap_tracks(path, names, animals)
 
 
 class _Plain(pickle.Unpickler):

@@ -96,24 +96,77 @@ class TrackRow:
     bridged: int
 
 
-@dataclass(frozen=True)
+@dataclass
 class TracksOutcome:
-    """Everything that was measured.
+    """Everything that was measured, file by file.
 
     Attributes:
         config: What was asked, with the points and the wall of the synthetic animal if it was one.
         rows: A row for each antenna.
         antennae: The antennae in the same order.
+        walls: The wall of each file.
         skipped: Animals known in too few frames.
         unseen: Antennae that were hardly seen, and animals that were left out.
+        files: The file of each animal, by a hash of its points.
     """
 
     config: TracksConfig
-    rows: Sequence[TrackRow]
-    antennae: Sequence[Antenna]
-    walls: dict[str, Wall]
-    skipped: int
-    unseen: Sequence[Unseen]
+    rows: list[TrackRow] = field(default_factory=list[TrackRow])
+    antennae: list[Antenna] = field(default_factory=list[Antenna])
+    walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
+    skipped: int = 0
+    unseen: list[Unseen] = field(default_factory=list["Unseen"])
+    files: dict[bytes, str] = field(default_factory=dict[bytes, str])
+
+    def add(
+        self, name: str, tracks: Sequence[Track], truth: Ints | None = None
+    ) -> Sequence[TrackRow]:
+        """Measure the animals of one file; `truth` are the shapes of the left antenna."""
+        config, before = self.config, len(self.rows)
+        cleaned = self._cleaned(tracks)
+        self._refuse_again(name, [animal.track for animal in cleaned])
+        self.walls[name] = wall = _wall(config, cleaned)
+        trial = self.rows[-1].trial + 1 if self.rows else 0
+        for number, animal in enumerate(cleaned, trial):
+            for side in config.points.sides:
+                antenna = measures.measured(number, side, animal, wall)
+                self.rows.append(_row(config, animal, antenna, truth if side == "left" else None))
+                self.antennae.append(antenna)
+        return self.rows[before:]
+
+    def _cleaned(self, tracks: Sequence[Track]) -> list[Antennae]:
+        """The antennae of the animals that are known in enough frames."""
+        config, cleaned = self.config, list[Antennae]()
+        for track in tracks:
+            antennae = clean(config, track, frame_rate(config, track), config.y_down)
+            known = {side: antennae.known(side) for side in antennae.sides}
+            few = {s: n for s, n in known.items() if n < config.cleaning.least_frames}
+            for side, count in few.items():
+                parts = {part for name in config.points.of(side) for part in name.split("+")}
+                of = parts | {*config.points.tail.split("+"), *config.points.head.split("+")}
+                empty = tuple(name for name in antennae.empty if name in of)
+                frames = antennae.frames
+                self.unseen.append(Unseen(track.file, track.animal, side, frames, count, empty))
+            if len(few) == len(known):
+                self.skipped += 1
+            else:
+                cleaned.append(antennae)
+        return cleaned
+
+    def _refuse_again(self, name: str, tracks: Sequence[Track]) -> None:
+        """Refuse an animal that another file holds too: one recording would count as two."""
+        hashes: dict[bytes, str] = {}
+        for track in tracks:  # a hash of the points, the same in every format
+            points = np.stack(list(track.points.values()))
+            content = np.where(np.isnan(points), np.nan, points).tobytes()
+            hashes[hashlib.sha256(content).digest()] = track.animal
+        for content, animal in hashes.items():
+            if content in self.files:
+                raise BadInputError(
+                    f"{name}: expected another recording than {self.files[content]}, found the "
+                    f"same points{f' of {animal}' if animal else ''}; give each recording once"
+                )
+        self.files |= dict.fromkeys(hashes, name)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -191,9 +244,9 @@ def run(
         MissingPackageError: A file is HDF5 and h5py is not installed.
     """
     del workers  # reading and measuring take less time than starting processes
-    animals = _Animals(config)
+    outcome = TracksOutcome(config)
     if not config.files:
-        animals.config = config.model_copy(
+        outcome.config = config.model_copy(
             update={"points": synthetic.POINTS, "wall": synthetic.WALL, "y_down": False}
         )
     names = config.files or [f"synthetic{k}" for k in range(config.synthetic.trials)]
@@ -202,92 +255,21 @@ def run(
             tracks = read(Path(name), config.points.parts, config.columns)
             if not tracks:
                 raise BadInputError(f"{name}: expected an animal with the named points, found none")
-            rows = animals.add(name, [track.in_order() for track in tracks])
+            rows = outcome.add(name, [track.in_order() for track in tracks])
         else:
             track, truth = synthetic.animal(config.synthetic, config.criteria, config.seed, number)
-            rows = animals.add(name, [track], truth)
+            rows = outcome.add(name, [track], truth)
         for row in rows:
             on_row(row)
         on_step(number + 1, len(names))
-    if not animals.rows:
-        empty = {f"{p} has no value in {a.file}": 0 for a in animals.unseen for p in a.empty}
+    if not outcome.rows:
+        empty = {f"{p} has no value in {a.file}": 0 for a in outcome.unseen for p in a.empty}
         why = shortened(", ".join(empty)) if empty else "are the points right"
         raise BadInputError(
             f"{', '.join(names)}: expected an animal known in {config.cleaning.least_frames} "
             f"frames, found none; {why}, and is --cleaning.likelihood not too high?"
         )
-    return TracksOutcome(
-        animals.config,
-        animals.rows,
-        animals.antennae,
-        animals.walls,
-        animals.skipped,
-        animals.unseen,
-    )
-
-
-@dataclass
-class _Animals:
-    """Animals that have been measured so far."""
-
-    config: TracksConfig
-    rows: list[TrackRow] = field(default_factory=list[TrackRow])
-    antennae: list[Antenna] = field(default_factory=list[Antenna])
-    walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
-    skipped: int = 0
-    unseen: list[Unseen] = field(default_factory=list["Unseen"])
-    files: dict[bytes, str] = field(default_factory=dict[bytes, str])
-    """The file of each animal, by a hash of its points."""
-
-    def add(
-        self, name: str, tracks: Sequence[Track], truth: Ints | None = None
-    ) -> Sequence[TrackRow]:
-        """Measure the animals of one file; `truth` are the shapes of the left antenna."""
-        config, before = self.config, len(self.rows)
-        cleaned = self._cleaned(tracks)
-        self._refuse_again(name, [animal.track for animal in cleaned])
-        self.walls[name] = wall = _wall(config, cleaned)
-        trial = self.rows[-1].trial + 1 if self.rows else 0
-        for number, animal in enumerate(cleaned, trial):
-            for side in config.points.sides:
-                antenna = measures.measured(number, side, animal, wall)
-                self.rows.append(_row(config, animal, antenna, truth if side == "left" else None))
-                self.antennae.append(antenna)
-        return self.rows[before:]
-
-    def _cleaned(self, tracks: Sequence[Track]) -> list[Antennae]:
-        """The antennae of the animals that are known in enough frames."""
-        config, cleaned = self.config, list[Antennae]()
-        for track in tracks:
-            antennae = clean(config, track, frame_rate(config, track), config.y_down)
-            known = {side: antennae.known(side) for side in antennae.sides}
-            few = {s: n for s, n in known.items() if n < config.cleaning.least_frames}
-            for side, count in few.items():
-                parts = {part for name in config.points.of(side) for part in name.split("+")}
-                of = parts | {*config.points.tail.split("+"), *config.points.head.split("+")}
-                empty = tuple(name for name in antennae.empty if name in of)
-                frames = antennae.frames
-                self.unseen.append(Unseen(track.file, track.animal, side, frames, count, empty))
-            if len(few) == len(known):
-                self.skipped += 1
-            else:
-                cleaned.append(antennae)
-        return cleaned
-
-    def _refuse_again(self, name: str, tracks: Sequence[Track]) -> None:
-        """Refuse an animal that another file holds too: one recording would count as two."""
-        hashes: dict[bytes, str] = {}
-        for track in tracks:  # a hash of the points, the same in every format
-            points = np.stack(list(track.points.values()))
-            content = np.where(np.isnan(points), np.nan, points).tobytes()
-            hashes[hashlib.sha256(content).digest()] = track.animal
-        for content, animal in hashes.items():
-            if content in self.files:
-                raise BadInputError(
-                    f"{name}: expected another recording than {self.files[content]}, found the "
-                    f"same points{f' of {animal}' if animal else ''}; give each recording once"
-                )
-        self.files |= dict.fromkeys(hashes, name)
+    return outcome
 
 
 def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> Wall:

@@ -137,5 +137,5 @@ def _spoiled(params: SyntheticParams, points: dict[str, Floats], rng: np.random.
     copies[inner & (rng.random(count) < params.repeated)] = 2
     copies[inner & (rng.random(count) < params.repeated)] = 0
     frames = np.repeat(np.arange(count), copies)
-    every, likely = ({n: v[frames] for n, v in values.items()} for values in (seen, scores))
-    return Track("synthetic", "", frames, params.rate, every, likely)
+    points, likely = ({n: v[frames] for n, v in values.items()} for values in (seen, scores))
+    return Track("synthetic", "", frames, params.rate, points, likely)

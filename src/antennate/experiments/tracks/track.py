@@ -11,7 +11,15 @@ from typing import NoReturn
 
 import numpy as np
 
-from antennate.csv_files import LARGEST_WHOLE, MISSING, Row, column, csv_rows, number_of
+from antennate.csv_files import (
+    LARGEST_WHOLE,
+    MISSING,
+    Row,
+    column,
+    csv_rows,
+    number_of,
+    wrong_count,
+)
 from antennate.errors import BadInputError
 from antennate.experiments.tracks.config import ColumnsParams
 from antennate.files import in_units, read_limited
@@ -174,18 +182,12 @@ def _numbers(
     path: Path, line: int, header: Sequence[str], cells: list[str], places: Sequence[int]
 ) -> list[float]:
     """Numbers of a row, NaN for a cell that says of itself that it has none."""
-    if len(cells) != len(header):
-        why = "; are there decimal commas? write points"
-        if len(cells) < len(header):
-            why = " (truncated); delete the row"
-        elif any("." in cell for cell in cells):
-            why = (
-                "; does row 1 lack the name of a column? R writes none above its row names: write "
-                "one there, and name the column of frames with --columns.frame"
-            )
-        raise BadInputError(
-            f"{path}: row {line}: expected {len(header)} cells, found {len(cells)}{why}"
-        )
+    surplus = (
+        "; does row 1 lack the name of a column? R writes none above its row names: write one "
+        "there, and name the column of frames with --columns.frame"
+    )
+    if why := wrong_count(header, cells, surplus):
+        raise BadInputError(f"{path}: row {line}: {why}")
     values: list[float] = []
     for place in places:
         cell = cells[place].strip()

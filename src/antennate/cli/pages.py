@@ -1,0 +1,191 @@
+"""The page of a live view: the flags that ask for it, and the process that serves it.
+
+Run as a module it is that process, which tells the address of the page and nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import socket
+import sys
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from pydantic.dataclasses import dataclass
+
+from antennate.cli.options import option
+from antennate.cli.terminal import write
+from antennate.errors import AntennateError
+from antennate.hardware.driving.priority import give_way
+from antennate.hardware.driving.signals import STOPS
+from antennate.messages import one_line
+from antennate.studies.run_files import BY_HAND
+from antennate.telemetry.view import ports
+from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
+
+if TYPE_CHECKING:  # these import much, for a page that few runs want
+    from antennate.studies.run_directory import RunDirectory
+    from antennate.telemetry.view.process import ViewProcess
+    from antennate.telemetry.view.show import Display
+    from antennate.telemetry.view.simulation import SimulationView
+
+MODULE = "antennate.cli.pages"
+"""What Python runs as the process of a page."""
+_NONE = "-"
+
+
+@dataclass(frozen=True)
+class FoxgloveOptions:
+    """Whether other tools may read along."""
+
+    foxglove: bool = option(
+        False, "topics live for Foxglove and Lichtblick, without access control"
+    )
+    foxglove_port: int = option(
+        ports.FOXGLOVE,
+        "port for these, 0 takes any",
+        "PORT",
+        needs=["--foxglove"],
+        ge=0,
+        le=65535,
+    )
+
+    @property
+    def port_for_foxglove(self) -> int | None:
+        """The port for Foxglove, None without it."""
+        return self.foxglove_port if self.foxglove else None
+
+
+@dataclass(frozen=True)
+class PageOptions(FoxgloveOptions):
+    """Where the page is."""
+
+    view: bool = option(False, "show it on a page of this computer while it runs")
+    view_port: int = option(
+        ports.PAGE, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
+    )
+
+
+@dataclass(frozen=True)
+class ViewOptions(PageOptions):
+    """The same where time is simulated."""
+
+    view_paused: bool = option(False, "start paused, so that nothing is missed", needs=["--view"])
+    view_speed: float = option(
+        1.0,
+        "times real time at which --view begins, 0 as fast as it goes",
+        "FLOAT",
+        needs=["--view", "--foxglove"],
+        ge=0,
+        le=100,
+    )
+
+
+def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:
+    """The process of the page that is wanted, None of none; it is to be closed.
+
+    Args:
+        options: What is wanted.
+        idle: Whether it gives way to everything else, as beside a loop in real time.
+
+    Raises:
+        AntennateError: It cannot be served.
+    """
+    foxglove = options.port_for_foxglove
+    if not options.view and foxglove is None:
+        return None
+    from antennate.telemetry.view.process import ViewProcess
+
+    port = options.view_port if options.view else None
+    return ViewProcess(port, MODULE, foxglove, on_lost=lambda line: write(f"{line}\n"), idle=idle)
+
+
+@contextlib.contextmanager
+def view_of(options: ViewOptions) -> Iterator[SimulationView | None]:
+    """The view of a simulation, None if none is wanted.
+
+    Raises:
+        AntennateError: As `page_of`.
+    """
+    process = page_of(options)
+    if process is None:
+        yield None
+        return
+    from antennate.telemetry.view.simulation import SimulationView
+
+    with process:
+        speed, paused = options.view_speed, options.view_paused
+        yield SimulationView(process.channel, speed, paused=paused)
+
+
+def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:
+    """Keep what a person changed in the run, and say so."""
+    if not lines:
+        return
+    head = "Changed by hand while it ran: this run does not follow from its configuration."
+    run.write(BY_HAND, "\n".join([head, *lines]) + "\n")
+    sys.stderr.write(f"changed by hand, so not reproducible: {run.path / BY_HAND}\n")
+
+
+def main() -> int:
+    """Serve until the program that is shown has ended; words as for `ViewProcess`."""
+    for number in STOPS:  # that program decides when it is over
+        signal.signal(number, signal.SIG_IGN)
+    channel_file, page_file, foxglove, *more = sys.argv[1:]
+    channel = Channel(socket.socket(fileno=int(channel_file)))
+    try:
+        _serve(
+            channel,
+            None if page_file == _NONE else socket.socket(fileno=int(page_file)),
+            None if foxglove == _NONE else int(foxglove),
+            IDLE in more,
+        )
+    except AntennateError as error:
+        channel.send(FAILED, one_line(str(error)).encode())
+        return 1
+    return 0
+
+
+def _serve(
+    channel: Channel, listener: socket.socket | None, foxglove: int | None, idle: bool
+) -> None:
+    from antennate.telemetry.view.show import run
+
+    displays: list[Display] = []
+    with contextlib.ExitStack() as stack:
+        if foxglove is not None:
+            displays.append(_sink(foxglove))
+        if listener is not None:
+            displays.append(_page(channel, listener, stack))
+        if idle:
+            give_way()
+        channel.send(READY)
+        run(channel, displays)
+
+
+def _sink(port: int) -> Display:
+    from antennate.telemetry.view.foxglove import FoxgloveSink, layout
+
+    sink = FoxgloveSink(port)
+    write(f"foxglove: {sink.address}, layout {layout()}; it does not check who reads it\n")
+    return sink
+
+
+def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack) -> Display:
+    from antennate.telemetry.view import page
+    from antennate.telemetry.view.gate import Gate
+    from antennate.telemetry.view.server import serve
+    from antennate.telemetry.view.show import Page
+
+    port = listener.getsockname()[1]
+    gate = Gate(port, *page.load(port), lambda: write(f"view: for another browser: {gate.link}\n"))
+    server = serve(listener, gate)
+    stack.callback(server.stop)
+    display = Page(server, channel)
+    write(f"view: {gate.link}\n")
+    return display
+
+
+if __name__ == "__main__":
+    sys.exit(main())
