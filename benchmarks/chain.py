@@ -18,11 +18,10 @@ import numpy as np
 
 from antennate.antenna.statics import PROFILES, Profile
 from antennate.experiments.calibrate.run import CalibrateConfig, push
-from antennate.experiments.sweep.config import SweepConfig
-from antennate.experiments.sweep.run import SweepRow, map_cell
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.outcome import WallTrial
-from antennate.experiments.wall.run import run_trial
+from antennate.experiments.sweep.experiment import SweepRow, map_cell
+from antennate.experiments.sweep.physics import SweepConfig
+from antennate.experiments.wall.experiment import run_trial
+from antennate.experiments.wall.physics import WallConfig, WallTrial
 from antennate.params.bench import Solver
 from antennate.sim import chain
 from antennate.studies.statistics import wilson95

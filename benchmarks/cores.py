@@ -25,10 +25,9 @@ import numpy as np
 from measuring import in_turn, ratios, spread, wall_seconds
 
 from antennate.control.gait import Gait
-from antennate.experiments.tunnel import run as experiment
+from antennate.experiments.tunnel import experiment as experiment
 from antennate.experiments.tunnel.batch import Bodies, cpu_bodies, run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import Disturbance

@@ -19,8 +19,7 @@ import numpy as np
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.dxl.model import FULL_DRIVE
-from antennate.experiments.tunnel.monitor import TrialMonitor
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.joints import Joints
 from antennate.params.safety import FollowingParams

@@ -173,7 +173,7 @@ def driven(folder: Path) -> None:
     sys.path.insert(0, str(ROOT / "tests"))
     drive = importlib.import_module("driven_rig").driven
 
-    from antennate.experiments.tunnel.run import TunnelConfig
+    from antennate.experiments.tunnel.physics import TunnelConfig
 
     folder.mkdir(parents=True)
     for name, trial, ticks in DRIVEN:

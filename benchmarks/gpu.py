@@ -22,7 +22,7 @@ from typing import Any
 
 from antennate.errors import AntennateError
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.experiments.tunnel.warp import room_for
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_scene

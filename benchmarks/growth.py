@@ -21,7 +21,7 @@ from measuring import cpu_seconds, in_turn, ratios, spread
 
 from antennate.control.gait import Gait
 from antennate.control.loop import run_loop
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.scene import TunnelParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import RobotSpec

@@ -20,12 +20,11 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.experiments.gait import run as gait
-from antennate.experiments.gait.pace import measure
-from antennate.experiments.tunnel import run as experiment
-from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params.gaits import GaitParams
+from antennate.experiments.gait import experiment as gait
+from antennate.experiments.gait.physics import measure
+from antennate.experiments.tunnel import experiment as experiment
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import trial

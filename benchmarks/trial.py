@@ -27,7 +27,7 @@ from measuring import cpu_seconds, in_turn, ratios, spread
 
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel import batch as experiment
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.places import Gears
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.trial import Trial, draw_trial

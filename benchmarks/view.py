@@ -29,7 +29,7 @@ from unittest import mock
 import pace
 
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.world import World
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.telemetry.view.process import ViewProcess

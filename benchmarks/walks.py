@@ -80,7 +80,7 @@ def tick() -> Walk:
     rig = importlib.import_module("driven_rig")
     watched = importlib.import_module("twin_rig").Watch
 
-    from antennate.experiments.tunnel.run import TunnelConfig
+    from antennate.experiments.tunnel.physics import TunnelConfig
     from antennate.hardware.config import DriveConfig
     from antennate.hardware.driving.drive import drive
     from antennate.twin.robot import TwinRobot
@@ -105,7 +105,7 @@ def tick() -> Walk:
 def trial() -> Walk:
     """One trial of `tunnel`."""
     from antennate.experiments.tunnel.batch import run_trials
-    from antennate.experiments.tunnel.config import TunnelConfig
+    from antennate.experiments.tunnel.physics import TunnelConfig
 
     config = TunnelConfig(seed=5, trials=1, time_limit=3.0, controllers=("closed",))
     run_trials(config, "closed", [0], lambda found: None)  # what is loaded once is not the walk

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.film import record
+from antennate.experiments.tunnel.experiment import record
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.telemetry.film import RATE, Film, pictures, require_video
 
 SHOWN = {"open": "timeout", "timed": "success", "closed": "success"}

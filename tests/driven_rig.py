@@ -25,7 +25,7 @@ from lockstep import BoardPort, LockstepClock
 from twin_rig import Watch
 
 from antennate.control.loop import run_loop
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from antennate.control.registry import make_controller
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.scene import TunnelParams
 from antennate.robots.spec import RobotSpec
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antennate.cli import main
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.params.base import read_file
 

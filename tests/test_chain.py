@@ -21,10 +21,9 @@ from antennate.cli import main
 from antennate.errors import ConfigError, MissingPackageError, OutputError, SimulationError
 from antennate.experiments.calibrate.run import CalibrateConfig, push
 from antennate.experiments.running import require_films
-from antennate.experiments.sweep import scan
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.passage import passage
-from antennate.experiments.wall.run import run
+from antennate.experiments.sweep import physics as scan
+from antennate.experiments.wall.experiment import run
+from antennate.experiments.wall.physics import WallConfig, passage
 from antennate.messages import command_words
 from antennate.params.bench import SweepParams
 from antennate.params.scene import BenchPhysicsParams

@@ -18,8 +18,8 @@ import antennate
 from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse
 from antennate.errors import ConfigError
-from antennate.experiments.gait.run import GaitStudyConfig
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.gait.experiment import GaitStudyConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import one_line
 from antennate.params.base import read_file
 from antennate.sim.world import World
@@ -630,12 +630,12 @@ def test_gait_runs_and_writes_its_result(capsys, tmp_path):
 
 
 def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
-    from antennate.experiments.gait import run as gait
+    from antennate.experiments.gait import experiment as gait
 
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gait, "run", interrupted)
+    monkeypatch.setattr(gait, "gather", interrupted)
     assert main(["gait"]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert not (tmp_path / "runs" / "gait-1").exists()

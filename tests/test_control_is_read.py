@@ -16,7 +16,7 @@ from antennate.experiments import load
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.driving.teleop import KeyController
 from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams

@@ -15,7 +15,7 @@ from antennate import simulate
 from antennate.cli import main
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, SceneError
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.scene import CorridorsParams, VariationParams
 from antennate.robots.spec import RobotSpec
@@ -280,7 +280,7 @@ def test_a_run_shows_shares_of_each_limit(
 
 def test_shares_are_of_the_limit_of_each_trial() -> None:
     from antennate.experiments.tunnel import measures
-    from antennate.experiments.tunnel.monitor import TrialResult
+    from antennate.experiments.tunnel.physics import TrialResult
 
     def row(name: str, trial: int, time: float, limit: float) -> TrialResult:
         ended = "success" if time < limit else "timeout"

@@ -7,7 +7,7 @@ import math
 import pytest
 from driven_rig import driven, simulated_alike
 
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.safety.causes import State
 from antennate.types import Maneuver
 

@@ -16,14 +16,14 @@ from PIL import Image
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN, USUAL
 from antennate.experiments.gait import figure as gait
-from antennate.experiments.taper import figure as taper
+from antennate.experiments.taper import experiment as taper
 from antennate.experiments.taper.experiment import TaperConfig
 from antennate.experiments.taper.experiment import run as run_taper
 from antennate.experiments.tunnel import figure as tunnel
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.wall import figure as wall
-from antennate.experiments.wall.outcome import Traverse
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.experiments.wall import experiment as wall
+from antennate.experiments.wall.physics import Traverse
 from antennate.robots.spec import RobotSpec
 from antennate.robots.wiring import wiring
 from antennate.types import Maneuver

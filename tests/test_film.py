@@ -19,16 +19,15 @@ import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.errors import AntennateError, BadInputError
-from antennate.experiments.bench_film import BenchRecorder
+from antennate.experiments.bench import BenchRecorder
 from antennate.experiments.calibrate.run import CalibrateConfig
 from antennate.experiments.calibrate.run import push as record_push
-from antennate.experiments.force.loads import ForceConfig
-from antennate.experiments.force.run import traverse
-from antennate.experiments.sweep.config import SweepConfig
-from antennate.experiments.sweep.run import map_cell
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.film import ending, films
-from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.force.experiment import traverse
+from antennate.experiments.force.physics import ForceConfig
+from antennate.experiments.sweep.experiment import map_cell
+from antennate.experiments.sweep.physics import SweepConfig
+from antennate.experiments.tunnel.experiment import ending, films
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.bench import SweepParams
 from antennate.sim import engine_setup
 from antennate.sim.camera import Camera

@@ -15,12 +15,10 @@ from antennate.cli import main
 from antennate.control.registry import BUILT_IN, RIVAL, compared
 from antennate.experiments.study import measures as study_measures
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.experiments.tunnel.run import TunnelOutcome
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.outcome import WallTrial
-from antennate.experiments.wall.run import WallOutcome
+from antennate.experiments.tunnel.experiment import TunnelOutcome
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.experiments.wall.experiment import WallOutcome
+from antennate.experiments.wall.physics import WallConfig, WallTrial
 
 TUNNEL, WALL = experiments.load("tunnel"), experiments.load("wall")
 FEW = "Fewer than 5 trials decide nothing; their means have no interval."

@@ -14,9 +14,10 @@ from antennate.antenna import sensor
 from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.cli import main
 from antennate.errors import ConfigError, SimulationError
-from antennate.experiments import reading
-from antennate.experiments.force import loads, post_traverse
-from antennate.experiments.force import run as force
+from antennate.experiments import bench
+from antennate.experiments.force import experiment as force
+from antennate.experiments.force import physics as loads
+from antennate.experiments.force import physics as post_traverse
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
@@ -99,7 +100,7 @@ def test_the_reading_falls_and_b_rises_with_the_force():
 
 def test_flex_comes_back_from_counts_within_their_resolution():
     flex = np.linspace(0.0, 2.0, 50)
-    back = reading.flex_of(SENSOR, sensor.counts(SENSOR, flex))
+    back = bench.flex_of(SENSOR, sensor.counts(SENSOR, flex))
     flattest = SENSOR.supply * SENSOR.bend_gain / (2 + 2 * SENSOR.bend_gain) ** 2
     half_a_count = 0.5 * 3.3 / 4096
     np.testing.assert_allclose(back, flex, atol=half_a_count / flattest)
@@ -107,7 +108,7 @@ def test_flex_comes_back_from_counts_within_their_resolution():
 
 def test_running_mean_of_a_record_is_over_the_last_readings():
     conditioning = ConditioningParams(averaging_time=0.03)
-    found = reading.averaged(conditioning, np.array([1.0, 2.0, 3.0, 4.0, 9.0]), 100.0)
+    found = bench.averaged(conditioning, np.array([1.0, 2.0, 3.0, 4.0, 9.0]), 100.0)
     np.testing.assert_allclose(found, [1.0, 1.5, 2.0, 3.0, 16 / 3])
 
 

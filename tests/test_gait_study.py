@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from antennate.errors import ConfigError
-from antennate.experiments.gait import run as study
-from antennate.experiments.gait.pace import Walk, measure, rolling_speed
-from antennate.params.gaits import GaitParams
+from antennate.experiments.gait import experiment as study
+from antennate.experiments.gait.physics import Walk, measure, rolling_speed
+from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Maneuver

@@ -18,12 +18,11 @@ from antennate.cli import BAD_INPUT, OK, main
 from antennate.control.gait import targets
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import ConfigError
+from antennate.experiments.gait import experiment as study
 from antennate.experiments.gait import figure
-from antennate.experiments.gait import run as study
-from antennate.experiments.gait.pace import measure
-from antennate.experiments.gait.unknown import Unknown, drawn
-from antennate.params.control import ControlParams
-from antennate.params.gaits import GaitParams
+from antennate.experiments.gait.config import Unknown, drawn
+from antennate.experiments.gait.physics import measure
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec

@@ -15,10 +15,9 @@ from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.run import check, run
-from antennate.params.control import ControlParams
-from antennate.params.gaits import GaitParams
+from antennate.experiments.tunnel.experiment import check, run
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.knowledge import (

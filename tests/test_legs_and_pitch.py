@@ -13,10 +13,9 @@ from driven_rig import driven, simulated_alike
 from antennate.cli import BAD_INPUT, OK, main
 from antennate.control.gait import Gait
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
-from antennate.experiments.gait.run import GaitStudyConfig, walk_flat
-from antennate.experiments.tunnel.run import TunnelConfig
-from antennate.params.control import ControlParams
-from antennate.params.gaits import GaitParams
+from antennate.experiments.gait.experiment import GaitStudyConfig, walk_flat
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.joints import YawParams
 from antennate.robots.spec import RobotSpec

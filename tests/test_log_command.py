@@ -27,7 +27,7 @@ from worlds import recorded, session
 from antennate import simulate
 from antennate.cli import main
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.telemetry.reader import LogReader

@@ -18,7 +18,7 @@ from antennate.control.conditioning import bending_level
 from antennate.control.loop import run_loop
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.run import CalibrateConfig, run
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.safety.channel import ChannelDiagnosis, Finding

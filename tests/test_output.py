@@ -18,7 +18,7 @@ from antennate.cli import main
 from antennate.cli.results import print_table
 from antennate.cli.terminal import Output
 from antennate.control.readings import short_names
-from antennate.experiments.tunnel.experiment import tables
+from antennate.experiments.tunnel.measures import tables
 from antennate.messages import extra
 from antennate.studies.measures import Table
 

@@ -17,7 +17,8 @@ from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
 from antennate.control.registry import CONTROLLERS, make_controller
 from antennate.errors import ConfigError, WorkerError
-from antennate.experiments.tunnel.run import TunnelConfig, run
+from antennate.experiments.tunnel.experiment import run
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive

@@ -18,8 +18,8 @@ from servo_recordings import of_twin
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN
-from antennate.experiments.force import loads
-from antennate.experiments.force import run as force
+from antennate.experiments.force import experiment as force
+from antennate.experiments.force import physics as loads
 from antennate.experiments.reproduce import experiment as reproduce
 from antennate.messages import command_words
 

@@ -14,7 +14,7 @@ from antennate.cli import main
 from antennate.control.readings import make_readings, parts_of
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.telemetry.reader import LogReader
 from antennate.types import AntennaFrame, Contact, Floats

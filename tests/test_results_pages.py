@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from antennate.experiments.force.experiment import MEASURES as FORCE
-from antennate.experiments.force.run import TraverseRow
+from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
-from antennate.experiments.sweep.run import SweepRow
+from antennate.experiments.sweep.experiment import SweepRow
 from antennate.experiments.touch.experiment import AVERAGING, PROFILE
 from antennate.experiments.tracks.run import TrackRow
 from antennate.experiments.tunnel import measures as tunnel
-from antennate.experiments.tunnel.monitor import TrialResult
-from antennate.experiments.wall import measures as wall
-from antennate.experiments.wall.outcome import WallTrial
+from antennate.experiments.tunnel.physics import TrialResult
+from antennate.experiments.wall import experiment as wall
+from antennate.experiments.wall.physics import WallTrial
 from antennate.studies.measures import Measure, count, mean, shown, summarise
 
 DOCS = Path(__file__).parents[1] / "docs"

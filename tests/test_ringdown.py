@@ -13,7 +13,7 @@ import pytest
 
 from antennate.antenna.dynamics import LinearChain, cone_ratio, least_damping
 from antennate.cli import main
-from antennate.experiments.ringdown.run import RingdownConfig, run
+from antennate.experiments.ringdown.experiment import RingdownConfig, run
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench

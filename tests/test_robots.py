@@ -13,7 +13,7 @@ from twin_rig import on_twin, simulated
 
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.joints import Joints
 from antennate.params.base import read_file
 from antennate.params.scene import PhysicsParams

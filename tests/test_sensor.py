@@ -13,7 +13,7 @@ from antennate import simulate
 from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.messages import command_words
 from antennate.params.base import read_file

@@ -24,10 +24,10 @@ import antennate
 from antennate.cli import main
 from antennate.dxl import packets
 from antennate.errors import AntennateError, LogError
-from antennate.experiments.gait.run import GaitStudyConfig, run
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.run import run as cross
-from antennate.params.gaits import GaitParams
+from antennate.experiments.gait.experiment import GaitStudyConfig, run
+from antennate.experiments.tunnel.experiment import run as cross
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim import engine_setup

@@ -10,10 +10,11 @@ import pytest
 
 from antennate.cli import main
 from antennate.errors import ConfigError, SimulationError
-from antennate.experiments.sweep import estimates, reach
-from antennate.experiments.sweep import run as sweep
-from antennate.experiments.sweep import scan as sweeping
-from antennate.experiments.sweep.config import SweepConfig
+from antennate.experiments.sweep import estimates
+from antennate.experiments.sweep import estimates as reach
+from antennate.experiments.sweep import experiment as sweep
+from antennate.experiments.sweep import physics as sweeping
+from antennate.experiments.sweep.physics import SweepConfig
 from antennate.params.bench import EstimateParams, ShapeParams, SweepParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams

@@ -13,13 +13,12 @@ from antennate import figures as style
 from antennate.antenna import statics as mechanics
 from antennate.cli import main
 from antennate.errors import ConfigError, SimulationError
-from antennate.experiments import reading
+from antennate.experiments import bench
+from antennate.experiments.touch import experiment as touch
 from antennate.experiments.touch import figure as figures
-from antennate.experiments.touch import run as touch
 from antennate.experiments.touch import sensing
-from antennate.experiments.touch.config import TouchConfig, site
+from antennate.experiments.touch.physics import TouchConfig, plan, site
 from antennate.experiments.touch.sensing import runs
-from antennate.experiments.touch.traverse import plan
 from antennate.params.bench import TouchWallsParams
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
@@ -48,7 +47,7 @@ def test_the_mind_answers_a_step_of_flex_when_the_mean_has_crossed():
     """Ten samples in the mean; b is one half at counts of 1543.3, between 1872 and 1399."""
     conditioning, sensor = ConditioningParams(), SensorParams(hysteresis=0.0, creep=(0.0, 0.0))
     flex = np.where(np.arange(100) >= 50, math.pi / 2, 0.0)[:, None]
-    counts = reading.recorded(sensor, flex, np.zeros((100, 1)))
+    counts = bench.recorded(sensor, flex, np.zeros((100, 1)))
     _, alarm = sensing.sense(conditioning, RuleParams(), counts, 0.01)
     midpoint = 1399.0 + 0.305 * 473.0
     samples = math.ceil(10 * (1872.0 - midpoint) / (1872.0 - 1399.0))
@@ -150,9 +149,9 @@ def test_pressing_steps_like_stepping():
     antenna = AntennaSpec()
     model = compile_bench(BenchPhysicsParams(), antenna, [Ball(0.1, 0.01, 0.01)])
     one, two = Bench(model, antenna), Bench(model, antenna)
-    for bench in (one, two):
-        bench.place(0.0, 0.0, 0.0)
-        bench.command(0.0, 0.002, 0.0, 0.0, 0.0)
+    for either in (one, two):
+        either.place(0.0, 0.0, 0.0)
+        either.command(0.0, 0.002, 0.0, 0.0, 0.0)
     one.step(60)
     two.press(60)
     np.testing.assert_array_equal(one.hinges(), two.hinges())

@@ -16,10 +16,9 @@ from tracked import DWELL, NAMES, POINTS, animal, bent, classified, dwelling, wr
 
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
-from antennate.experiments.sweep import estimates
-from antennate.experiments.sweep import run as sweep
-from antennate.experiments.sweep.config import SweepConfig
+from antennate.experiments.sweep import experiment as sweep
 from antennate.experiments.sweep.experiment import EXPERIMENT
+from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tracks.config import TrackWallParams
 from antennate.experiments.tracks.experiment import EXPERIMENT as TRACKS
 from antennate.experiments.tracks.measures import wall_of
@@ -328,7 +327,7 @@ def test_the_simulated_antenna_goes_through_the_same_classifier(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Shares of `sweep` by its own angles, and of `tracks` by the points that it saved."""
-    monkeypatch.setattr(estimates, "plan", lambda config: [])  # the map alone
+    monkeypatch.setattr(sweep, "plan", lambda config: [])  # the map alone
     outcome = sweep.run(
         SweepConfig(
             points=True,

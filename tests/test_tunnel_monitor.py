@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.experiments.tunnel.monitor import TrialMonitor
+from antennate.experiments.tunnel.physics import TrialMonitor
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import Route

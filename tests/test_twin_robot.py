@@ -15,7 +15,7 @@ from twin_rig import Decisions, on_twin, simulated
 
 from antennate.control.gait import targets
 from antennate.control.registry import BUILT_IN, make_controller
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.joints import CommandError, Joints
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec

@@ -12,19 +12,18 @@ from pydantic import ValidationError
 
 from antennate.cli import main
 from antennate.errors import SimulationError
-from antennate.experiments.wall import run as wall
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.experiment import EXPERIMENT
-from antennate.experiments.wall.outcome import (
+from antennate.experiments.wall import experiment as wall
+from antennate.experiments.wall.experiment import EXPERIMENT, run
+from antennate.experiments.wall.physics import (
     Traverse,
+    WallConfig,
     WallTrial,
     classify,
     least_advance,
     longest_gap,
     longest_stick,
+    passage,
 )
-from antennate.experiments.wall.passage import passage
-from antennate.experiments.wall.run import run
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
 
@@ -212,7 +211,11 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize(
     "words",
-    [["wall", "--solver", "mujoco"], ["wall", "--solver", "chain"], ["touch"]],
+    [
+        ["bench", "wall", "--solver", "mujoco"],
+        ["bench", "wall", "--solver", "chain"],
+        ["bench", "touch"],
+    ],
 )
 def test_an_antenna_too_light_for_the_physics_is_refused_in_one_line(
     words: list[str],

@@ -18,8 +18,7 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, MissingPackageError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.experiments.tunnel.warp import run_trials_on_warp
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, TunnelParams

@@ -17,8 +17,7 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.dxl.answers import Timing
 from antennate.dxl.bus import Bus
-from antennate.experiments.tunnel.monitor import TrialMonitor
-from antennate.experiments.tunnel.run import TunnelConfig
+from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.esp32.board import Board, BoardReader

@@ -25,7 +25,7 @@ from scipy.stats import t as student
 from antennate.control.knowledge import KNOWABLE, Knowing, Knowledge
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import cpu_bodies, run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
 from antennate.sim.knowledge import SIDE_AHEAD, angle_ahead
 from antennate.sim.trial import draw_scene, scene_of

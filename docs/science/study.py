@@ -22,7 +22,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate.control.readings import short_names
-from antennate.experiments.tunnel.run import TunnelConfig, run
+from antennate.experiments.tunnel.experiment import run
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.figures import INK, WIDTH, above, canvas, render, styled
 from antennate.studies.pool import core_count
 

@@ -23,9 +23,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.wall.config import WallConfig
-from antennate.experiments.wall.passage import passage
-from antennate.experiments.wall.run import run
+from antennate.experiments.wall.experiment import run
+from antennate.experiments.wall.physics import WallConfig, passage
 from antennate.params.bench import Solver
 from antennate.studies.pool import core_count
 

@@ -35,17 +35,17 @@ def names() -> list[str]:
 
 def summaries() -> dict[str, str]:
     """Name and summary of every experiment; ours are not loaded for it."""
-    found = {}
+    texts = {}
     for name in _folders():
         text = importlib.import_module(f"{__name__}.{name}").__doc__ or ""
-        found[name] = text.splitlines()[0].rstrip(".")
+        texts[name] = text.splitlines()[0].rstrip(".")
     for name in names():
-        if name not in found:
+        if name not in texts:
             try:
-                found[name] = load(name).description.strip().partition(".")[0]
+                texts[name] = load(name).description.strip().partition(".")[0]
             except BadInputError as error:
-                found[name] = f"({error})"
-    return found
+                texts[name] = f"({error})"
+    return texts
 
 
 def load(name: str) -> Experiment[Any, Any]:

@@ -146,29 +146,35 @@ def run(
     for name, given in {"overwrite": overwrite, "resume": resume}.items():
         if given and out is None:
             raise ConfigError(f"{name}: expected out beside it, found none")
-    found, config = _configured(name_or_config, settings, workers)
-    found.check(config)
-    if engine != LOCAL and not found.on_workers:
+    experiment, config = _configured(name_or_config, settings, workers)
+    experiment.check(config)
+    if engine != LOCAL and not experiment.on_workers:
         raise ConfigError(
-            f"engine: expected an experiment that runs trials on workers, found {found.name}"
+            f"engine: expected an experiment that runs trials on workers, found {experiment.name}"
         )
     if video is not None:
-        require_films(found, config, checks.whole("video", video), out)
-    pool = Workers(workers, make_engine(engine), shared=environment(found.name, config))
+        require_films(experiment, config, checks.whole("video", video), out)
+    pool = Workers(workers, make_engine(engine), shared=environment(experiment.name, config))
     if out is None:
-        return Result(found, config, found.run(config, pool, on_step, lambda row: None))
+        return Result(experiment, config, experiment.run(config, pool, on_step, lambda row: None))
     require_apart(out, overwrite, config.model_dump())
-    place = (found.name, out, overwrite, identity(found.name, config), resume or found.continued)
-    with RunDirectory.create(*place, tasks=found.grows) as directory:
-        directory.keeps_store = found.continued or found.grows is not None
+    place = (
+        experiment.name,
+        out,
+        overwrite,
+        identity(experiment.name, config),
+        resume or experiment.continued,
+    )
+    with RunDirectory.create(*place, tasks=experiment.grows) as directory:
+        directory.keeps_store = experiment.continued or experiment.grows is not None
         directory.describe(config)
         pool = replace(pool, store=directory.store)
-        outcome = found.run(config, pool, on_step, directory.append)
-        keep(found, outcome, directory)
+        outcome = experiment.run(config, pool, on_step, directory.append)
+        keep(experiment, outcome, directory)
         if video is not None:
-            write_films(found, config, video, directory)
-        write_report(directory, found.view)
-        return Result(found, config, outcome, directory.path)
+            write_films(experiment, config, video, directory)
+        write_report(directory, experiment.view)
+        return Result(experiment, config, outcome, directory.path)
 
 
 def keep(
@@ -283,20 +289,20 @@ def _configured(
     experiment: str | Params, settings: Mapping[str, Any], workers: int
 ) -> tuple[Experiment[Any, Any], Params]:
     if isinstance(experiment, str):
-        found = experiments.load(experiment)
+        chosen = experiments.load(experiment)
         values = dict(settings)
         if "controllers" in values:
             values["controllers"] = _names(values["controllers"], workers)
-        return found, from_values(found.config, values)
+        return chosen, from_values(chosen.config, values)
     if settings:
         raise ConfigError(
             f"run: expected settings only beside a name, found {', '.join(settings)} beside "
             f"{type(experiment).__name__}"
         )
     for name in experiments.names():
-        found = experiments.load(name)
-        if type(experiment) is found.config:
-            return found, experiment
+        chosen = experiments.load(name)
+        if type(experiment) is chosen.config:
+            return chosen, experiment
     raise ConfigError(
         f"run: expected a name or the configuration of an experiment, found "
         f"{type(experiment).__name__}"
@@ -329,5 +335,5 @@ def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tupl
 def _importable(controller: ControllerFactory) -> bool:
     """Whether a fresh process finds this class: at the top of a module that is a file."""
     module = sys.modules.get(controller.__module__)
-    found = getattr(module, controller.__name__, None)
-    return found is controller and hasattr(module, "__file__")
+    known = getattr(module, controller.__name__, None)
+    return known is controller and hasattr(module, "__file__")

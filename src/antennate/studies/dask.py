@@ -18,9 +18,7 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.studies.processes import Processes
-from antennate.studies.processor import Processor
-from antennate.studies.submitted import (
+from antennate.studies.engines import (
     NO_PLACE,
     Submitted,
     folder_of,
@@ -28,7 +26,8 @@ from antennate.studies.submitted import (
     require_same,
     work_apart,
 )
-from antennate.studies.work import Emit, Fail, Packed, Part, Work
+from antennate.studies.processes import Processes
+from antennate.studies.work import Emit, Fail, Packed, Part, Processor, Work
 
 CONNECT = 10.0
 """Time within which a scheduler has to answer, or to come back [s]."""
@@ -121,9 +120,9 @@ class Dask:
                         place if cluster is None else cluster, timeout=CONNECT, set_as_default=False
                     )
             except (OSError, ImportError) as error:
-                found = "none" if isinstance(error, OSError) else "one of other versions"
+                other = "none" if isinstance(error, OSError) else "one of other versions"
                 raise WorkerError(
-                    f"dask: expected a scheduler at {place}, found {found}: {in_one_line(error)}"
+                    f"dask: expected a scheduler at {place}, found {other}: {in_one_line(error)}"
                 ) from None
             yield stack.enter_context(client), cluster, place
 
@@ -131,10 +130,10 @@ class Dask:
 @contextlib.contextmanager
 def _mismatches_in_a_line() -> Iterator[None]:
     """Tell other versions of packages at the scheduler in a line; Dask has a table of them."""
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
-    for warning in told:
+    for warning in caught:
         text = str(warning.message)
         if text.startswith("Mismatched versions"):
             rows = re.findall(r"^\| (\S+) .*\|$", text, re.M)[1:]  # the first is the heading
@@ -145,15 +144,15 @@ def _mismatches_in_a_line() -> Iterator[None]:
 
 def _require_scheduler(place: str) -> None:
     """Require that what answers there greets as a scheduler does; a client would wait for ever."""
-    head, found = b"", "another program"
+    head, program = b"", "another program"
     host, _, port = place.removeprefix("tcp://").rpartition(":")
     with socket.create_connection((host.strip("[]"), int(port)), CONNECT) as connection:
         try:
             head = connection.makefile("rb").read(_LENGTH.size)
         except TimeoutError:
-            found = f"a program that says nothing for {CONNECT:g} s"
+            program = f"a program that says nothing for {CONNECT:g} s"
     if len(head) < _LENGTH.size or _LENGTH.unpack(head)[0] > _LONGEST_GREETING:
-        raise WorkerError(f"dask: expected a scheduler at {place}, found {found}")
+        raise WorkerError(f"dask: expected a scheduler at {place}, found {program}")
 
 
 class _Workers:

@@ -1,14 +1,22 @@
-"""Configurations as TOML, results as strict JSON, rows as CSV; and rows back from CSV."""
+"""Configurations as TOML, results as strict JSON, rows as CSV; and rows back from CSV.
+
+What workers return is kept as JSON too, with its types and every bit of every number: dataclasses,
+models, enumerations, tuples and arrays are objects with the key `@`. Nothing is ever unpickled: a
+file names only classes of packages that are trusted already.
+"""
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields, is_dataclass
+from enum import Enum
 from typing import Any, cast
 
 import numpy as np
@@ -216,3 +224,102 @@ def _toml(value: Any) -> str:
         # unlike JSON, TOML takes no halves of a character, and no bare delete character
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)
+
+
+_KIND = "@"
+
+
+def encoded(value: Any) -> Any:
+    """A value as what JSON can hold.
+
+    Raises:
+        TypeError: It holds an object of another kind.
+    """
+    match value:
+        case Enum():
+            return {_KIND: _name(value), "value": value.value}
+        case np.ndarray() | np.generic():
+            data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
+            kind = "array" if isinstance(value, np.ndarray) else "scalar"
+            return {_KIND: kind, "dtype": value.dtype.str, "shape": value.shape, "data": data}
+        case None | bool() | int() | float() | str():
+            return value
+        case BaseModel():
+            return {_KIND: _name(value), "fields": value.model_dump_json()}
+        case tuple():
+            return {_KIND: "tuple", "of": [encoded(item) for item in value]}
+        case list():
+            return [encoded(item) for item in value]
+        case Mapping():
+            pairs = [(encoded(key), encoded(item)) for key, item in value.items()]
+            if all(isinstance(key, str) and key != _KIND for key, _ in pairs):
+                return dict(pairs)
+            return {_KIND: "dict", "of": pairs}
+    if is_dataclass(value) and not isinstance(value, type):
+        return {_KIND: _name(value)} | {
+            field.name: encoded(getattr(value, field.name)) for field in fields(value)
+        }
+    raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
+
+
+def decoded(data: Any, packages: Collection[str]) -> Any:
+    """Back from `encoded`.
+
+    Args:
+        data: What JSON held.
+        packages: Top-level packages whose classes may be named.
+
+    Raises:
+        ValueError: It is nothing that `encoded` makes.
+    """
+    if isinstance(data, list):
+        return [decoded(item, packages) for item in data]
+    if not isinstance(data, dict):
+        return data
+    kind = data.get(_KIND)
+    if kind is None:
+        return {key: decoded(item, packages) for key, item in data.items()}
+    try:
+        if kind == "tuple":
+            return tuple(decoded(item, packages) for item in data["of"])
+        if kind == "dict":
+            return {decoded(k, packages): decoded(item, packages) for k, item in data["of"]}
+        if kind in ("array", "scalar"):
+            flat = np.frombuffer(base64.b64decode(data["data"]), np.dtype(data["dtype"]))
+            array = flat.reshape(data["shape"]).copy()
+            return array if kind == "array" else array[()]
+        return _object(_class(kind, packages), data, packages)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"expected a result, found {error}") from None
+
+
+def _object(kind: type, data: Mapping[str, Any], packages: Collection[str]) -> Any:
+    if issubclass(kind, Enum):
+        return kind(data["value"])
+    if issubclass(kind, BaseModel):
+        return kind.model_validate_json(data["fields"])
+    if not is_dataclass(kind):
+        raise TypeError(f"the class {kind.__name__}")
+    return kind(**{k: decoded(item, packages) for k, item in data.items() if k != _KIND})
+
+
+def _name(value: Any) -> str:
+    return f"{type(value).__module__}:{type(value).__qualname__}"
+
+
+def _class(name: str, packages: Collection[str]) -> type:
+    """A class that is imported already, of a trusted package."""
+    module, _, path = name.partition(":")
+    if module.partition(".")[0] not in packages or module not in sys.modules:
+        raise TypeError(f"a class of {module}")
+    kind: Any = sys.modules[module]
+    for part in path.split("."):
+        kind = getattr(kind, part)
+    if not isinstance(kind, type):
+        raise TypeError(f"no class {name}")
+    return kind
+
+
+def dumped(value: Any) -> str:
+    """JSON on one line; NaN and infinities are kept."""
+    return json.dumps(value, separators=(",", ":"))

@@ -28,7 +28,9 @@ def identity(command: str, config: Params) -> dict[str, Any]:
     """What decides the numbers of a run, as JSON can hold it."""
     values = json.loads(config.model_dump_json())
     shared = environment(command, config)
-    more = _code_added(values) | _code_of(type(config))
+    more, module = _code_added(values), type(config).__module__
+    if not module.startswith("antennate."):  # of another package
+        more |= _module(module)
     return {
         "command": command,
         "config": values,
@@ -56,14 +58,14 @@ def environment(command: str = "", config: Params | None = None) -> dict[str, An
 
 def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """What a worker has of the environment of its driver, which works in this folder."""
-    found = dict(code())
-    for name in theirs["code"].keys() - found.keys():
+    files = dict(code())
+    for name in theirs["code"].keys() - files.keys():
         file = folder / name
         if file.is_file():
-            found[name] = _checksum(file)
+            files[name] = _checksum(file)
         elif _is_module(name):
-            found |= _module(name)
-    return {"versions": dict(versions(tuple(theirs["versions"]))), "code": found}
+            files |= _module(name)
+    return {"versions": dict(versions(tuple(theirs["versions"]))), "code": files}
 
 
 @functools.cache
@@ -83,22 +85,22 @@ def code_named(values: Any) -> dict[str, str]:
 
     Beside FILE.py also what it imports of its own folder.
     """
-    found = {}
+    checksums = {}
     for text in texts(values):
         place, _, name = text.rpartition(":")
         file = Path(place if name and place else text)
         if file.suffix and file.is_file():
             files = _with_imports(file) if file.suffix == ".py" else [file]
-            found |= {str(each): _checksum(each) for each in files}
+            checksums |= {str(each): _checksum(each) for each in files}
         elif place and name.isidentifier() and all(map(str.isidentifier, place.split("."))):
-            found |= _module(place)
-    return found
+            checksums |= _module(place)
+    return checksums
 
 
 def _with_imports(first: Path) -> list[Path]:
     """A file and all beside it that it imports, or that those import."""
-    found = [first]
-    for file in found:
+    paths = [first]
+    for file in paths:
         try:
             nodes = [*ast.walk(ast.parse(file.read_bytes()))]
         except (SyntaxError, ValueError):
@@ -110,27 +112,22 @@ def _with_imports(first: Path) -> list[Path]:
         for name in dict.fromkeys(name.partition(".")[0] for name in names):
             module, package = first.with_name(f"{name}.py"), first.parent / name
             beside = [module] if module.is_file() else sorted(package.rglob("*.py")) if name else []
-            found += [each for each in beside if each not in found]
-    return found
+            paths += [each for each in beside if each not in paths]
+    return paths
 
 
 def _code_added(values: Any) -> dict[str, str]:
     """Checksums of the source of objects that were added to a registry and are named."""
     named = set(texts(values))
     added = [pair for objects in ADDED.values() for pair in objects.items() if pair[0] in named]
-    found = {}
+    checksums = {}
     for name, each in added:
         try:
             source = inspect.getsource(each)
         except (OSError, TypeError):
             continue  # typed at a prompt
-        found[name] = hashlib.sha256(source.encode()).hexdigest()[:16]
-    return found
-
-
-def _code_of(kind: type) -> dict[str, str]:
-    """Checksum of the module of a configuration of another package."""
-    return {} if kind.__module__.startswith("antennate.") else _module(kind.__module__)
+        checksums[name] = hashlib.sha256(source.encode()).hexdigest()[:16]
+    return checksums
 
 
 def _module(name: str) -> dict[str, str]:
@@ -159,13 +156,13 @@ def texts(values: Any) -> Iterator[str]:
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """What differs, in words; empty if nothing does."""
     before, after = dict(_flat(old, ())), dict(_flat(new, ()))
-    told = [
+    changes = [
         _told(path, before.get(path, _NONE), after.get(path, _NONE))
         for path in dict.fromkeys([*before, *after])
         if before.get(path, _NONE) != after.get(path, _NONE)
     ]
-    more = f" and {len(told) - _SHOWN} more" if len(told) > _SHOWN else ""
-    return ", ".join(told[:_SHOWN]) + more
+    more = f" and {len(changes) - _SHOWN} more" if len(changes) > _SHOWN else ""
+    return ", ".join(changes[:_SHOWN]) + more
 
 
 def but_trials(known: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -180,16 +177,13 @@ def _told(path: tuple[str, ...], old: Any, new: Any) -> str:
     group, name = path[0], ".".join(path[1:])
     if group == "code":
         kind = "module" if _is_module(name) else "file"
-        return f"the {kind} {name} {_changed(old, new)}"
+        change = "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
+        return f"the {kind} {name} {change}"
     return f"{name or group} {_short(old)}, now {_short(new)}"
 
 
 def _is_module(name: str) -> bool:
     return not name.endswith(".py") and all(map(str.isidentifier, name.split(".")))
-
-
-def _changed(old: Any, new: Any) -> str:
-    return "is new" if old == _NONE else "is gone" if new == _NONE else "changed"
 
 
 def _short(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ class Measure:
         join: Between two numbers, as the ends of an interval.
         least: What it cannot lie below.
         most: What it cannot exceed; text names the parameter that says so.
+        interval: Key of its 95 % interval, beside its own; a line of the table below it.
     """
 
     name: str
@@ -43,6 +44,14 @@ class Measure:
     join: str = " to "
     least: float = -math.inf
     most: float | str = math.inf
+    interval: str = ""
+
+    @property
+    def ends(self) -> Measure:
+        """Its interval."""
+        path = self.name.rpartition(".")[0]
+        name = f"{path}.{self.interval}" if path else self.interval
+        return replace(self, name=name, label="  95 %", of=None, interval="")
 
     @property
     def title(self) -> str:
@@ -51,10 +60,10 @@ class Measure:
 
     def value(self, summary: Mapping[str, Any]) -> Any:
         """Its value in a summary; None where there is none."""
-        found: Any = summary
+        value: Any = summary
         for part in self.name.split("."):
-            found = found.get(part) if isinstance(found, Mapping) else None
-        return found
+            value = value.get(part) if isinstance(value, Mapping) else None
+        return value
 
     def cell(self, summary: Mapping[str, Any]) -> str:
         """Its value in a summary as a table shows it."""
@@ -211,5 +220,6 @@ class Table:
         preface: str = "",
     ) -> Table:
         """The measures that have a label, for a summary in each column."""
-        rows = [(m.title, [m.cell(c) for c in columns.values()]) for m in measures if m.label]
+        lines = (line for m in measures for line in ((m, m.ends) if m.interval else (m,)))
+        rows = [(m.title, [m.cell(c) for c in columns.values()]) for m in lines if m.label]
         return cls(title, list(columns), rows, note, preface=preface)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import re
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
+from typing import Any
 
 from antennate.studies.measures import Table
 
@@ -116,10 +117,12 @@ def numbers(table: Table) -> str:
     """A table of measures, with its title and its note, behind what its columns are."""
     columns = ["", *(name.replace("_", " ") for name in table.columns)]
     rows = [[name, *cells] for name, cells in table.rows]
+    short = all(len(cell) < 30 for _, cells in table.rows for cell in cells)
+    kind = "numbers" if short else ""  # short cells stand in columns, texts are left as they flow
     note = paragraphs(table.note, "muted")
     lines = (line.partition(":") for line in table.preface.splitlines())
     preface = "".join(f"<p><strong>{escape(a)}</strong>{b}{escape(c)}</p>" for a, b, c in lines)
-    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, _kind(table))}{note}"
+    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, kind)}{note}"
 
 
 def is_broad(table: Table) -> bool:
@@ -143,11 +146,6 @@ def beside(figures: Sequence[str], words: str) -> str:
         f'{"".join(above)}<div class="beside"><div class="first">{first}</div>'
         f'<div class="words">{words}</div><div class="others">{"".join(others)}</div></div>'
     )
-
-
-def _kind(table: Table) -> str:
-    """`numbers` for short cells, which stand in columns; texts are left as they flow."""
-    return "numbers" if all(len(c) < 30 for _, cells in table.rows for c in cells) else ""
 
 
 def picture(png: bytes, svg: bytes, described: str) -> str:
@@ -190,3 +188,43 @@ def block(text: str, wrap: bool = False) -> str:
     """Text as it was typed; nothing of none."""
     text = text.rstrip()
     return f'<pre class="{"wrap" if wrap else ""}">{escape(text)}</pre>' if text else ""
+
+
+_TERMS = {
+    "wilson95": "Wilson 95 %: the true shares of success that could have given this count. Few "
+    "trials make it wide; where the intervals of two conditions overlap much, their order is not "
+    "known.",
+    "restricted_mean_time_s": "Restricted mean time: the mean over all valid trials, where one "
+    "that fails counts as the whole time limit. So giving up early does not look fast. Its "
+    "interval also reaches for failures that so few trials may not have met.",
+    "progress_per_time_m_s": "Progress over time: how far all valid trials came together, over "
+    "their time together, so that failures count. Speed over successes: the mean of progress over "
+    "time of each trial that succeeded.",
+    "stuck": "Stuck episodes: how often the robot, for 5 s, did not gain 0.02 m on its best "
+    "progress; it has recovered if it then did.",
+    "hold": "Hold: the maneuver in which the robot stands still.",
+    "mcnemar_p": "McNemar: two conditions meet the same trials, and only those trials count that "
+    "one of them passes and the other does not. p is how often chance alone would split these so "
+    "unevenly or more; below 0.05 is usually taken for a difference.",
+    "wilcoxon_p": "Wilcoxon: the same question for how long the trials took, by the ranks of the "
+    "differences trial by trial, with those of zero among the ranks (Pratt).",
+}
+"""Sentences by the names of numbers in a result."""
+
+
+def terms_explained(result: Mapping[str, Any]) -> str:
+    """HTML on what of it is in a result; empty if nothing is."""
+    there = {name for name, value in _values(result) if value is not None}
+    texts = [text for name, text in _TERMS.items() if name in there]
+    text = paragraphs("\n\n".join(texts))
+    return f"<h2>How to read this</h2>{text}" if texts else ""
+
+
+def _values(value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for name, part in value.items():
+            yield str(name), part
+            yield from _values(part)
+    elif isinstance(value, list):
+        for part in value:
+            yield from _values(part)

@@ -145,8 +145,8 @@ def _of_lists(kind: Kind, axes: Axes) -> list[Point]:
             _require_each_once(f"vary.{name}: expected each value", values)
         return [dict(zip(axes, values, strict=True)) for values in itertools.product(*lists)]
     if len(lengths := {len(values) for values in lists}) > 1:
-        found = ", ".join(map(str, sorted(lengths)))
-        raise ConfigError(f"vary: expected lists of one length, found lengths {found}")
+        counts = ", ".join(map(str, sorted(lengths)))
+        raise ConfigError(f"vary: expected lists of one length, found lengths {counts}")
     _require_each_once("vary: expected each point", list(zip(*lists, strict=True)))
     return [dict(zip(axes, values, strict=True)) for values in zip(*lists, strict=True)]
 
@@ -161,11 +161,11 @@ def _require_finite(name: str, axis: Sequence[Any] | Range) -> None:
 
 def _require_each_once(expected: str, values: Sequence[Any]) -> None:
     """Check that none comes twice: its trials would be counted twice."""
-    found: set[str] = set()
+    texts: set[str] = set()
     for value in values:
-        if (text := json.dumps(value, default=str)) in found:
+        if (text := json.dumps(value, default=str)) in texts:
             raise ConfigError(f"{expected} once, found {text} twice")
-        found.add(text)
+        texts.add(text)
 
 
 def _value(axis: Sequence[Any] | Range, share: float) -> Any:
@@ -182,17 +182,17 @@ def trajectories(dimensions: int, count: int, rng: np.random.Generator) -> Float
     Returns:
         Shares of the ranges, 0 to 1, shape (count · (dimensions + 1), dimensions).
     """
-    found = []
+    shares = []
     starts = np.arange(LEVELS // 2) / (LEVELS - 1)
     for _ in range(count):
-        here = rng.choice(starts, dimensions)
+        share = rng.choice(starts, dimensions)
         up = rng.random(dimensions) < 0.5
-        here = np.where(up, here, here + STEP)
-        found.append(here.copy())
+        share = np.where(up, share, share + STEP)
+        shares.append(share.copy())
         for moved in rng.permutation(dimensions):
-            here[moved] += STEP if up[moved] else -STEP
-            found.append(here.copy())
-    return np.clip(np.array(found), 0.0, 1.0)
+            share[moved] += STEP if up[moved] else -STEP
+            shares.append(share.copy())
+    return np.clip(np.array(shares), 0.0, 1.0)
 
 
 def elementary_effects(
@@ -215,8 +215,8 @@ def elementary_effects(
     values = np.where(np.isfinite(values), values, np.nan)
     values = values.reshape(*values.shape[:-1], count, dimensions + 1)
     effects = np.diff(values, axis=-1) / moves
-    found = np.take_along_axis(effects, np.broadcast_to(order, effects.shape), axis=-1)
-    return np.swapaxes(found, -1, -2)
+    ordered = np.take_along_axis(effects, np.broadcast_to(order, effects.shape), axis=-1)
+    return np.swapaxes(ordered, -1, -2)
 
 
 @functools.lru_cache(maxsize=1)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from antennate.errors import WorkerError
-from antennate.studies.codec import decoded, encoded
+from antennate.studies.formats import decoded, encoded
 from antennate.studies.processes import Processes
 from antennate.studies.store import Store, key_of
 from antennate.studies.work import Engine, Failure, Here, Work
@@ -127,7 +127,7 @@ class _Call:
         self._workers, self._number, self._total = workers, next(workers.calls), total
         self._packages = {"antennate", package}
         self._take, self._on_step, self._lost = take, on_step, lost
-        self.found: dict[int, Any] = {}
+        self.results: dict[int, Any] = {}
 
     def emit(self, place: int, result: Any) -> None:
         """Keep a result."""
@@ -146,9 +146,9 @@ class _Call:
         self._finish(place, result)
 
     def _finish(self, place: int, result: Any) -> None:
-        self.found[place] = result
+        self.results[place] = result
         self._take(result)
-        self._on_step(len(self.found), self._total)
+        self._on_step(len(self.results), self._total)
 
     def resume(self) -> None:
         """Take what was finished before."""
@@ -166,10 +166,10 @@ class _Call:
                     result = decoded(record["result"], self._packages)
                 except ValueError:
                     continue  # of a class that is no more: it is run again
-            self.found[place] = result
+            self.results[place] = result
             self._take(result)
-        if self.found:
-            self._on_step(len(self.found), self._total)
+        if self.results:
+            self._on_step(len(self.results), self._total)
 
 
 def gather(
@@ -206,10 +206,12 @@ def gather(
     package = function.__module__.partition(".")[0]
     call = _Call(workers, len(tasks), package, on_result, on_step, lost)
     call.resume()
-    todo = [place for place in range(len(tasks)) if place not in call.found and workers.mine(place)]
+    todo = [
+        place for place in range(len(tasks)) if place not in call.results and workers.mine(place)
+    ]
     if todo and workers.closed:
         raise WorkerError(
-            f"expected {len(tasks)} finished trials, found {len(call.found)}: a shard is missing"
+            f"expected {len(tasks)} finished trials, found {len(call.results)}: a shard is missing"
         )
     parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
     if parts:
@@ -221,5 +223,5 @@ def gather(
         work = Work(function, tasks, together, timeout, folder, **how)
         workers.engine_for(len(parts)).run(work, parts, workers.count, call.emit, call.fail)
     if workers.shard is not None:
-        raise ShardEnd(sum(map(workers.mine, call.found)), len(tasks))
-    return [call.found[place] for place in range(len(tasks))]
+        raise ShardEnd(sum(map(workers.mine, call.results)), len(tasks))
+    return [call.results[place] for place in range(len(tasks))]

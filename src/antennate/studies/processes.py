@@ -26,7 +26,6 @@ from typing import Any
 from antennate.errors import WorkerError, in_one_line, raised
 from antennate.lookup import NotSent
 from antennate.sim.engine_setup import dropped
-from antennate.studies.processor import processor
 from antennate.studies.work import (
     Emit,
     Fail,
@@ -36,6 +35,7 @@ from antennate.studies.work import (
     Waiting,
     Work,
     added_objects,
+    processor,
     sendable,
     take_added,
 )

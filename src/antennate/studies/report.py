@@ -18,7 +18,7 @@ from antennate import messages
 from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.params.base import Params
-from antennate.studies import dates, page, terms
+from antennate.studies import page
 from antennate.studies.formats import to_toml
 from antennate.studies.measures import FEW, NONE, Table
 from antennate.studies.run_directory import RunDirectory
@@ -35,6 +35,7 @@ from antennate.studies.run_files import (
     RESULT,
     TABLE,
     VERSIONS,
+    when_run,
 )
 
 _MOST_REASONS = 20
@@ -148,34 +149,34 @@ def _command(run: RunDirectory, view: View) -> str:
 def _when(run: RunDirectory, result: Result | None) -> str:
     """When it was run, how long it took, and its seed, as far as they are known."""
     seed = (result or {}).get("seed", _table(run.text(CONFIG)).get("seed"))
-    told = dates.sentence(run.text(COMMAND))
-    return f"{told} Seed {seed}." if seed is not None else told
+    when = when_run(run.text(COMMAND))
+    return f"{when} Seed {seed}." if seed is not None else when
 
 
 def _images(run: RunDirectory, view: View) -> dict[str, str]:
     """The figures by name, the picture first."""
-    found = {path.stem: path for path in run.made(FIGURES, ".png")}
+    files = {path.stem: path for path in run.made(FIGURES, ".png")}
     return {
         name: page.picture(
-            read_limited(found[name], LARGEST),
-            read_limited(found[name].with_suffix(".svg"), LARGEST),
+            read_limited(files[name], LARGEST),
+            read_limited(files[name].with_suffix(".svg"), LARGEST),
             view.caption(name),
         )
-        for name in view.ordered(found)
+        for name in view.ordered(files)
     }
 
 
 def _films(run: RunDirectory) -> dict[str, str]:
     """The films by name, in the order in which the run has what they show."""
-    told = _table(run.text(CONFIG))
-    names = [str(each) for key in _SHOWN if key in told for each in told[key]]
+    config = _table(run.text(CONFIG))
+    names = [str(each) for key in _SHOWN if key in config for each in config[key]]
 
     def place(path: Path) -> tuple[int, str]:
-        found = (i for i, name in enumerate(names) if path.stem.startswith(name))
-        return next(found, len(names)), path.stem
+        places = (i for i, name in enumerate(names) if path.stem.startswith(name))
+        return next(places, len(names)), path.stem
 
-    found = sorted(run.made(FILMS, ".mp4"), key=place)
-    return {path.stem: page.film(read_limited(path, LARGEST)) for path in found}
+    files = sorted(run.made(FILMS, ".mp4"), key=place)
+    return {path.stem: page.film(read_limited(path, LARGEST)) for path in files}
 
 
 _SHOWN = ("controllers", "profiles")
@@ -185,11 +186,11 @@ _SHOWN = ("controllers", "profiles")
 def _logs(run: RunDirectory) -> str:
     """Which logs there are."""
     folders = (run.path, run.path / LOGS)
-    found = [path for folder in folders for path in sorted(folder.glob("*.mcap"))]
-    names = ", ".join(str(path.relative_to(run.path)) for path in found[:_MOST_LOGS])
-    more = f" and {len(found) - _MOST_LOGS} more" if len(found) > _MOST_LOGS else ""
-    kind = "log" if len(found) == 1 else "logs"
-    return page.paragraphs(f"Beside this page: {kind} {names}{more}.", "muted") if found else ""
+    logs = [path for folder in folders for path in sorted(folder.glob("*.mcap"))]
+    names = ", ".join(str(path.relative_to(run.path)) for path in logs[:_MOST_LOGS])
+    more = f" and {len(logs) - _MOST_LOGS} more" if len(logs) > _MOST_LOGS else ""
+    kind = "log" if len(logs) == 1 else "logs"
+    return page.paragraphs(f"Beside this page: {kind} {names}{more}.", "muted") if logs else ""
 
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:
@@ -201,7 +202,7 @@ def _shown(run: RunDirectory, result: Result, view: View) -> str:
     words = "".join(page.numbers(table) for table in tables if not page.is_broad(table))
     figures = [page.captioned(image, view.caption(name)) for name, image in images.items()]
     broad = "".join(page.numbers(table) for table in tables if page.is_broad(table))
-    return page.beside(figures, words + terms.explained(result)) + broad
+    return page.beside(figures, words + page.terms_explained(result)) + broad
 
 
 def _failures(run: RunDirectory) -> str:
@@ -239,17 +240,17 @@ def _settings(run: RunDirectory, view: View) -> str:
 
 def _flat(text: str) -> dict[str, str]:
     """Every parameter of a TOML file by its dotted path, in words."""
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
 
     def walk(table: Mapping[str, Any], before: str) -> None:
         for key, value in table.items():
             if isinstance(value, Mapping):
                 walk(value, f"{before}{key}.")
             else:
-                found[before + key] = value if isinstance(value, str) else json.dumps(value)
+                values[before + key] = value if isinstance(value, str) else json.dumps(value)
 
     walk(_table(text), "")
-    return found
+    return values
 
 
 def _table(text: str) -> dict[str, Any]:
@@ -281,12 +282,12 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     results = [run.result() for run in runs]
     parts = [f"<h1>{page.escape(view.title)}: {page.escape(' and '.join(names))}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
-    told = [view.sentence(result) for result in results]
-    for name, run, text in zip(names, runs, told, strict=True):
+    sentences = [view.sentence(result) for result in results]
+    for name, run, text in zip(names, runs, sentences, strict=True):
         alone = page.paragraphs(text.replace(FEW, "").strip())
         parts.append(f"<h2>{page.escape(name)}</h2>{alone}")
         parts.append(page.block(_command(run, view), wrap=True))
-    parts.append(page.paragraphs(FEW if any(FEW in text for text in told) else ""))
+    parts.append(page.paragraphs(FEW if any(FEW in text for text in sentences) else ""))
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
     parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
@@ -303,9 +304,9 @@ def _names(runs: Sequence[RunDirectory]) -> list[str]:
     return short if len(set(short)) == len(short) else [str(run.path) for run in runs]
 
 
-def _differing(title: str, names: Sequence[str], values: Sequence[Mapping[str, str]]) -> str:
-    keys = dict.fromkeys(key for found in values for key in found)
-    rows = [[key, *(found.get(key, NONE) for found in values)] for key in keys]
+def _differing(title: str, names: Sequence[str], runs: Sequence[Mapping[str, str]]) -> str:
+    keys = dict.fromkeys(key for run in runs for key in run)
+    rows = [[key, *(run.get(key, NONE) for run in runs)] for key in keys]
     rows = [row for row in rows if len(set(row[1:])) > 1]
     head = f"<h2>{title} that differ</h2>"
     return head + (page.grid(["", *names], rows) if rows else page.paragraphs("None."))
@@ -316,19 +317,19 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
     by_title = [{table.title: table for table in tables} for tables in found]
     joined = []
     for title in dict.fromkeys(title for tables in by_title for title in tables):
-        here = {n: t[title] for n, t in zip(names, by_title, strict=True) if title in t}
-        columns = list(dict.fromkeys(c for table in here.values() for c in table.columns))
-        cells = {name: _cells(table) for name, table in here.items()}
+        own = {n: t[title] for n, t in zip(names, by_title, strict=True) if title in t}
+        columns = list(dict.fromkeys(c for table in own.values() for c in table.columns))
+        cells = {name: _cells(table) for name, table in own.items()}
         rows = [
             (
-                line[0] if name == next(iter(here)) else "",
+                line[0] if name == next(iter(own)) else "",
                 [name, *(found.get(c, NONE) for c in columns)],
             )
             for line in dict.fromkeys(line for lines in cells.values() for line in lines)
-            for name, found in ((name, cells[name].get(line, {})) for name in here)
+            for name, found in ((name, cells[name].get(line, {})) for name in own)
         ]
-        notes = dict.fromkeys(table.note for table in here.values())
-        prefaces = (line for table in here.values() for line in table.preface.splitlines())
+        notes = dict.fromkeys(table.note for table in own.values())
+        prefaces = (line for table in own.values() for line in table.preface.splitlines())
         joined.append(
             Table(
                 *(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))),
@@ -341,28 +342,28 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
 def _cells(table: Table) -> dict[tuple[str, int], dict[str, str]]:
     """The cells of a table by line and column; a label that comes again is another line."""
     seen: dict[str, int] = {}
-    found = {}
+    cells_of = {}
     for name, cells in table.rows:
         label = ", ".join(cells[: table.leading]) or name
         seen[label] = seen.get(label, 0) + 1
-        found[label, seen[label]] = dict(zip(table.columns, cells, strict=True))
-    return found
+        cells_of[label, seen[label]] = dict(zip(table.columns, cells, strict=True))
+    return cells_of
 
 
 def _pairs(
     title: str,
     names: Sequence[str],
-    found: Sequence[Mapping[str, str]],
+    by_run: Sequence[Mapping[str, str]],
     caption: Callable[[str], str],
     kind: str = "",
 ) -> str:
     """Pictures of the same name together: below one another, or side by side as a `pair`."""
     parts = []
-    for key in dict.fromkeys(key for pictures in found for key in pictures):
-        here = [
+    for key in dict.fromkeys(key for pictures in by_run for key in pictures):
+        shown = [
             page.captioned(pictures[key], f"{name}: {caption(key)}")
-            for name, pictures in zip(names, found, strict=True)
+            for name, pictures in zip(names, by_run, strict=True)
             if key in pictures
         ]
-        parts.append(f'<div class="{kind}">{"".join(here)}</div>')
+        parts.append(f'<div class="{kind}">{"".join(shown)}</div>')
     return f"<h2>{title}</h2>{''.join(parts)}" if parts else ""

@@ -27,9 +27,8 @@ from antennate import checks
 from antennate.errors import BadInputError, OutputError
 from antennate.files import writing_whole
 from antennate.params.base import Config, Params, read_file
-from antennate.studies import dates, formats
+from antennate.studies import formats
 from antennate.studies.claim import Claim, claim, give_back
-from antennate.studies.processor import processor
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -43,15 +42,18 @@ from antennate.studies.run_files import (
     TABLE,
     VERSIONS,
     add_to_list,
+    begun_line,
     files_of,
     inside,
     listed,
     read_as,
     remove_described,
     remove_run,
+    with_end,
     writing,
 )
 from antennate.studies.store import Tasks
+from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 
 _KEPT_FREE = 1 << 16
@@ -183,15 +185,15 @@ class RunDirectory:
         self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
         if command:
             resumed = self.store is not None and self.store.holds_trials
-            self._described[COMMAND] = f"{shlex.join(command)}\n{dates.begun(resumed)}"
+            self._described[COMMAND] = f"{shlex.join(command)}\n{begun_line(resumed)}"
         for name, text in self._described.items():
             self.write(name, text)
 
     def _versions(self) -> str:
         """Versions of what the numbers depend on, and the models of the processors."""
-        told = self.store.identity if self.store is not None else None
+        identity = self.store.identity if self.store is not None else None
         models = self.store.processors if self.store is not None else []
-        known = versions() if told is None else told["versions"]
+        known = versions() if identity is None else identity["versions"]
         return formats.to_json({**known, "processor": " and ".join(models or [processor()])})
 
     def without_trials(self) -> None:
@@ -242,7 +244,7 @@ class RunDirectory:
             self.write(VERSIONS, self._versions())
         self.write(RESULT, formats.to_json(result))
         if text := self.text(COMMAND):
-            self.write(COMMAND, dates.ended(text))
+            self.write(COMMAND, with_end(text))
         self.keep()
         self._drop_partial()
         if not result.get("interrupted"):
@@ -344,9 +346,9 @@ class RunDirectory:
         return self
 
     def __exit__(self, *_: object) -> None:
-        kept = self._kept or (self.store is not None and self.store.holds_trials)
-        self._close_store(remove=not kept)
-        if kept:
+        stays = self._kept or (self.store is not None and self.store.holds_trials)
+        self._close_store(remove=not stays)
+        if stays:
             if self._partial is not None:
                 with contextlib.suppress(OSError):
                     self._partial.close()

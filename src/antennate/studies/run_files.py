@@ -1,15 +1,17 @@
 """The names of the files of a run, and which of them a folder holds.
 
 `files.txt` lists the files that a run writes, each before it is made. Without that list a folder
-holds no run of this program, and is never overwritten.
+holds no run of this program, and is never overwritten. Below its command stands when it ran.
 """
 
 from __future__ import annotations
 
 import contextlib
+import datetime
 import itertools
 import json
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -251,10 +253,10 @@ def inside(place: Path, name: str) -> Path:
     Raises:
         ConfigError: The name leads out of it.
     """
-    found = Path(checks.text("name", name))
-    if found.is_absolute() or ".." in found.parts or not name.isprintable():
+    path = Path(checks.text("name", name))
+    if path.is_absolute() or ".." in path.parts or not name.isprintable():
         raise ConfigError(f"name: expected one within the run, found {name}")
-    return place / found
+    return place / path
 
 
 @contextlib.contextmanager
@@ -301,10 +303,52 @@ def place_of(command: str, path: str | Path | None) -> Path:
         raise OutputError("expected the name of a folder, found an empty one")
     if "/" in checks.text("command", command):
         raise ConfigError(f"command: expected a name without a slash, found {command}")
-    return _free(command) if path is None else checks.path("path", path)
+    if path is not None:
+        return checks.path("path", path)
+    places = (Path("runs") / f"{command}-{number}" for number in itertools.count(1))
+    return next(place for place in places if not place.exists())
 
 
-def _free(command: str) -> Path:
-    """The next folder for a run of a command that nobody has named."""
-    runs = Path("runs")
-    return next(path for n in itertools.count(1) if not (path := runs / f"{command}-{n}").exists())
+_DATE = "%Y-%m-%d %H:%M:%S UTC"
+_DATES = re.compile(r"^# (begun|resumed|ended) (.*)$", re.MULTILINE)
+
+
+def begun_line(resumed: bool = False) -> str:
+    """The line of a run that begins now, or goes on."""
+    return f"# {'resumed' if resumed else 'begun'} {_now()}\n"
+
+
+def with_end(text: str) -> str:
+    """What was written, with the line of a run that ends now."""
+    kept = (line for line in text.splitlines(True) if not line.startswith("# ended "))
+    return f"{''.join(kept)}# ended {_now()}\n"
+
+
+def when_run(text: str) -> str:
+    """When, and for how long; empty if it does not tell."""
+    try:
+        dates = {
+            what: datetime.datetime.strptime(when, _DATE).replace(tzinfo=datetime.UTC)
+            for what, when in _DATES.findall(text)
+        }
+    except ValueError:
+        return ""
+    for what, words, it in (("begun", "Run on", "it"), ("resumed", "Resumed on", "the rest")):
+        if what in dates:
+            took = dates["ended"] - dates[what] if "ended" in dates else None
+            day = f"{words} {dates[what]:%Y-%m-%d at %H:%M} UTC"
+            return f"{day}." if took is None else f"{day}; {it} took {_span(took.total_seconds())}."
+    return ""
+
+
+def _span(seconds: float) -> str:
+    minutes, hours = seconds / 60, seconds / 3600
+    if seconds < 1:
+        return "less than 1 s"
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{minutes:.0f} min" if minutes < 100 else f"{hours:.1f} h"
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime(_DATE)

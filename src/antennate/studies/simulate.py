@@ -86,7 +86,9 @@ def simulate(
     controlling.reset(np.array([0]), start.phase)
     limit = time_limit_of(start.scene, time_limit)
     walk = _Walk(config.robot, robot, controlling, start, limit)
-    name = controller if isinstance(controller, str) else _name(controller)
+    name = controller
+    if not isinstance(name, str):  # without a name in a registry
+        name = str(getattr(controller, "__name__", type(controller).__name__))
     with contextlib.ExitStack() as stack:
         if log is not None:
             header = Header(
@@ -97,8 +99,8 @@ def simulate(
                 trial=trial,
                 phase=start.phase,
             )
-            kept = SimulatedLog(log, header, start.world, walk.decisions)
-            walk.log = stack.enter_context(kept)
+            logged = SimulatedLog(log, header, start.world, walk.decisions)
+            walk.log = stack.enter_context(logged)
         run_loop(robot, walk.checked, control.period, walk.go_on)
     return walk.recorder.series(
         {
@@ -167,8 +169,3 @@ class _Walk:
         if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
             self.outcome = self._judge.look(self._start.world.head[:2]) or "timeout"
         return self.outcome == "timeout" and self._start.world.t < self._time_limit
-
-
-def _name(factory: ControllerFactory) -> str:
-    """What a log calls a controller that has no name in a registry."""
-    return str(getattr(factory, "__name__", type(factory).__name__))

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from antennate.errors import BadInputError, OutputError
 from antennate.files import open_regular
-from antennate.studies.codec import dumped
+from antennate.studies.formats import dumped
 from antennate.studies.identity import but_trials, differences
 
 STORE = "trials.store.jsonl"
@@ -74,13 +74,13 @@ class Store:
         """Take what the file holds; how many lines are damaged."""
         data = _data(self.path)
         self.was_empty = not data
-        found = parsed(data)
-        self.identity, self.records = found.identity, found.records
-        self.processors: list[str] = found.processors
+        content = parsed(data)
+        self.identity, self.records = content.identity, content.records
+        self.processors: list[str] = content.processors
         self._end = len(data)
         if data and not data.endswith(b"\n"):
             self._append(b"\n")
-        return found.damaged
+        return content.damaged
 
     def begin(self, identity: Mapping[str, Any], tasks: Tasks | None = None) -> None:
         """Say what is run, or find that it is what the file was begun with, or more trials of it.
@@ -121,8 +121,8 @@ class Store:
                 f"{self.path.parent}: expected no fewer trials than this run has, found {changes}; "
                 "choose another folder for fewer"
             )
-        kept = ((i, places[task]) for i, task in enumerate(old) if task in places)
-        keys = {key_of(0, i): key_of(0, place) for i, place in kept}
+        moved = ((i, places[task]) for i, task in enumerate(old) if task in places)
+        keys = {key_of(0, i): key_of(0, place) for i, place in moved}
         self._append(line({"identity": identity, "keys": keys}))
         self.identity, self.records = identity, _moved(self.records, keys)
 
@@ -297,8 +297,8 @@ def parsed(data: bytes) -> Parsed:
 
 def _moved(records: Mapping[str, Any], keys: Mapping[str, str]) -> dict[str, Any]:
     """Records by new keys."""
-    found = {key: {**content, "key": keys[key]} for key, content in records.items() if key in keys}
-    return {content["key"]: content for content in found.values()}
+    moved = {key: {**content, "key": keys[key]} for key, content in records.items() if key in keys}
+    return {content["key"]: content for content in moved.values()}
 
 
 def _contents(data: bytes) -> Iterator[dict[str, Any] | None]:
@@ -316,7 +316,7 @@ def read_store(path: Path) -> Parsed:
     Raises:
         BadInputError: It cannot be read, or does not say what is run.
     """
-    found = parsed(_data(path))
-    if found.identity is None:
+    content = parsed(_data(path))
+    if content.identity is None:
         raise BadInputError(f"{path}: expected finished trials, found no first line that is sound")
-    return found
+    return content

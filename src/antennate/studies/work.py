@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import pickle
+import platform
+import re
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +16,25 @@ from typing import Any, Literal, Protocol
 
 from antennate.errors import LogError, WorkerError, in_one_line
 from antennate.lookup import ADDED, NotSent
-from antennate.studies.processor import processor
+
+_CPUINFO = Path("/proc/cpuinfo")
+
+
+@functools.cache
+def processor() -> str:
+    """Its model, as the system calls it."""
+    try:
+        model = re.search(r"^model name\s*:\s*(.+)$", _CPUINFO.read_text(), re.M)
+    except OSError:
+        model = None
+    return model[1].strip() if model else platform.processor() or platform.machine()
+
+
+class Processor(str):
+    """The model of the processor that trials ran on, where it comes among their results."""
+
+    __slots__ = ()
+
 
 Emit = Callable[[int, Any], None]
 """Takes the place of a task and its result."""
@@ -103,16 +124,16 @@ class Part:
         A log that cannot be written fails all that run beside it, as it is for the disk.
         """
         left = dict(self.tasks)
-        told: Exception | None = None
+        emit_error: Exception | None = None
         process, back = os.getpid(), _way_back()
 
         def take(place: int, result: Any) -> None:
-            nonlocal told
+            nonlocal emit_error
             _end_forked(process)
             try:
                 emit(place, result)
             except Exception as error:
-                told = error
+                emit_error = error
                 raise
             del left[place]
             back()
@@ -130,8 +151,8 @@ class Part:
                     take(now[0], self.function(*self.tasks[now[0]]))
             except Exception as error:  # noqa: BLE001  (a trial may raise anything)
                 _end_forked(process)
-                if told is not None:
-                    raise told from None
+                if emit_error is not None:
+                    raise emit_error from None
                 known = isinstance(error, LogError | WorkerError)
                 reason = str(error) if known else in_one_line(error)
                 if len(now) == 1 or isinstance(error, LogError):  # a full disk is one for all
@@ -252,8 +273,8 @@ def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
 def take_added(added: Packed) -> None:
     """In a worker: know the objects that were added in the driver."""
     for group, objects in added.items():
-        found = {name: _read(content) for name, content in objects.items()}
-        ADDED.setdefault(group, {}).update(found)
+        objects_read = {name: _read(content) for name, content in objects.items()}
+        ADDED.setdefault(group, {}).update(objects_read)
 
 
 def _read(content: bytes) -> Any:

@@ -23,10 +23,10 @@ from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError, ConfigError
+from antennate.experiments.bench import mean_since
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
-from antennate.experiments.reading import mean_since
 from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams, Solver, solver
 from antennate.params.scene import BenchPhysicsParams
@@ -252,7 +252,7 @@ def films(config: CalibrateConfig, trial: int) -> dict[str, Callable[[], Film]]:
 
 def _film(config: CalibrateConfig, which: int) -> Film:
     """A film of a push at one of the speeds."""
-    from antennate.experiments.bench_film import BenchRecorder  # slow to import
+    from antennate.experiments.bench import BenchRecorder  # slow to import
 
     recorder = BenchRecorder(config.antenna, _FILM_SPEED)
     push(config, which * config.rig.pushes, recorder.watch)

@@ -1,14 +1,240 @@
-"""The experiment `gait`."""
+"""The gait on a flat floor: how far each maneuver goes, what the lead of the body wave is worth.
+
+The gait is its own mirror image half a cycle later, so over whole cycles FORWARD neither yaws nor
+drifts. FORWARD is walked again for numbers that are not known, drawn from their ranges.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from antennate.experiments.gait import run as gait
-from antennate.studies.experiment import Experiment
+import numpy as np
+
+from antennate.colours import called
+from antennate.experiments.gait.config import GaitStudyConfig, drawn
+from antennate.experiments.gait.physics import (
+    Pace,
+    Walk,
+    measure,
+    rolling_speed,
+    walk_flat,
+)
+from antennate.params.control import GaitParams
+from antennate.sim.world import World
+from antennate.studies.experiment import Experiment, OnRow, OnStep, Outcome, no_row, no_step
 from antennate.studies.measures import Measure, Table, shown
+from antennate.studies.pool import Workers, gather
+from antennate.telemetry.header import log_name
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Maneuver
+
+if TYPE_CHECKING:
+    from antennate.telemetry.film import Film
+
+MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
+WAVE_OFF = "wave_off"
+
+
+@dataclass(frozen=True, slots=True)
+class GaitOutcome(Outcome):
+    """All walks: four maneuvers by name, one without body wave, and the sweep over its lead.
+
+    Attributes:
+        drawn: FORWARD for each draw of the unknown numbers.
+        ends: FORWARD with each of them alone at its lower and its upper end.
+    """
+
+    config: GaitStudyConfig
+    maneuvers: dict[str, Walk]
+    wave_off: Walk
+    sweep: list[Walk]
+    drawn: list[Walk]
+    ends: dict[str, tuple[Walk, Walk]]
+
+    def pace(self, walk: Walk) -> Pace:
+        """What a walk of this study comes to."""
+        return measure(walk, self.config.settling_cycles, self.config.cycles)
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        config = self.config
+        rolling = None
+        if config.robot.legs.kind == "rolling":
+            rolling = rolling_speed(config.gait, config.robot)
+        straight = self.pace(self.wave_off).speed
+        chosen = self.pace(self.maneuvers["forward"]).speed
+        swept = [self.pace(walk) for walk in self.sweep]
+        speeds = [pace.speed for pace in swept]
+        best = max(speeds)
+        return {
+            "schema": 1,
+            "command": "gait",
+            "body_length_m": config.length,
+            "frequency_hz": config.gait.frequency,
+            "maneuvers": {name: self._row(walk) for name, walk in self.maneuvers.items()},
+            "wave_off": {
+                "speed_m_s": straight,
+                "expected_m_s": rolling,
+                "ratio": None if rolling is None else straight / rolling,
+            },
+            "phase_sweep": [
+                {
+                    "body_phase_rad": walk.gait.body_phase,
+                    "speed_m_s": pace.speed,
+                    "body_lengths_per_cycle": pace.body_lengths,
+                }
+                for walk, pace in zip(self.sweep, swept, strict=True)
+            ],
+            "chosen_body_phase_rad": config.gait.body_phase,
+            "best_body_phase_rad": self.sweep[speeds.index(best)].gait.body_phase,
+            "cost_of_phase": {
+                "chosen_over_best": chosen / best,
+                "worst_over_best": min(speeds) / best,
+            },
+            "measured_body_lengths_per_cycle": config.measured,
+            "unknown": self._unknown() if self.drawn else None,
+        }
+
+    def _unknown(self) -> dict[str, Any]:
+        """What the unknown numbers make of FORWARD, in body lengths a cycle."""
+        lengths = np.array([self.pace(walk).body_lengths for walk in self.drawn])
+        ends = {n: [self.pace(walk).body_lengths for walk in both] for n, both in self.ends.items()}
+        low, median, high = np.percentile(lengths, [2.5, 50.0, 97.5]).tolist()
+        return {
+            "draws": len(lengths),
+            "median": median,
+            "interval95": [low, high],
+            "range": [float(lengths.min()), float(lengths.max())],
+            "body_lengths_per_cycle": lengths.tolist(),
+            "parameters": {
+                one.name: {
+                    "range": [one.low, one.high],
+                    "body_lengths_per_cycle": ends[one.name],
+                    "change": ends[one.name][1] - ends[one.name][0],
+                }
+                for one in self.config.unknowns
+            },
+        }
+
+    def _row(self, walk: Walk) -> dict[str, Any]:
+        pace = self.pace(walk)
+        return {
+            "speed_m_s": pace.speed,
+            "body_lengths_per_cycle": pace.body_lengths,
+            "yaw_deg_per_cycle": math.degrees(pace.yaw),
+            "cost_of_transport": pace.cost_of_transport,
+        }
+
+
+def check(config: GaitStudyConfig) -> None:
+    """Find draws that make no robot or gait before anything is run.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    _tasks(config)
+
+
+_Task = tuple[GaitStudyConfig, str, GaitParams, Maneuver]
+
+
+def log_names(config: GaitStudyConfig) -> list[str]:
+    """Names of the logs of all walks."""
+    return [log_name(name) for _, name, _, _ in _tasks(config)]
+
+
+def _tasks(config: GaitStudyConfig) -> list[_Task]:
+    gait = config.gait
+    forward = {WAVE_OFF: _changed(gait, amplitude=0.0)}
+    for i in range(config.sweep_points):
+        lead = 2.0 * math.pi * i / config.sweep_points
+        forward[f"sweep{i}"] = _changed(gait, body_phase=lead)
+    return [
+        *((config, m.name.lower(), gait, m) for m in MANEUVERS),
+        *((config, name, one, Maneuver.FORWARD) for name, one in forward.items()),
+        *((one, name, one.gait, Maneuver.FORWARD) for name, one in _unknown(config).items()),
+    ]
+
+
+def _unknown(config: GaitStudyConfig) -> dict[str, GaitStudyConfig]:
+    """What is walked for the unknown numbers: each draw, then each number at its ends."""
+    unknowns, configs = config.unknowns, dict[str, GaitStudyConfig]()
+    if not unknowns:
+        return configs
+    names = [one.name for one in unknowns]
+    for i, values in enumerate(drawn(unknowns, config.draws, config.seed).tolist()):
+        configs[f"draw{i}"] = config.at(dict(zip(names, values, strict=True)))
+    for one in unknowns:
+        configs[f"{one.name}:low"] = config.at({one.name: one.low})
+        configs[f"{one.name}:high"] = config.at({one.name: one.high})
+    return configs
+
+
+def _changed(gait: GaitParams, **values: float) -> GaitParams:
+    return GaitParams(**{**gait.model_dump(), **values})
+
+
+def _walk(task: _Task, logs: Path | None) -> Walk:
+    """One walk, with its log if there is a folder."""
+    return walk_flat(*task, logs=logs)
+
+
+def _show(
+    tasks: Sequence[_Task], on_step: OnStep, view: SimulationView, logs: Path | None
+) -> Iterator[Walk]:
+    """All walks on a page, one after the other."""
+    names = {each.name.lower(): called(each) for each in MANEUVERS}
+    for done, (config, name, gait, maneuver) in enumerate(tasks, start=1):
+
+        def watch(world: World, frame: AntennaFrame, maneuver: Maneuver = maneuver) -> None:
+            view.tick(world.model, world.data, frame, maneuver=int(maneuver))
+
+        view.begin(names.get(name, name.replace("_", " ")))
+        yield walk_flat(config, name, gait, maneuver, watch, logs)
+        on_step(done, len(tasks))
+
+
+def run(
+    config: GaitStudyConfig,
+    workers: int | Workers = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+    view: SimulationView | None = None,
+    logs: Path | None = None,
+) -> GaitOutcome:
+    """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
+
+    With a view they run in this process, one after the other, and give the same. The log of each
+    goes to a folder if one is given.
+
+    Raises:
+        ConfigError: A draw of the unknown numbers makes no robot or gait.
+        LogError: A log cannot be written.
+        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
+    """
+    tasks = _tasks(config)
+    if view is None:
+        walks = gather(_walk, [(task, logs) for task in tasks], workers, on_step)
+    else:
+        walks = list(_show(tasks, on_step, view, logs))
+    by_name = {walk.name: walk for walk in walks}
+    return GaitOutcome(
+        config=config,
+        maneuvers={m.name.lower(): by_name[m.name.lower()] for m in MANEUVERS},
+        wave_off=by_name[WAVE_OFF],
+        sweep=[by_name[f"sweep{i}"] for i in range(config.sweep_points)],
+        drawn=[by_name[f"draw{i}"] for i in range(config.draws) if config.unknown],
+        ends={
+            one.name: (by_name[f"{one.name}:low"], by_name[f"{one.name}:high"])
+            for one in config.unknowns
+        },
+    )
+
 
 MANEUVER = (
     Measure("speed_m_s", "speed", "m/s", form="+.3f"),
@@ -33,15 +259,21 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"gives {100 * cost['chosen_over_best']:.0f} % of its speed;\n"
         f"the slowest one gives {100 * cost['worst_over_best']:.0f} %.",
     )
-    return (maneuvers, *_unknown(result))
+    return (maneuvers, *_unknown_tables(result))
 
 
-def _unknown(result: Mapping[str, Any]) -> Sequence[Table]:
+def _unknown_tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """FORWARD with each unknown number at both ends of its range, and with all of them drawn."""
     if (unknown := result["unknown"]) is None:
         return ()
     rows = [
-        (name, [*(f"{end:g}" for end in row["range"]), *_numbers(row["body_lengths_per_cycle"])])
+        (
+            name,
+            [
+                *(f"{end:g}" for end in row["range"]),
+                *(f"{end:.2f}" for end in row["body_lengths_per_cycle"]),
+            ],
+        )
         for name, row in unknown["parameters"].items()
     ]
     one = Table(
@@ -57,16 +289,9 @@ def _unknown(result: Mapping[str, Any]) -> Sequence[Table]:
     ]
     if (measured := result["measured_body_lengths_per_cycle"]) is not None:
         every += [("measured on a robot", [f"{measured:.2f}"])]
-        every += [("draws below that", [f"{_below(unknown, measured)} of {unknown['draws']}"])]
+        below = sum(value < measured for value in unknown["body_lengths_per_cycle"])
+        every += [("draws below that", [f"{below} of {unknown['draws']}"])]
     return one, Table("All of them drawn", ("body lengths a cycle",), every)
-
-
-def _numbers(values: Sequence[float]) -> list[str]:
-    return [f"{value:.2f}" for value in values]
-
-
-def _below(unknown: Mapping[str, Any], measured: float) -> int:
-    return sum(value < measured for value in unknown["body_lengths_per_cycle"])
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -90,23 +315,43 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-CAPTIONS = {
-    "gait": "The sweep over the lead of the body wave, and the maneuvers from above.",
-    "unknown": "FORWARD over all draws of the unknown numbers, and over each of them alone.",
-}
+def films(config: GaitStudyConfig, trial: int) -> dict[str, Callable[[], Film]]:
+    """A film of each maneuver; walks have no chance, so that `trial` says nothing."""
+    return {m.name.lower(): partial(_record, config, m) for m in MANEUVERS}
+
+
+def _record(config: GaitStudyConfig, maneuver: Maneuver) -> Film:
+    """Walk one maneuver and record it.
+
+    Raises:
+        SimulationError: The physics became invalid.
+    """
+    from antennate.telemetry import film  # slow to import
+
+    recorder = film.WalkRecorder(config.robot, width=2.2)
+
+    def watch(world: World, frame: AntennaFrame) -> None:
+        recorder.see(world, world.t, counts=frame.counts[0], centre=world.links().mean(axis=0))
+
+    walk_flat(config, maneuver.name.lower(), config.gait, maneuver, watch)
+    way = recorder.values("centre") - recorder.values("centre")[0]
+    return recorder.walk(
+        maneuver.name,
+        [film.trace("way of the middle: x, y [m]", way)],
+        [film.maneuver_band(np.full(len(recorder), int(maneuver)))],
+    )
+
 
 EXPERIMENT = Experiment.of_folder(
-    __name__,
-    gait.GaitStudyConfig,
-    lambda config, workers, on_step, _: gait.run(config, workers, on_step),
-    tables,
-    sentence,
-    check=gait.check,
-    filmed=True,
+    *(__name__, GaitStudyConfig, run, tables, sentence),
+    check=check,
+    films=films,
     parts="walks",
-    logged=lambda config, workers, on_step, _, logs: gait.run(config, workers, on_step, logs=logs),
-    logs=gait.log_names,
-    viewed=lambda config, on_step, _, view, logs: gait.run(config, 1, on_step, view, logs),
-    captions=CAPTIONS,
+    logs=log_names,
+    shown=True,
+    captions={
+        "gait": "The sweep over the lead of the body wave, and the maneuvers from above.",
+        "unknown": "FORWARD over all draws of the unknown numbers, and over each of them alone.",
+    },
     explained="docs/results.md",
 )

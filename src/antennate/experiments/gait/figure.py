@@ -11,16 +11,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.gait.pace import Walk
-from antennate.experiments.gait.run import GaitOutcome
+from antennate.experiments.gait.experiment import GaitOutcome
+from antennate.experiments.gait.physics import Walk
 from antennate.types import Maneuver
 
 
 def figures(outcome: GaitOutcome) -> dict[str, Figure]:
     """The figures of a run."""
     result = outcome.result()
-    found = {"gait": study(result, outcome.maneuvers)}
-    return found if result["unknown"] is None else found | {"unknown": unknown(result)}
+    drawn = {"gait": study(result, outcome.maneuvers)}
+    return drawn if result["unknown"] is None else drawn | {"unknown": unknown(result)}
 
 
 @style.styled
@@ -106,12 +106,14 @@ def unknown(result: Mapping[str, Any]) -> Figure:
 
 
 def _draw_draws(panel: Axes, result: Mapping[str, Any]) -> None:
-    found = result["unknown"]
-    panel.hist(found["body_lengths_per_cycle"], bins=20, color=style.SERIES[5], label="draws")
-    low, high = found["interval95"]
+    unknown_numbers = result["unknown"]
+    panel.hist(
+        unknown_numbers["body_lengths_per_cycle"], bins=20, color=style.SERIES[5], label="draws"
+    )
+    low, high = unknown_numbers["interval95"]
     panel.axvspan(low, high, color=style.FAINT, alpha=0.5, zorder=0, label="95 % of them")
     panel.set_ylim(0, 1.5 * panel.get_ylim()[1])
-    panel.set(ylabel="draws", title=f"{found['draws']} draws of all unknown numbers")
+    panel.set(ylabel="draws", title=f"{unknown_numbers['draws']} draws of all unknown numbers")
 
 
 def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:

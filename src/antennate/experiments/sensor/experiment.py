@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from antennate import figures as style
 from antennate.antenna import sensor
 from antennate.errors import ConfigError
 from antennate.params.base import Params, number
@@ -16,6 +17,10 @@ from antennate.robots.antenna import SensorParams
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Measure, Table
 from antennate.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 E24 = (
     *(1.0, 1.1, 1.2, 1.3, 1.5, 1.6, 1.8, 2.0, 2.2, 2.4, 2.7, 3.0),
@@ -145,7 +150,8 @@ def _hold(config: SensorConfig) -> Floats:
     return np.array(rows)
 
 
-SHOWN_ROWS = 10
+_ROWS = 10
+"""Most lines of the table."""
 CURVE = (
     Measure("resistance_ohm", "R", "kOhm", scale=1e-3),
     Measure("voltage_v", "V", form=".3f"),
@@ -156,7 +162,7 @@ CURVE = (
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """The static curve, and what disturbs it."""
     rows = result["curve"]
-    step = -(-(len(rows) - 1) // (SHOWN_ROWS - 1))
+    step = -(-(len(rows) - 1) // (_ROWS - 1))
     way = "rise" if result["polarity"] > 0 else "fall"
     clipped = "\nThe range is clipped by the converter." if result["clipped"] else ""
     curve = Table(
@@ -182,18 +188,67 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-CAPTIONS = {
-    "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "
-    "and the choice of the divider.",
-}
+@style.styled
+def figures(outcome: SensorOutcome) -> dict[str, Figure]:
+    """Three panels of one sensor."""
+    figure, result = style.canvas(style.WIDTH, 8.7), outcome.result()
+    curve, held, choice = figure.subplots(3, 1)
+    _draw_curve(curve, result, outcome.loop)
+    _draw_hold(held, outcome.hold)
+    _draw_choice(choice, result, outcome.resistors, outcome.spread)
+    return {"sensor": figure}
+
+
+def _draw_curve(panel: Axes, result: Mapping[str, Any], loop: Floats) -> None:
+    first, second, _ = style.series(3)
+    rows = result["curve"]
+    panel.plot(np.degrees(loop[:, 0]), loop[:, 1], color=second, label="loop")
+    panel.plot(
+        [row["flex_deg"] for row in rows],
+        [row["counts"] for row in rows],
+        color=first,
+        linestyle=(0, (4, 1.5)),
+        label="static",
+    )
+    panel.set(xlabel="flex [deg]", ylabel="reading [counts]", title="Static curve and loop")
+    panel.legend()
+
+
+def _draw_hold(panel: Axes, hold: Floats) -> None:
+    panel.plot(hold[:, 0], hold[:, 1], color=style.FAINT, linewidth=0.6, label="with noise")
+    panel.plot(hold[:, 0], hold[:, 2], color=style.series(3)[0], label="without")
+    panel.set(xlabel="time [s]", ylabel="reading [counts]", title="Bend held from 0 s on")
+    panel.legend()
+
+
+def _draw_choice(panel: Axes, result: Mapping[str, Any], resistors: Floats, spread: Floats) -> None:
+    panel.plot(1e-3 * resistors, spread, color=style.series(3)[0])
+    for key, marker, label in (
+        ("divider_ohm", "s", "in use"),
+        ("best_divider_ohm", "D", "best of E24"),
+    ):
+        ohm = result[key]
+        panel.plot(
+            1e-3 * ohm,
+            np.interp(ohm, resistors, spread),
+            color=style.INK,
+            marker=marker,
+            linestyle="",
+            label=f"{label}: {1e-3 * ohm:g} kOhm",
+        )
+    panel.set_xscale("log")
+    panel.set(xlabel="fixed resistor [kOhm]", ylabel="spread of readings [counts]", title="Divider")
+    panel.set_ylim(0, 1.35 * float(spread.max()))
+    panel.legend(loc="upper right")
+
 
 EXPERIMENT = Experiment.of_folder(
-    __name__,
-    SensorConfig,
-    lambda config, *_: run(config),
-    tables,
-    sentence,
-    captions=CAPTIONS,
+    *(__name__, SensorConfig, lambda config, *_: run(config), tables, sentence),
+    figures=figures,
+    captions={
+        "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "
+        "and the choice of the divider.",
+    },
     explained="docs/results.md",
     on_workers=False,
 )

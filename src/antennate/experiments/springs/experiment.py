@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from antennate import figures as style
 from antennate.antenna import springs
 from antennate.antenna.springs import Winding
 from antennate.errors import ConfigError
@@ -14,6 +17,10 @@ from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Measure, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PAPER_TABLE = {3.0: 0.274, 6.0: 0.137, 9.0: 0.091}
 """Stiffness by active coils as printed in the paper [N·mm/deg]."""
@@ -35,7 +42,6 @@ class SpringsOutcome(Outcome):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         config = self.config
-        wire, coil = 1e-3 * config.wire_mm, 1e-3 * config.coil_mm
         return {
             "schema": 1,
             "command": "springs",
@@ -43,26 +49,26 @@ class SpringsOutcome(Outcome):
             "modulus_pa": springs.modulus_of(config),
             "wire_mm": config.wire_mm,
             "coil_mm": config.coil_mm,
-            "spring_index": coil / wire,
-            "springs": [_spring(config, wire, coil, coils) for coils in config.active_coils],
+            "spring_index": (1e-3 * config.coil_mm) / (1e-3 * config.wire_mm),
+            "springs": [self._spring(coils) for coils in config.active_coils],
             "wanted_n_mm_per_deg": list(config.wanted_n_mm_per_deg),
             "windings": [_winding(winding) for winding in self.windings],
         }
 
-
-def _spring(config: SpringParams, wire: float, coil: float, coils: float) -> dict[str, Any]:
-    k = springs.spring_stiffness(springs.modulus_of(config), wire, coil, coils)
-    yields = springs.yield_angle(config, wire, coil, coils)
-    printed = PAPER_TABLE.get(coils)
-    return {
-        "active_coils": coils,
-        "stiffness_n_mm_per_deg": k / N_MM_PER_DEG,
-        "stiffness_n_m_per_rad": k,
-        "paper_n_mm_per_deg": printed,
-        "paper_exact_n_mm_per_deg": None if printed is None else 3 * PAPER_TABLE[3.0] / coils,
-        "torque_at_angle_n_mm": 1e3 * k * math.radians(config.angle_deg),
-        "yield_angle_deg": math.degrees(yields),
-    }
+    def _spring(self, coils: float) -> dict[str, Any]:
+        config = self.config
+        wire, coil = 1e-3 * config.wire_mm, 1e-3 * config.coil_mm
+        k = springs.spring_stiffness(springs.modulus_of(config), wire, coil, coils)
+        printed = PAPER_TABLE.get(coils)
+        return {
+            "active_coils": coils,
+            "stiffness_n_mm_per_deg": k / N_MM_PER_DEG,
+            "stiffness_n_m_per_rad": k,
+            "paper_n_mm_per_deg": printed,
+            "paper_exact_n_mm_per_deg": None if printed is None else 3 * PAPER_TABLE[3.0] / coils,
+            "torque_at_angle_n_mm": 1e3 * k * math.radians(config.angle_deg),
+            "yield_angle_deg": math.degrees(springs.yield_angle(config, wire, coil, coils)),
+        }
 
 
 def _winding(winding: Winding) -> dict[str, Any]:
@@ -100,7 +106,8 @@ def run(config: SpringParams) -> SpringsOutcome:
     return SpringsOutcome(config, springs.windings(config, wanted))
 
 
-SHOWN_WINDINGS = 6
+_TABLED, _DRAWN = 6, 5
+"""Sets of springs in the table, and in the figure."""
 
 SPRING = (
     Measure("stiffness_n_mm_per_deg", "stiffness", "N·mm/deg", form=".4f"),
@@ -136,7 +143,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
                 **row,
                 "coils": " ".join(f"{n:g}" for n in row["active_coils"]),
             }
-            for row in result["windings"][:SHOWN_WINDINGS]
+            for row in result["windings"][:_TABLED]
         },
         WINDING if result["windings"] else (),
         "The best mandrel of each stock wire, nearest first.\n" if result["windings"] else "",
@@ -171,18 +178,71 @@ def sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-CAPTIONS = {
-    "springs": "Torque of each spring up to its yield, and the errors of what could "
-    "be wound in its place.",
-}
+@style.styled
+def figures(outcome: SpringsOutcome) -> dict[str, Figure]:
+    """Torque of each spring up to its yield, and the errors of what could be wound instead."""
+    figure, result = style.canvas(style.WIDTH, 7.4), outcome.result()
+    torque, wound = figure.subplots(2, 1)
+    _draw_torque(torque, result)
+    _draw_windings(wound, result)
+    return {"springs": figure}
+
+
+def _draw_torque(panel: Axes, result: Mapping[str, Any]) -> None:
+    rows = result["springs"]
+    end = 1.15 * min(360.0, max(row["yield_angle_deg"] for row in rows))
+    for row, colour in zip(rows, style.series(len(rows)), strict=True):
+        k, limit = row["stiffness_n_mm_per_deg"], row["yield_angle_deg"]
+        angle = np.array([0.0, min(limit, end)])
+        panel.plot(angle, k * angle, color=colour, label=f"{row['active_coils']:g} coils, {k:.3f}")
+        if limit <= end:
+            panel.plot(limit, k * limit, color=colour, marker="x", markersize=7)
+    panel.set(
+        xlabel="angle [deg]",
+        ylabel="torque [N·mm]",
+        title=f"{result['wire']}, wire {result['wire_mm']:g} mm, \ncoil {result['coil_mm']:g} mm; "
+        "× yields",
+    )
+    panel.set_xlim(0, end)
+    panel.set_ylim(0)
+    panel.legend(title="stiffness [N·mm/deg]", loc="lower right")
+
+
+def _draw_windings(panel: Axes, result: Mapping[str, Any]) -> None:
+    wanted = np.array(result["wanted_n_mm_per_deg"])
+    shown = result["windings"][:_DRAWN]
+    places = np.arange(len(wanted))
+    for i, (row, colour) in enumerate(zip(shown, style.series(len(shown)), strict=True)):
+        error = 100 * (np.array(row["stiffness_n_mm_per_deg"]) / wanted - 1)
+        panel.plot(
+            places + 0.08 * (i - (len(shown) - 1) / 2),
+            error,
+            color=colour,
+            marker="o",
+            linestyle="",
+            label=f"wire {row['wire_mm']:.2f}, mandrel {row['mandrel_mm']:.1f} mm",
+        )
+    panel.axhline(0.0, color=style.MUTED, linewidth=0.8)
+    panel.set_xticks(places, [f"{k:g}" for k in wanted])
+    panel.set(
+        xlabel="wanted stiffness [N·mm/deg]",
+        ylabel="error of what can be wound [%]",
+        title="Nearest sets from stock wire",
+    )
+    panel.set_xlim(-0.5, len(wanted) - 0.5)
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high + 0.75 * (high - low))
+    if shown:
+        panel.legend(loc="upper left", fontsize=8)
+
 
 EXPERIMENT = Experiment.of_folder(
-    __name__,
-    SpringParams,
-    lambda config, *_: run(config),
-    tables,
-    sentence,
-    captions=CAPTIONS,
+    *(__name__, SpringParams, lambda config, *_: run(config), tables, sentence),
+    figures=figures,
+    captions={
+        "springs": "Torque of each spring up to its yield, and the errors of what could "
+        "be wound in its place.",
+    },
     explained="docs/results.md",
     on_workers=False,
 )

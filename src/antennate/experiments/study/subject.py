@@ -21,9 +21,9 @@ from antennate.lookup import Registry
 from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
-from antennate.studies.codec import dumped
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
+from antennate.studies.formats import dumped
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
 
@@ -222,7 +222,7 @@ class _ExperimentSubject:
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
         """The same on a GPU or another device of Warp."""
-        if self._trials is None or self._trials.run_on_device is None:
+        if self._trials is None or self._trials.batch is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.sweep.run import SweepOutcome
+from antennate.experiments.sweep.experiment import SweepOutcome
 
 _CUE_MARKS = {
     "flex_and_base": ("o", "#332288"),
@@ -99,19 +99,19 @@ def _draw_map(panel: Axes, cells: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _draw_errors(panel: Axes, estimates: Mapping[str, Any], quantity: str) -> None:
-    found = [by_noise["noisy"][quantity] for by_noise in estimates.values()]
+    by_condition = [by_noise["noisy"][quantity] for by_noise in estimates.values()]
     for k, (cue, (marker, colour)) in enumerate(_CUE_MARKS.items()):
         style.intervals(
             panel,
-            [i + 0.13 * (k - 2) for i in range(len(found))],
-            [cues.get(cue, {}) for cues in found],
+            [i + 0.13 * (k - 2) for i in range(len(by_condition))],
+            [cues.get(cue, {}) for cues in by_condition],
             ("mape_percent", "mape_95"),
-            min((cues[cue]["n"] for cues in found if cue in cues), default=0),
+            min((cues[cue]["n"] for cues in by_condition if cue in cues), default=0),
             marker=marker,
             color=colour,
             label=_CUE_NAMES[cue],
         )
-    numbers = [max((row["n"] for row in cues.values()), default=0) for cues in found]
+    numbers = [max((row["n"] for row in cues.values()), default=0) for cues in by_condition]
     labels = [f"{name}\nn = {n}" for name, n in zip(estimates, numbers, strict=True)]
     style.categories(panel, labels)
     panel.set_yscale("log")

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from antennate import figures as style
 from antennate.antenna import springs
 from antennate.csv_files import column, csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
@@ -18,6 +19,10 @@ from antennate.params.spring import TaperParams
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.measures import Table, shown
 from antennate.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLUMN = "diameter_mm"
 """Column of a file of measured diameters, base first."""
@@ -116,10 +121,12 @@ def read_diameters(path: Path) -> Floats:
     """
     rows = csv_rows(path, read_limited(path, _LARGEST_FILE), [COLUMN], BadInputError)
     place = column(next(rows)[1], COLUMN) or 0
-    found = [_diameter(path, line, "".join(cells[place : place + 1])) for line, cells in rows]
-    if len(found) < 2:
-        raise BadInputError(f"{path}: expected at least 2 rows of diameters, found {len(found)}")
-    return 1e-3 * np.array(found)
+    diameters = [_diameter(path, line, "".join(cells[place : place + 1])) for line, cells in rows]
+    if len(diameters) < 2:
+        raise BadInputError(
+            f"{path}: expected at least 2 rows of diameters, found {len(diameters)}"
+        )
+    return 1e-3 * np.array(diameters)
 
 
 def _diameter(path: Path, line: int, cell: str) -> float:
@@ -132,23 +139,26 @@ def _diameter(path: Path, line: int, cell: str) -> float:
     return value
 
 
-SHOWN_SEGMENTS = 20
-COLUMNS = {"d [mm]": "diameter_mm", "I [mm⁴]": "second_moment_mm4", "proxy": "proxy"}
+_SEGMENTS = 20
+"""Most lines of the table."""
+_COLUMNS = {"d [mm]": "diameter_mm", "I [mm⁴]": "second_moment_mm4", "proxy": "proxy"}
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     """Segments of the animal, and ladders of springs."""
     rows = result["segments"]
-    step = -(-len(rows) // SHOWN_SEGMENTS)
+    step = -(-len(rows) // _SEGMENTS)
     animal = [
-        (f"segment {i + 1}", [shown(row[key], ".3g") for key in COLUMNS.values()])
+        (f"segment {i + 1}", [shown(row[key], ".3g") for key in _COLUMNS.values()])
         for i, row in enumerate(rows)
         if i % step == 0
     ]
     ladder, suggested = result["ladder"], result["suggested"]
     springs = zip(result["stretches"], ladder["proxy"], suggested["proxy"], strict=True)
     return (
-        Table("Animal", list(COLUMNS), animal, f"Base over tip {result['base_over_tip']:.0f} : 1."),
+        Table(
+            "Animal", list(_COLUMNS), animal, f"Base over tip {result['base_over_tip']:.0f} : 1."
+        ),
         Table(
             "One spring a stretch, over the first",
             ("animal", "ladder", "suggested"),
@@ -174,17 +184,54 @@ def _coils(row: Mapping[str, Any]) -> str:
     return "-".join(f"{n:g}" for n in row["active_coils"])
 
 
-CAPTIONS = {
-    "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",
-}
+_ANIMAL, _STRETCHES = style.INK, style.MUTED
+_LADDER, _SUGGESTED = style.PROFILE_LOOKS["descending"][0], "#56B4E9"
+"""The ladder is that of the descending profile, unless told otherwise; no profile has the other."""
+
+
+@style.styled
+def figures(outcome: TaperOutcome) -> dict[str, Figure]:
+    """The proxy of the animal, its stretches, the ladder, and the ladder that follows it best."""
+    figure, result = style.canvas(style.WIDTH, 3.8), outcome.result()
+    panel = figure.subplots()
+    segments = np.array([row["proxy"] for row in result["segments"]])
+    places = (np.arange(len(segments)) + 0.5) / len(segments)
+    panel.plot(
+        places,
+        segments,
+        color=_ANIMAL,
+        marker="o",
+        markersize=4,
+        label=f"animal, {len(segments)} segments: {result['base_over_tip']:.0f} : 1",
+    )
+    _steps(panel, result["stretches"], _STRETCHES, (0, (2, 1.5)), "animal, one stretch a spring")
+    for name, colour in (("ladder", _LADDER), ("suggested", _SUGGESTED)):
+        row = result[name]
+        label = f"{name} {_coils(row)}: {row['base_over_tip']:.3g} : 1"
+        _steps(panel, row["proxy"], colour, "solid", label)
+    panel.set_yscale("log")
+    panel.set(
+        xlim=(0, 1),
+        xlabel="place along the antenna, base to tip",
+        ylabel="stiffness over that of the base",
+    )
+    panel.legend(loc="lower left", fontsize=8)
+    return {"taper": figure}
+
+
+def _steps(panel: Axes, values: list[float], colour: Any, line: Any, label: str) -> None:
+    edges = np.linspace(0.0, 1.0, len(values) + 1)
+    look = {"color": colour, "linestyle": line, "linewidth": 1.8}
+    above = 3 if line != "solid" else 2  # dashes show a line below them
+    panel.stairs(values, edges, baseline=None, label=label, zorder=above, **look)
+
 
 EXPERIMENT = Experiment.of_folder(
-    __name__,
-    TaperConfig,
-    lambda config, *_: run(config),
-    tables,
-    sentence,
-    captions=CAPTIONS,
+    *(__name__, TaperConfig, lambda config, *_: run(config), tables, sentence),
+    figures=figures,
+    captions={
+        "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",
+    },
     explained="docs/results.md",
     on_workers=False,
 )

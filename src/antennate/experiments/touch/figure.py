@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.touch.experiment import F1, ONSET, RELEASE
-from antennate.experiments.touch.run import TouchOutcome
+from antennate.experiments.touch.experiment import F1, ONSET, RELEASE, TouchOutcome
+from antennate.experiments.touch.physics import Traverse
 from antennate.experiments.touch.sensing import Comparison
-from antennate.experiments.touch.traverse import Traverse
 from antennate.params.control import RuleParams
 
 _TRUE, _SENSED = style.SERIES[5], style.INK
@@ -48,11 +47,11 @@ def measures(result: Mapping[str, Any]) -> Figure:
         panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
     for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
         key = measure.name.partition(".")[0]
-        found = [row[key] for row in speeds]
+        latencies_by_speed = [row[key] for row in speeds]
         median = ("median_ms", "median_95_ms")
-        _draw(panel, speeds, "speed_m_s", found, median, trials=result["trials"])
-        _draw(panel, speeds, "speed_m_s", found, ("p90_ms", ""), **_BAR)
-        low, high = (end(row["n"] for row in found) for end in (min, max))
+        _draw(panel, speeds, "speed_m_s", latencies_by_speed, median, trials=result["trials"])
+        _draw(panel, speeds, "speed_m_s", latencies_by_speed, ("p90_ms", ""), **_BAR)
+        low, high = (end(row["n"] for row in latencies_by_speed) for end in (min, max))
         note = style.interval_note("95 %", result["trials"])
         panel.set_title(f"Median, {note}, 90th percentile (bar),\nn = {low} to {high} contacts")
         panel.set_ylabel(measure.title)
@@ -66,7 +65,7 @@ def _draw(
     panel: Axes,
     cells: Sequence[Mapping[str, Any]],
     part: str,
-    found: Sequence[Mapping[str, Any]],
+    rows: Sequence[Mapping[str, Any]],
     keys: style.Keys,
     trials: int = 0,
     **look: Any,
@@ -81,8 +80,8 @@ def _draw(
         mine = [k for k, cell in enumerate(cells) if cell["profile"] == name]
         x = [values.index(cells[k][part]) + aside for k in mine]
         own_look = look or {"marker": own, "label": name}
-        here = [found[k] for k in mine]
-        style.intervals(panel, x, here, keys, trials, color=colour, **own_look)
+        drawn = [rows[k] for k in mine]
+        style.intervals(panel, x, drawn, keys, trials, color=colour, **own_look)
     style.categories(panel, [f"{v:g}" if isinstance(v, float) else v for v in values])
     panel.set_xlabel("speed of the traverse [m/s]" if part == "speed_m_s" else "wall")
 
@@ -94,8 +93,8 @@ def curves(result: Mapping[str, Any]) -> Figure:
     roc, over = figure.subplots(2, 1, height_ratios=(1.25, 1))
     roc.plot([0, 100], [0, 100], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
     roc.annotate("chance", (60, 60), (63, 55), color=style.MUTED, rotation=38, fontsize=8)
-    for name, found in result["roc"].items():
-        _draw_curve(roc, over, result, name, found)
+    for name, curve in result["roc"].items():
+        _draw_curve(roc, over, result, name, curve)
     theta = result["threshold"]
     over.axvline(theta, color=style.MUTED, linewidth=1.0, linestyle=(0, (4, 2)))
     over.annotate(f"default {theta:g}", (theta, 0.03), (4, 0), textcoords="offset points")
@@ -124,10 +123,10 @@ def curves(result: Mapping[str, Any]) -> Figure:
 
 
 def _draw_curve(
-    roc: Axes, over: Axes, result: Mapping[str, Any], name: str, found: Mapping[str, Any]
+    roc: Axes, over: Axes, result: Mapping[str, Any], name: str, curve: Mapping[str, Any]
 ) -> None:
     colour, marker, line = style.PROFILE_LOOKS[name]
-    points = [p for p in found["curve"] if None not in p.values()]
+    points = [p for p in curve["curve"] if None not in p.values()]
     if not points:
         return
     area = result["profiles"][name]
@@ -135,29 +134,29 @@ def _draw_curve(
     right = [100 * p["true_positive_rate"] for p in points]
     label = f"{name}: area {area['auc']:.3f}, of flex itself {area['auc_flex']:.3f}"
     roc.plot([100, *wrong, 0], [100, *right, 0], color=colour, linestyle=line, label=label)
-    own = found["default"]
+    own = curve["default"]
     at = (100 * own["false_positive_rate"], 100 * own["true_positive_rate"])
     roc.plot(*at, color=colour, marker=marker, markersize=6, linestyle="", zorder=4)
     over.plot([p["theta"] for p in points], [p["f1"] for p in points], color=colour, linestyle=line)
-    best = found["best_f1"]
+    best = curve["best_f1"]
     over.plot(
         best["theta"], best["f1"], color=colour, marker="o", markersize=8, markerfacecolor="white"
     )
 
 
 @style.styled
-def trace(one: Traverse, found: Comparison) -> Figure:
+def trace(traverse: Traverse, sensed: Comparison) -> Figure:
     """One traverse: the wall with shapes of the antenna, flex, b, and contact against truth."""
     figure = style.canvas(style.WIDTH, 7.2)
     plan, flex, level, state = figure.subplots(4, 1, height_ratios=(2.0, 1.2, 1.2, 0.7))
-    config = one.plan.config
-    t = np.arange(len(one.flex)) / config.antenna.sensor.rate
-    _draw_plan(plan, one)
-    flex.plot(t, one.flex, color=style.INK, linewidth=1.3)
+    config = traverse.plan.config
+    t = np.arange(len(traverse.flex)) / config.antenna.sensor.rate
+    _draw_plan(plan, traverse)
+    flex.plot(t, traverse.flex, color=style.INK, linewidth=1.3)
     flex.set_ylabel("flex [rad]")
-    level.plot(t, 1.0 / (1.0 + np.exp(-found.level)), color=style.INK, linewidth=1.3)
+    level.plot(t, 1.0 / (1.0 + np.exp(-sensed.level)), color=style.INK, linewidth=1.3)
     _draw_bounds(level, config.rule)
-    for row, (states, colour) in enumerate(((found.alarm, _SENSED), (found.truth, _TRUE))):
+    for row, (states, colour) in enumerate(((sensed.alarm, _SENSED), (sensed.truth, _TRUE))):
         state.fill_between(t, row + 0.1, row + 0.9, where=states.tolist(), color=colour, step="mid")
     state.set(xlim=(t[0], t[-1]), ylim=(0, 2), xlabel="time [s]")
     state.set_yticks([0.5, 1.5], ["sensed", "true"])
@@ -167,7 +166,7 @@ def trace(one: Traverse, found: Comparison) -> Figure:
         panel.tick_params(labelbottom=False)
         panel.fill_between(
             *(t, 0, 1),
-            where=found.truth.tolist(),
+            where=sensed.truth.tolist(),
             color=_TRUE,
             alpha=0.15,
             transform=panel.get_xaxis_transform(),
@@ -193,14 +192,14 @@ def _draw_bounds(panel: Axes, rule: RuleParams) -> None:
     panel.set(ylim=(-0.05, 1.05), ylabel="b, 0 to 1")
 
 
-def _draw_plan(panel: Axes, one: Traverse) -> None:
-    plan = one.plan
+def _draw_plan(panel: Axes, traverse: Traverse) -> None:
+    plan = traverse.plan
     for line in plan.outline():
         if plan.wall == "boulders":
             panel.plot(*line.T, color=style.MUTED, marker="o", markersize=3, linestyle="")
         else:
             panel.plot(*line.T, color=style.MUTED, linewidth=2.2)
-    shown = one.joints[np.linspace(0, len(one.joints) - 1, _SHAPES).astype(int)]
+    shown = traverse.joints[np.linspace(0, len(traverse.joints) - 1, _SHAPES).astype(int)]
     colour = style.PROFILE_LOOKS[plan.profile][0]
     panel.add_collection(LineCollection(list(shown), colors=colour, linewidths=1.3))
     panel.plot(*shown[:, 0].T, color=style.INK, marker="o", markersize=3, linestyle="")

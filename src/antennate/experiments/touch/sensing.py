@@ -13,9 +13,8 @@ import numpy as np
 
 from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import ContactState, RunningMean, bending_level
-from antennate.experiments import reading
-from antennate.experiments.touch.config import TouchConfig
-from antennate.experiments.touch.traverse import Traverse
+from antennate.experiments.bench import recorded
+from antennate.experiments.touch.physics import TouchConfig, Traverse
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.types import Bools, Contact, Floats, Ints
 
@@ -29,8 +28,8 @@ def runs(state: Bools) -> Ints:
 def merged(state: Bools, shortest: int) -> Bools:
     """The state with every gap between two runs filled that is shorter than `shortest` ticks."""
     filled = state.copy()
-    found = runs(state)
-    for end, begin in zip(found[:-1, 1], found[1:, 0], strict=True):
+    edges = runs(state)
+    for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True):
         if begin - end < shortest:
             filled[end:begin] = True
     return filled
@@ -70,9 +69,9 @@ def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
     over = (alarms[None, :, 0] < contacts[:, None, 1] + grace) & (
         alarms[None, :, 1] > contacts[:, None, 0]
     )
-    found, answering = np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0))
+    answered, answering = np.asarray(over.any(axis=1)), np.asarray(over.any(axis=0))
     onset, release, carried = [], [], 0
-    for i in np.flatnonzero(found):
+    for i in np.flatnonzero(answered):
         begin, end = contacts[i]
         answers = alarms[over[i]]
         if answers[0, 0] < begin:
@@ -84,7 +83,7 @@ def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
         if not onwards and end < len(truth) and last < len(truth):
             release.append(last - end)
     return Matches(
-        *(contacts, found, carried, len(alarms), int((~answering).sum())),
+        *(contacts, answered, carried, len(alarms), int((~answering).sum())),
         onset=np.array(onset, dtype=np.int64),
         release=np.array(release, dtype=np.int64),
     )
@@ -149,14 +148,14 @@ def true_contact(config: TouchConfig, force: Floats) -> Bools:
 
 def compare(config: TouchConfig, traverses: Sequence[Traverse]) -> list[Comparison | None]:
     """Let the control read all traverses, those of one speed side by side; None if invalid."""
-    found: list[Comparison | None] = [None] * len(traverses)
+    comparisons: list[Comparison | None] = [None] * len(traverses)
     for speed in config.speeds:
         places = [i for i, t in enumerate(traverses) if t.plan.speed == speed and not t.reason]
         if places:
             batch = _compare_batch(config, [traverses[i] for i in places])
             for place, comparison in zip(places, batch, strict=True):
-                found[place] = comparison
-    return found
+                comparisons[place] = comparison
+    return comparisons
 
 
 def readings(config: TouchConfig, batch: Sequence[Traverse]) -> Floats:
@@ -166,7 +165,7 @@ def readings(config: TouchConfig, batch: Sequence[Traverse]) -> Floats:
         trial: reading_noise(sensor, np.random.default_rng([config.seed, trial, 1]), (ticks,))
         for trial in {t.plan.trial for t in batch}
     }
-    return reading.recorded(
+    return recorded(
         sensor,
         np.stack([t.flex for t in batch], axis=1),
         np.stack([noises[t.plan.trial] for t in batch], axis=1),
@@ -180,18 +179,18 @@ def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Compa
     safe = np.clip(level, 1e-15, 1.0 - 1e-15)
     logit = np.log(safe / (1.0 - safe))
     grace = round(config.conditioning.averaging_time * sensor.rate)
-    found = []
-    for i, one in enumerate(batch):
-        truth, plan = true_contact(config, one.force), one.plan
-        found.append(
+    comparisons = []
+    for i, traverse in enumerate(batch):
+        truth, plan = true_contact(config, traverse.force), traverse.plan
+        comparisons.append(
             Comparison(
                 *(plan.wall, plan.speed, plan.profile, plan.trial),
-                metres=float(one.x[-1] - one.x[0]),
+                metres=float(traverse.x[-1] - traverse.x[0]),
                 truth=truth,
                 alarm=alarm[:, i],
                 level=logit[:, i],
-                flex=one.flex,
+                flex=traverse.flex,
                 matches=match(truth, alarm[:, i], grace),
             )
         )
-    return found
+    return comparisons

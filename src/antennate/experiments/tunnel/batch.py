@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Union
@@ -13,12 +14,12 @@ from antennate.control.loop import CheckedController, run_loop
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
-from antennate.experiments.tunnel.config import TunnelConfig
-from antennate.experiments.tunnel.monitor import (
+from antennate.experiments.tunnel.physics import (
     Outcome,
     TrialMonitor,
     TrialPath,
     TrialResult,
+    TunnelConfig,
 )
 from antennate.sim.knowledge import Truths, require_route
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene
@@ -92,14 +93,17 @@ def run_trials(
             read in trials that are run for it, so many at once.
         read: Takes what the robot of each trial reads, likewise.
     """
+    again = functools.partial(
+        *(run_trials, config, condition), emit=emit, logs=logs, make=make, bodies=bodies, read=read
+    )
     if parts_of(condition)[1] == YOKED and donors is None:
         for first in range(0, len(trials), batch):
             some = trials[first : first + batch]
-            found = _donors(config, parts_of(condition)[0], some, batch)
-            run_trials(config, condition, some, emit, batch, logs, watch, make, bodies, found)
+            counts = _donors(config, parts_of(condition)[0], some, batch)
+            again(some, batch=batch, watch=watch, donors=counts)
         return
-    made = (bodies or cpu_bodies(config))(min(batch, len(trials)))
     size = min(batch, len(trials))
+    made = (bodies or cpu_bodies(config))(size)
     rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read)
     try:
         rows.run(make)
@@ -112,17 +116,14 @@ def run_trials(
             return
         for trial in rows.unfinished:
             rows.log_of(trial).unlink(missing_ok=True)
-            run_trials(
-                *(config, condition, [trial], emit, 1, logs, None),
-                *(make, bodies, donors, read),
-            )
+            again([trial], batch=1, donors=donors)
 
 
 def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch: int) -> Donors:
     """What robots with their own readings read in the trials that follow these, by these."""
     following = {trial: config.following(trial) for trial in trials}
     read: Donors = {}
-    run_trials(config, controller, [*following.values()], lambda found: None, batch, read=read)
+    run_trials(config, controller, [*following.values()], lambda result: None, batch, read=read)
     return {trial: read[donor] for trial, donor in following.items() if donor in read}
 
 
@@ -137,9 +138,10 @@ def cpu_bodies(config: TunnelConfig) -> MakeBodies:
     return make
 
 
-def lost_row(key: tuple[int, int, str], config: TunnelConfig, reason: str) -> TrialResult:
-    """The row of a trial, named by seed, number and controller, of which there is nothing else."""
+def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> TrialResult:
+    """The row of a trial of which there is nothing else."""
     limit = config.time_limit or TIME_LIMIT
+    key = config.seed, trial, condition
     return TrialResult(*key, "invalid", limit, limit_s=limit, reason=reason)
 
 
@@ -231,8 +233,7 @@ class _Rows:
             try:
                 return self._begin(row, trial)
             except SceneError as error:
-                key = self._config.seed, trial, self._name
-                lost = lost_row(key, self._config, str(error))
+                lost = lost_row(self._config, self._name, trial, str(error))
                 self._emit((lost, None))
         return None
 

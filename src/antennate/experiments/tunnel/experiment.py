@@ -1,144 +1,209 @@
-"""The experiment `tunnel`."""
+"""The tunnel: does touch help? All controllers meet the same tunnels, starts and disturbances."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from itertools import combinations
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from antennate.control.readings import short_names
-from antennate.control.registry import RIVAL, about, compared
-from antennate.experiments.tunnel import measures
-from antennate.experiments.tunnel import run as tunnel
-from antennate.experiments.tunnel.batch import BATCH
-from antennate.experiments.tunnel.monitor import TrialResult
+from antennate.control.knowledge import Kind, given_to
+from antennate.control.readings import YOKED, parts_of, short_names
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials
+from antennate.experiments.tunnel.measures import (
+    COLUMNS,
+    limit_of,
+    none_valid,
+    paired,
+    sentence,
+    summary,
+    tables,
+)
+from antennate.experiments.tunnel.physics import TrialPath, TrialResult, TunnelConfig
+from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
-from antennate.studies.experiment import Experiment, Trials
-from antennate.studies.measures import Table, few, successes
+from antennate.sim.trial import check_start, draw_scene, scene_of
+from antennate.sim.world import World
+from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
+from antennate.studies.pool import Workers
 from antennate.telemetry.header import log_name
+from antennate.telemetry.view.simulation import SimulationView
+from antennate.types import AntennaFrame, Controller
 
-_JOINED = (
-    "Intervals of restricted times join Wilson's of the failures with Student's of the times:\n"
-    "they reach for failures that few trials do not meet."
+if TYPE_CHECKING:
+    from antennate.telemetry.film import Film
+
+
+@dataclass(frozen=True, slots=True)
+class TunnelOutcome:
+    """All rows in the order of controllers and trials, and what figures need of them."""
+
+    config: TunnelConfig
+    rows: list[TrialResult]
+    paths: dict[tuple[str, int], TrialPath]
+    interrupted: bool
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        config = self.config
+        shared = limit_of(self.rows, config.time_limit)
+        by_name = {
+            name: [row for row in self.rows if row.controller == name] for name in config.conditions
+        }
+        return {
+            "schema": 2,
+            "command": "tunnel",
+            "seed": config.seed,
+            "scene": config.scene,
+            "knows": list(config.knows),
+            "time_limit_s": shared,
+            "length_m": config.tunnel.length if config.scene == TUNNEL else None,
+            "interrupted": self.interrupted,
+            "controllers": {name: summary(rows, shared) for name, rows in by_name.items()},
+            "paired": paired(by_name, shared),
+        }
+
+
+def check(config: TunnelConfig) -> None:
+    """Find a bad scene or controller before anything is run.
+
+    Raises:
+        ConfigError: There is no such scene or controller, or it cannot be made.
+        SceneError: The scene cannot be built, or the robot does not fit at its start.
+    """
+    check_start(config)
+    given: dict[Kind, None] = {}
+    for name in config.controllers:
+        try:
+            made = make_controller(name, config.control, config.robot)
+        except ConfigError as error:
+            raise ConfigError(f"--controllers: {error}") from error
+        given |= dict.fromkeys(given_to(made, name, config.knows))
+    if given:
+        require_route(config.scene, draw_scene(config, scene_of(config), 0), list(given))
+
+
+def every(config: TunnelConfig) -> list[Trial]:
+    """All trials, condition by condition."""
+    return [(name, trial) for name in config.conditions for trial in range(config.trials)]
+
+
+def tasks(config: TunnelConfig) -> list[tuple[str, int, int]]:
+    """What each task is: its condition, its trial, and that whose readings it is given.
+
+    With more trials the one that was last is followed by another, so its yoked run is a new task.
+    """
+    return [
+        (name, trial, config.following(trial) if parts_of(name)[1] == YOKED else trial)
+        for name, trial in every(config)
+    ]
+
+
+def _on_warp(
+    config: TunnelConfig, condition: str, trials: Sequence[int], emit: Emit, device: str | None
+) -> None:
+    """Trials in batches on a GPU."""
+    from antennate.experiments.tunnel.warp import run_trials_on_warp
+
+    run_trials_on_warp(config, condition, trials, emit, device=device)
+
+
+def _check_batch(config: TunnelConfig, logs: Path | None) -> None:
+    if logs is not None:
+        raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
+    if YOKED in config.readings:
+        raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
+
+
+def _watched(view: SimulationView) -> dict[str, Any]:
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
+        return view.tick(world.model, world.data, frame, control)
+
+    return {"watch": watch, "make": view.controller}
+
+
+TRIALS = Trials[TunnelConfig](
+    *("controller", every, run_trials, TrialResult, lost_row, BATCH, _on_warp, _check_batch),
+    watched=_watched,
+    interruptible=True,
 )
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """The controllers one by one and two by two."""
-    controllers, pairs = result["controllers"], result["paired"]
-    limit = result["time_limit_s"]
-    one, two = measures.shown(limit)
-    until = "its limit, of each trial its own" if limit is None else f"the time limit, {limit:g} s"
-    short = short_names(controllers)
-    counts = sorted({row["trials"] for row in controllers.values()})
-    many = " to ".join(str(n) for n in dict.fromkeys([counts[0], counts[-1]]))
-    many += " trial" if many == "1" else " trials"
-    one_by_one = Table.of(
-        "Controllers",
-        {short[name]: row for name, row in controllers.items()},
-        one,
-        f"{many} a controller, seed {result['seed']}. A failure counts as {until}.\n"
-        f"Invalid trials do not count in the rows below "
-        f"`invalid`.{'' if few(_valid(result)) else f' {_JOINED}'}",
-        about(controllers),
-    )
-    shown_pairs = _shown_pairs(list(controllers))
-    all_shown = len(shown_pairs) == math.comb(len(controllers), 2)
-    hidden = "" if all_shown else f" Pairs without `{RIVAL}` are in result.json."
-    two_by_two = Table.of(
-        "Pairs, trial by trial",
-        {
-            f"{short[first]} minus {short[second]}": pairs[f"{first}-{second}"]
-            for first, second in shown_pairs
-            if f"{first}-{second}" in pairs
-        },
-        two,
-        "McNemar's test is exact; Wilcoxon's takes failures as the limit, and zeros by Pratt's "
-        f"ranks; both two-sided.{hidden}",
-    )
-    return (one_by_one, two_by_two) if pairs else (one_by_one,)
+def run(
+    config: TunnelConfig,
+    workers: int | Workers = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+    logs: Path | None = None,
+    view: SimulationView | None = None,
+) -> TunnelOutcome:
+    """Run all trials of all controllers, with the log of each in a folder if one is given.
+
+    With a view they run in this process, one after the other, and give the same.
+
+    Raises:
+        LogError: A log cannot be written.
+        SceneError: A scene cannot be built as described.
+        WorkerError: A worker process failed.
+    """
+    trials, interrupted = TRIALS.gather(config, workers, on_step, on_row, logs, view)
+    paths = {(row.controller, row.trial): path for row, path in trials if path is not None}
+    return TunnelOutcome(config, [row for row, _ in trials], paths, interrupted)
 
 
-def _shown_pairs(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Pairs that the table shows: of many, those with the rival; result.json holds all."""
-    pairs = list(combinations(names, 2))
-    with_rival = [pair for pair in pairs if RIVAL in pair]
-    return with_rival if len(names) > 3 and with_rival else pairs
+SPEED = 2.0
+"""Films are so many times faster than the robot."""
 
 
-def sentence(result: Mapping[str, Any]) -> str:
-    """Which controllers came through, and how sure it is."""
-    none_valid = _none_valid(result)
-    short = short_names(result["controllers"])
-    found = successes(
-        {short[n]: row for n, row in result["controllers"].items() if n not in none_valid}
-    )
-    so_few = few(_valid(result))
-    test = "" if so_few else _against_rival(result, short)
-    invalid = sum(row["invalid"] for row in result["controllers"].values())
-    why = f" Invalid trials: {invalid}; trials.csv gives the reason of each." if invalid else ""
-    scene = result["scene"]
-    what = "Tunnels crossed" if scene == TUNNEL else f"Trials that succeeded in {scene}"
-    if known := result.get("knows"):  # results of older versions have none
-        what += f", knowing {' and '.join(known)}"
-    text = f"{what} (95 % interval): {found}{test}." if found else ""
-    text += f" {so_few}" if found and so_few else ""
-    for name, reason in none_valid.items():
-        text += f" No trial of {name} is valid: {reason}."
-    return f"{text}{why}".strip()
-
-
-def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:
-    """The last controller against its rival, on the trials that are valid in both."""
-    names = compared(list(result["controllers"]))
-    if names is None:
-        return ""
-    first, rival = names
-    for key in (f"{rival}-{first}", f"{first}-{rival}"):
-        pair = result["paired"].get(key)
-        shares = result["time_limit_s"] is None
-        mean, of = ("share_difference", 100.0) if shares else ("time_difference_s", 1.0)
-        ends = pair and pair["share_difference_95" if shares else "time_difference_95"]
-        if ends is None:
-            continue
-        unit = "% of the limit" if shares else "s"
-        sign = of if key.startswith(f"{rival}-") else -of  # so that a gain of the first is positive
-        gain = sign * pair[mean]
-        ends = sorted((sign * end for end in ends), reverse=gain >= 0)
-        return (
-            f"; {short[first]} against {short[rival]}: {_faster(gain, unit)} (95 % interval: "
-            f"{_span(ends, unit)}; a failure counts as the limit), McNemar p "
-            f"{pair['mcnemar_p']:.2g}"
-        )
-    return ""
-
-
-def _span(ends: Sequence[float], unit: str) -> str:
-    """Gains of time from one end to the other, the larger of that sign first if both occur."""
-    if min(ends) < 0 < max(ends):
-        return f"{_faster(ends[0], unit)} to {_faster(ends[1], unit)}"
-    low, high = sorted(ends, key=abs)
-    return f"{abs(low):.1f} to {_faster(high, unit)}"
-
-
-def _faster(gain: float, unit: str) -> str:
-    """A gain of time in words."""
-    return f"{abs(gain):.1f} {unit} {'faster' if gain >= 0 else 'slower'}"
-
-
-def _valid(result: Mapping[str, Any]) -> list[int]:
-    """Valid trials of each controller."""
-    return [row["trials"] - row["invalid"] for row in result["controllers"].values()]
-
-
-def _none_valid(result: Mapping[str, Any]) -> dict[str, str]:
-    """Controllers of which every trial is invalid, and why the first one is."""
+def films(config: TunnelConfig, trial: int) -> dict[str, Callable[[], Film]]:
+    """A film of each controller."""
     return {
-        name: row["first_reason"]
-        for name, row in result["controllers"].items()
-        if row["trials"] and row["invalid"] == row["trials"]
+        label: partial(record, config, name, trial, label)
+        for name, label in short_names(config.conditions).items()
     }
+
+
+def record(
+    config: TunnelConfig, controller: str, trial: int, label: str, speed: float = SPEED
+) -> Film:
+    """Run one trial and record it.
+
+    Raises:
+        BadInputError: The controller failed at its first tick.
+    """
+    from antennate.telemetry.film import WalkRecorder  # slow to import
+
+    recorder, rows = WalkRecorder(config.robot, speed), list[TrialResult]()
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> tuple[()]:
+        recorder.see(
+            world,
+            world.t,
+            counts=frame.counts[0],
+            level=control.level[0],
+            contact=control.contact[0],
+            maneuver=control.maneuver[0],
+        )
+        return ()
+
+    run_trials(config, controller, [trial], lambda result: rows.append(result[0]), watch=watch)
+    title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
+    return recorder.decided(title, config.control.rule.threshold, ending(rows[0], config))
+
+
+def ending(row: TrialResult, config: TunnelConfig) -> str:
+    """A word on what came out, and when."""
+    there = "out" if config.scene == TUNNEL else "there"
+    words = {
+        "success": there,
+        "timeout": "stuck" if row.stuck > row.recovered else f"not {there}",
+        "left": "left the scene",
+        "invalid": "invalid",
+    }
+    return f"{words[row.outcome]} after {row.time_s:.3g} s"
 
 
 CAPTIONS = {
@@ -149,24 +214,15 @@ CAPTIONS = {
 }
 
 EXPERIMENT = Experiment.of_folder(
-    __name__,
-    tunnel.TunnelConfig,
-    tunnel.run,
-    tables,
-    sentence,
-    check=tunnel.check,
-    filmed=True,
-    failed=lambda result: bool(_none_valid(result)),
-    logged=tunnel.run,
-    logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in tunnel.every(config)],
-    trials=Trials(
-        *("controller", tunnel.every, tunnel.run_rows, BATCH, TrialResult, tunnel.run_on_device)
-    ),
-    tasks=tunnel.tasks,
-    measures=measures.COLUMNS,
-    viewed=lambda config, on_step, on_row, view, logs: tunnel.run(
-        config, 1, on_step, on_row, logs, view
-    ),
+    *(__name__, TunnelConfig, run, tables, sentence),
+    check=check,
+    films=films,
+    failed=lambda result: bool(none_valid(result)),
+    shown=True,
+    logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in every(config)],
+    trials=TRIALS,
+    tasks=tasks,
+    measures=COLUMNS,
     captions=CAPTIONS,
     explained="docs/results.md",
 )

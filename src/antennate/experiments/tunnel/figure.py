@@ -18,8 +18,8 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 from antennate import figures as style
 from antennate.control.readings import short_names
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS
-from antennate.experiments.tunnel.monitor import TrialPath, TrialResult
-from antennate.experiments.tunnel.run import TunnelOutcome
+from antennate.experiments.tunnel.experiment import TunnelOutcome
+from antennate.experiments.tunnel.physics import TrialPath, TrialResult
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3
@@ -49,7 +49,7 @@ def figures(outcome: TunnelOutcome) -> dict[str, Figure]:
     return {
         "trajectories": trajectories(outcome.paths, config.conditions, outcome.rows, trials),
         "summary": summary(
-            (found := outcome.result())["controllers"], outcome.rows, found["time_limit_s"]
+            (result := outcome.result())["controllers"], outcome.rows, result["time_limit_s"]
         ),
     }
 
@@ -239,13 +239,13 @@ def summary(
     heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
     rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
     colours, short = style.controller_colours(list(controllers)), short_names(controllers)
-    for i, (name, found) in enumerate(controllers.items()):
-        valid, colour = found["trials"] - found["invalid"], colours[name]
+    for i, (name, row) in enumerate(controllers.items()):
+        valid, colour = row["trials"] - row["invalid"], colours[name]
         if not valid:
             continue
-        time = found[key if time_limit is None else f"{key}_s"]
-        time95 = found[f"{key}_95"] if valid >= style.ENOUGH_TRIALS else None
-        _interval(rate, i, found["successes"] / valid, found["wilson95"], colour)
+        time = row[key if time_limit is None else f"{key}_s"]
+        time95 = row[f"{key}_95"] if valid >= style.ENOUGH_TRIALS else None
+        _interval(rate, i, row["successes"] / valid, row["wilson95"], colour)
         _interval(mean, i, time, time95 or (), colour)
         exits = sorted(
             r.time_s / (r.limit_s if time_limit is None else 1.0)
@@ -261,7 +261,7 @@ def summary(
             linewidth=max(1.2, 3.2 - 0.8 * i),
             label=short[name],
         )
-    valid = [found["trials"] - found["invalid"] for found in controllers.values()]
+    valid = [row["trials"] - row["invalid"] for row in controllers.values()]
     counted = [f"{label}\nn = {n}" for label, n in zip(short.values(), valid, strict=True)]
     _name_lines(rate, counted)
     _name_lines(mean, list(short.values()))

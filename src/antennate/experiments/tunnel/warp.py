@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from antennate.experiments.tunnel.batch import Emit, run_trials
-from antennate.experiments.tunnel.config import TunnelConfig
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.trial import draw_scene, scene_of
 from antennate.sim.warp.robot import CountingRobot, PaddedTunnels, WarpRobot

@@ -1,4 +1,8 @@
-"""Contacts to learn from: point loads at rest within the cone of friction, and traverses."""
+"""Contacts to learn from: point loads at rest within the cone of friction, and traverses.
+
+In a traverse the antenna points along x; its base moves towards -y, so that a post bends it one way
+only, until it slips off.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +16,106 @@ from pydantic import model_validator
 from antennate.antenna import sensor as flex_sensor
 from antennate.antenna.statics import PROFILES, Chain, Profile, equilibrium, with_profile
 from antennate.control.conditioning import bending_level
-from antennate.experiments import reading
-from antennate.experiments.force.post_traverse import Traverse
+from antennate.errors import SimulationError
+from antennate.experiments.bench import averaged, recorded
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, require_own_curve
+from antennate.sim.bench import Ball, Bench, Watch, compile_bench
 from antennate.types import Bools, Floats, Ints
+
+_CLEARANCE = 0.03
+"""Way of the base before it meets the post [m]; it has come up to speed by then."""
+_RISE = 0.2
+"""Time over which the base comes up to speed [s]."""
+_LOST = 0.1
+"""Contact lost for so long has ended [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Traverse:
+    """What was recorded of one traverse while the post pressed.
+
+    Attributes:
+        flex: Flex under the flex sensor [rad], shape (n,).
+        force: Size of the contact force, averaged over the time of a sample [N], shape (n,).
+        place: Where the post touches, along the antenna over its length, shape (n,).
+        age: Time since the post first touched [s], shape (n,).
+        reason: Why the trial is invalid, or empty.
+    """
+
+    flex: Floats
+    force: Floats
+    place: Floats
+    age: Floats
+    reason: str = ""
+
+
+def drag(
+    physics: BenchPhysicsParams,
+    antenna: AntennaSpec,
+    overlap: float,
+    speed: float,
+    post_radius: float,
+    limit: float,
+    rate: float,
+    watch: Watch | None = None,
+) -> Traverse:
+    """Drag the antenna past a post until it slips off or a hinge exceeds its limit.
+
+    Args:
+        physics: Numerics.
+        antenna: The antenna.
+        overlap: Place of the first contact, over the length of the antenna.
+        speed: Speed of the base [m/s].
+        post_radius: Radius of the post [m].
+        limit: Largest hinge angle that still counts [rad].
+        rate: Samples a second [Hz].
+        watch: Looks at the bench after each physics step.
+    """
+    post = Ball(overlap * antenna.length, -(post_radius + antenna.radius + _CLEARANCE), post_radius)
+    bench = Bench(compile_bench(physics, antenna, [post]), antenna)
+    bench.place(0.0, 0.0, 0.0)
+    steps = round(1.0 / (rate * physics.timestep))
+    end = (_CLEARANCE + 2.0 * antenna.length) / speed + _RISE
+    rows: list[tuple[float, float, float, float]] = []
+    last = math.inf
+    try:
+        while bench.t < end and bench.t - last < _LOST:
+            bench.command(0.0, -way(bench.t, speed), 0.0, -speed_at(bench.t, speed), 0.0)
+            force = float(np.linalg.norm(bench.press(steps, watch)))
+            if abs(bench.hinges()).max() > limit:
+                break
+            if force > 0.0:
+                last = bench.t
+                rows.append((bench.flex(), force, _place(bench.joints(), post), last))
+    except SimulationError as error:
+        none = np.zeros(0)
+        return Traverse(none, none, none, none, str(error))
+    flex, pressed, place, t = np.array(rows).reshape(-1, 4).T
+    return Traverse(flex, pressed, place, t - t[:1])
+
+
+def speed_at(t: float, speed: float) -> float:
+    """Speed of a base that comes up to `speed` without a jerk [m/s]."""
+    return speed * min(t / _RISE, 1.0)
+
+
+def way(t: float, speed: float) -> float:
+    """Way of such a base [m]: the integral of its speed."""
+    return speed * (t * t / (2 * _RISE) if t < _RISE else t - _RISE / 2)
+
+
+def _place(joints: Floats, post: Ball) -> float:
+    """Where along the antenna lies the point nearest to the post, over its length."""
+    starts, sides = joints[:-1], np.diff(joints, axis=0)
+    square = (sides**2).sum(axis=1)
+    to_post = np.array([post.x, post.y]) - starts
+    share = np.clip((to_post * sides).sum(axis=1) / square, 0.0, 1.0)
+    gap = np.linalg.norm(to_post - share[:, None] * sides, axis=1)
+    nearest = int(gap.argmin())
+    return float((nearest + share[nearest]) / len(sides))
 
 
 class ForceConfig(Params):
@@ -163,23 +260,23 @@ def static_loads(
 
 def traverse_points(config: ForceConfig, traverses: list[Traverse]) -> Points:
     """The samples of all traverses through the sensor chain; even traverses serve to fit."""
-    counts, levels = [np.zeros(0)], [np.zeros(0)]
-    for k, one in enumerate(traverses):
+    sensor, counts, levels = config.antenna.sensor, [np.zeros(0)], [np.zeros(0)]
+    for k, traverse in enumerate(traverses):
         rng = np.random.default_rng([config.seed, 2, k])
-        noise = flex_sensor.reading_noise(config.antenna.sensor, rng, (len(one.flex),))
-        counts.append(reading.recorded(config.antenna.sensor, one.flex, noise))
-        mean = reading.averaged(config.conditioning, counts[-1], config.antenna.sensor.rate)
+        noise = flex_sensor.reading_noise(sensor, rng, (len(traverse.flex),))
+        counts.append(recorded(sensor, traverse.flex, noise))
+        mean = averaged(config.conditioning, counts[-1], sensor.rate)
         levels.append(bending_level(config.conditioning, mean))
-    trial = np.repeat(np.arange(len(traverses)), [len(one.flex) for one in traverses])
+    trial = np.repeat(np.arange(len(traverses)), [len(traverse.flex) for traverse in traverses])
     return Points(
         {
-            "flex": np.concatenate([one.flex for one in traverses]),
+            "flex": np.concatenate([t.flex for t in traverses]),
             "reading": np.concatenate(counts),
             "level": np.concatenate(levels),
         },
-        np.concatenate([one.force for one in traverses]),
-        np.concatenate([one.place for one in traverses]),
+        np.concatenate([t.force for t in traverses]),
+        np.concatenate([t.place for t in traverses]),
         trial,
         trial % 2 == 0,
-        np.concatenate([one.age for one in traverses]),
+        np.concatenate([t.age for t in traverses]),
     )

@@ -7,20 +7,99 @@ antenna is the mirror image, so it needs no bench of its own.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from antennate.antenna.shapes import Shape, classify
+from antennate.antenna.statics import PROFILES, Profile
 from antennate.errors import SimulationError
-from antennate.experiments.force.post_traverse import speed_at, way
-from antennate.params.bench import ShapeParams, Solver, SweepParams
+from antennate.experiments.force.physics import speed_at, way
+from antennate.params.base import Params, number, require_different, require_whole_steps
+from antennate.params.bench import EstimateParams, ShapeParams, Solver, SweepParams, solver
+from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, Watch, compile_bench
-from antennate.sim.chain import ChainBench
+from antennate.sim.chain import ChainBench, require_read
 from antennate.types import Bools, Floats
+
+
+class SweepConfig(Params):
+    """Everything that decides the outcome of `bench sweep`."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        "antenna.base_angle",
+        *(f"conditioning.{n}" for n in ConditioningParams.model_fields if n != "averaging_time"),
+    )
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of all chance."""
+    profiles: tuple[Profile, ...] = number(
+        tuple(PROFILES), "1", "assumed: the paper's three and both controls", min_length=1
+    )
+    """Profiles of the map."""
+    profile: Profile = number("descending", "1", "paper: the robot's profile")
+    """Profile of the estimates."""
+    distances: tuple[float, ...] = number(
+        (0.35, 0.5, 0.65, 0.8, 0.95), "1", "assumed: up to nearly out of reach", min_length=1
+    )
+    """Distances of the wall, over the length of the antenna."""
+    centres: tuple[Annotated[float, Field(ge=0, le=2.0)], ...] = number(
+        tuple(math.radians(a) for a in (47.0, 70.0, 90.0)),
+        "rad",
+        "assumed: the mounting angle, and on to sideways",
+        min_length=1,
+    )
+    """Centres of the sweep."""
+    amplitudes: tuple[Annotated[float, Field(gt=0, le=1.5)], ...] = number(
+        tuple(math.radians(a) for a in (15.0, 30.0, 45.0)),
+        "rad",
+        "assumed: half and one and a half times the default",
+        min_length=1,
+    )
+    """Amplitudes of the sweep."""
+    sweeps: int = number(2, "1", "assumed: they repeat; one before them is left out", ge=1, le=100)
+    """Sweeps measured."""
+    speed: float = number(
+        0.05, "m/s", "assumed: slowly; under half of the paper's 0.12 m/s", gt=0, le=1
+    )
+    """Speed of the base along the wall where it moves."""
+    points: bool = number(False, "1", "assumed: a large file that few need")
+    """Whether to save the points of the antenna of `profile` in every cell, for `tracks`."""
+    solver: Solver = solver()
+    """What steps the physics: the engine, or the chain solver (extra `fast`; compiles once)."""
+    sweep: SweepParams = SweepParams()
+    shape: ShapeParams = ShapeParams()
+    estimate: EstimateParams = EstimateParams()
+    antenna: AntennaSpec = AntennaSpec()
+    conditioning: ConditioningParams = ConditioningParams()
+    physics: BenchPhysicsParams = BenchPhysicsParams()
+
+    @model_validator(mode="after")
+    def _agree(self) -> SweepConfig:
+        require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
+        require_different("profiles", self.profiles)
+        require_read(self.solver, self.physics)
+        least = self.antenna.radius / self.antenna.length
+        for what, values in (
+            ("distances", self.distances),
+            ("estimate.distance", self.estimate.distance),
+        ):
+            if min(values) <= least:
+                raise ValueError(
+                    f"{what} must exceed the antenna's radius, {least:g} of its length, "
+                    f"found {min(values):g}"
+                )
+        if not self.estimate.distance[0] < self.estimate.distance[1]:
+            raise ValueError(f"estimate.distance must rise, found {self.estimate.distance}")
+        return self
+
 
 _APPROACH = 0.5
 """Time from the heading to the near end of the sweep [s]."""
@@ -152,11 +231,11 @@ def _record_chain(
     clock = np.cumsum(np.full(steps * math.ceil(end * rate + 1.0), physics.timestep))
     after = clock[steps - 1 :: steps]  # summed up as the engine's clock is
     begins = np.append(0.0, after)
-    told = [
+    targets = [
         (way(t, speed), speed_at(t, speed), commanded(sweep, t))
         for t in begins[begins < end].tolist()
     ]
-    x, speeds, angles = np.array(told).T
+    x, speeds, angles = np.array(targets).T
     still = np.zeros_like(x)
     commands = bench.commands(np.column_stack([x, still]), np.column_stack([speeds, still]), angles)
     try:
@@ -193,7 +272,50 @@ def shares(params: ShapeParams, trace: Trace, first: float) -> dict[str, float]:
     """Shares of time of each shape and of no contact, from `first` [s] on; they add up to 1."""
     at = trace.t > first
     shape = classify(params, trace.flex, trace.offset)
-    found = {
+    touched = {
         kind.name.lower(): float((trace.touching & (shape == kind))[at].mean()) for kind in Shape
     }
-    return found | {"free": float((~trace.touching)[at].mean())}
+    return touched | {"free": float((~trace.touching)[at].mean())}
+
+
+_BODY = 0.1
+"""Distance of the point `tail` behind `head`, which is on the base before the first hinge [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outlines:
+    """One sweep.
+
+    Attributes:
+        trial: Its name.
+        t: Time [s], shape (n,).
+        points: Along the antenna [m], shape (n, k, 2).
+        touching: Whether it touches the wall, shape (n,).
+    """
+
+    trial: str
+    t: Floats
+    points: Floats
+    touching: Bools
+
+
+def outlines_of(trial: str, trace: Trace, first: float) -> Outlines:
+    """The points of a sweep from `first` [s] on, as `shares` counts them."""
+    at = trace.t > first
+    return Outlines(trial, trace.t[at], trace.points[at], trace.touching[at])
+
+
+def outlines_csv(sweeps: Sequence[Outlines]) -> str:
+    """A row for each sample: `left0` to the tip, body axis `tail` to `head`, and contact."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    names = [f"left{i}" for i in range(sweeps[0].points.shape[1])]
+    columns = [f"{name}_{axis}" for name in (*names, "head", "tail") for axis in "xy"]
+    writer.writerow(["trial", "frame", "time", "left_contact", *columns])
+    for sweep in sweeps:
+        for i, points in enumerate(sweep.points):
+            head = points[0]
+            points_of_row = np.vstack([points, head, head - (_BODY, 0.0)]).ravel()
+            cells = [f"{value:.6f}" for value in points_of_row]
+            writer.writerow([sweep.trial, i, f"{sweep.t[i]:.6f}", int(sweep.touching[i]), *cells])
+    return file.getvalue()
