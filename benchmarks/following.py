@@ -20,8 +20,8 @@ from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.dxl.model import FULL_DRIVE
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
-from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.joints import Joints
+from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of

@@ -33,10 +33,10 @@ from antennate.hardware.driving import drive as dry_run
 from antennate.hardware.dynamixel import actuators, bringup
 from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.actuators import ServoMonitor
-from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.ports import serial_line as serial_port
 from antennate.hardware.safety import session, torque
+from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.robots.spec import RobotSpec
 

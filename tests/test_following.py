@@ -16,9 +16,9 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig

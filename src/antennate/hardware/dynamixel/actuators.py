@@ -15,11 +15,11 @@ from antennate.dxl.models import XC430_W240
 from antennate.errors import AntennateError, reason
 from antennate.hardware.actuators import ActuatorState, JointFaults
 from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.following import Following
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import READ_ALL, READ_ONE, SUPPLY_AGE, WATCHDOG_COUNTS
+from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.port import PortError
 from antennate.types import Floats, JointCommand

@@ -54,7 +54,8 @@ def require_order(limits: SupervisorParams, period: float) -> None:
     """
     answer, watchdog = ("the latest answer", ANSWER), ("the watchdogs of the servos", WATCHDOG)
     pause = ("limits.longest_pause", limits.longest_pause)
-    _rise([("a read", READ_ONE), ("that of a leg", READ_LEG), ("that of all", READ_ALL), answer])
+    reads = [("a read of one servo", READ_ONE), ("of a leg", READ_LEG), ("of all", READ_ALL)]
+    _rise([*reads, answer])
     _rise([("a period of control.rate", period), answer, watchdog, pause])
     _rise([("limits.stale_age", limits.stale_age), answer])
     _rise([("a read of `jog`", JOG_PERIOD), ("its watchdog", JOG_WATCHDOG_COUNTS * WATCHDOG_UNIT)])
