@@ -31,10 +31,10 @@ from antennate.control.registry import CONTROLLERS
 from antennate.errors import WorkerError
 from antennate.experiments.study.config import StudyConfig
 from antennate.messages import command_words
-from antennate.studies.engines import Submitted
 from antennate.studies.identity import environment, identity, packages_used
 from antennate.studies.slurm import Resumable
 from antennate.studies.store import read_store
+from antennate.studies.submitted import Submitted
 from antennate.studies.work import Part, Work
 
 HERE = Path(__file__).parent

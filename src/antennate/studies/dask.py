@@ -18,7 +18,8 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
-from antennate.studies.engines import (
+from antennate.studies.processes import Processes
+from antennate.studies.submitted import (
     NO_PLACE,
     Submitted,
     folder_of,
@@ -26,7 +27,6 @@ from antennate.studies.engines import (
     require_same,
     work_apart,
 )
-from antennate.studies.processes import Processes
 from antennate.studies.work import Emit, Fail, Packed, Part, Processor, Work
 
 CONNECT = 10.0

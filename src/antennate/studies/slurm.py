@@ -16,12 +16,12 @@ from typing import Any
 
 from antennate.errors import ConfigError, OutputError, WorkerError, in_one_line
 from antennate.messages import shortened
-from antennate.studies.engines import require_package, require_same, work_apart
 from antennate.studies.formats import decoded, encoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
 from antennate.studies.store import Store, parsed
+from antennate.studies.submitted import require_package, require_same, work_apart
 from antennate.studies.work import Emit, Fail, Failure, Packed, Part, Waiting, Work, added_objects
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
