@@ -20,7 +20,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.experiments.gait import experiment as gait
+from antennate.experiments.gait import physics as gait
 from antennate.experiments.gait.physics import measure
 from antennate.experiments.tunnel import experiment as experiment
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig

@@ -18,7 +18,7 @@ from antennate.experiments.calibrate.run import CalibrateConfig, run
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.recording import Recorder
-from antennate.params.bench import RecordParams
+from antennate.params.hardware import RecordParams
 
 
 class Bench:

@@ -36,8 +36,8 @@ from antennate.studies.measures import Table
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
-from antennate.telemetry.header import MOST_PARTS, Header, part, parts
-from antennate.telemetry.reader import RECOVERED, LogReader, left_out, recover
+from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, parts
+from antennate.telemetry.reader import LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS

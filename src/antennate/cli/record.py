@@ -28,7 +28,7 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recording import Recorder
 from antennate.hardware.host import HostClock
 from antennate.messages import typed
-from antennate.params.bench import RecordParams
+from antennate.params.hardware import RecordParams
 
 DESCRIPTION = """\
 Record an antenna at a bench, into a CSV file that `antennate calibrate` takes. With --marks you

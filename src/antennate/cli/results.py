@@ -38,7 +38,7 @@ from antennate.studies.run_files import (
     require_apart,
 )
 from antennate.studies.store import Tasks
-from antennate.telemetry.reader import RECOVERED
+from antennate.telemetry.header import RECOVERED
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from antennate.hardware.esp32.wire import names_board
 from antennate.hardware.safety import deadlines
 from antennate.messages import shown
 from antennate.params.base import Params, number, paths_of
-from antennate.params.bench import RecordParams
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.hardware import (
     DeadManParams,
@@ -31,6 +30,7 @@ from antennate.params.hardware import (
     JogParams,
     NetworkParams,
     PortsParams,
+    RecordParams,
     SetupParams,
     TeleopParams,
 )

@@ -25,10 +25,9 @@ from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_strea
 from zstandard import ZstdError, frame_content_size
 
 from antennate.errors import LogError
+from antennate.telemetry.header import LIBRARY
 
 MAGIC = b"\x89MCAP0\r\n"
-LIBRARY = "antennate "
-"""How the program is named that writes the logs of antennate, before its version."""
 RECORD = struct.Struct("<BQ")
 """Kind and length, before the content of each record."""
 UNSOUND = (struct.error, ValueError, OverflowError, McapError, ZstdError)

@@ -32,6 +32,10 @@ TWIN = "twin"
 """The controller of a twin's log: what its client decides is not known."""
 MOST_PARTS = 10
 """Files that one log can have."""
+LIBRARY = "antennate "
+"""How the program is named that writes the logs of antennate, before its version."""
+RECOVERED = "-recovered"
+"""What follows the name of a log that was recovered."""
 _OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
 """How a log from before MCAP begins: its schema and the kind of its first record."""
 _OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')

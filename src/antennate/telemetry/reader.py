@@ -43,8 +43,6 @@ _LARGEST = 1 << 25
 """Most bytes of messages that are taken for those of one tick."""
 _EACH = 500
 """Bytes that a message takes in memory beside its content."""
-RECOVERED = "-recovered"
-"""What the name of a recovered log has behind that of the log."""
 
 
 class Damage(NamedTuple):

@@ -24,8 +24,7 @@ from antennate import __version__
 from antennate.errors import LogError, reason
 from antennate.files import require_room
 from antennate.telemetry.cdr import Form
-from antennate.telemetry.chunks import LIBRARY
-from antennate.telemetry.header import Header
+from antennate.telemetry.header import LIBRARY, Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, TOPICS, Topic
 from antennate.types import Floats, Ints

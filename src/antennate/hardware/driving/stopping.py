@@ -17,9 +17,10 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from antennate.params.hardware import DeadManParams
+if TYPE_CHECKING:  # the command line imports this file for every command
+    from antennate.params.hardware import DeadManParams
 
 STOPS = tuple(
     getattr(signal, name)

@@ -27,8 +27,7 @@ from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
 from antennate.hardware.esp32.wire import Counters, FrameDecoder, Hello, Sample
 from antennate.messages import typed
 from antennate.notebook import from_columns
-from antennate.params.bench import RecordParams
-from antennate.params.hardware import DoctorParams
+from antennate.params.hardware import DoctorParams, RecordParams
 from antennate.types import Bools, Floats, Ints
 
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
