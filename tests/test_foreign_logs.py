@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from log_ticks import HEADER, tick
+from log_ticks import HEADER, MAGIC, chunks, tick
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -249,6 +249,17 @@ def test_X10_a_hostile_log_takes_at_most_200_MB(
     assert len(lines) == 1
     assert said in lines[0]
     assert int(peak) * 1024 <= 200e6
+
+
+def test_a_log_of_antennate_without_a_crc_is_damaged_whatever_follows_it(log: Path) -> None:
+    """Only a file that names another program may be without; a damaged name is none."""
+    data = bytearray(log.read_bytes())
+    begin, _ = chunks(bytes(data))[2]
+    data[begin + 9 + 24 : begin + 9 + 28] = bytes(4)
+    for name in (data[len(MAGIC)], 0x55):
+        data[len(MAGIC)] = name
+        log.write_bytes(data)
+        assert ticks_of(log) == WRITTEN[:1] + WRITTEN[2:]
 
 
 @pytest.mark.parametrize(

@@ -208,6 +208,35 @@ def test_G2_damage_costs_other_programs_logs_no_more(
         assert len(numbers) < 40 or place in (begin + 12, begin + 45)  # what no CRC covers
 
 
+def test_G2_a_chunk_without_a_crc_is_called_so(tmp_path: Path) -> None:
+    """MCAP lets a program leave it out; what cannot be checked is not read."""
+    data = written(tmp_path / "log", 4)
+    begin, _ = chunks(data)[2]
+    bare = bytearray(data)
+    bare[begin + 9 + 24 : begin + 9 + 28] = bytes(4)
+    result = found(tmp_path / "bare", bytes(bare))
+    assert result is not None
+    assert result[0] == [1, 3, 4]
+    assert [damage.reason for damage in result[1].damage] == ["chunk without a CRC"]
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_G2_an_index_that_a_flipped_bit_makes_an_end_ends_nothing(
+    tmp_path: Path, closed: bool
+) -> None:
+    """Kinds of MCAP: 0x07 an index of messages, 0x0F the end of the data."""
+    data = written(tmp_path / "log", 6)
+    (_, end), (after, _) = chunks(data)[2:4]
+    assert data[end] == 0x07
+    spoiled = bytearray(data if closed else unclosed(data))
+    spoiled[end] ^= 0x08
+    result = found(tmp_path / "spoiled", bytes(spoiled))
+    assert result is not None
+    assert result[0] == [1, 2, 3, 4, 5, 6]
+    assert [damage.reason for damage in result[1].damage] == ["damaged record"]
+    assert after > end
+
+
 def test_G2_a_damaged_summary_costs_no_tick(tmp_path: Path) -> None:
     data = written(tmp_path / "whole", 3)
     for place in range(len(unclosed(data)) + 13, len(data), 97):

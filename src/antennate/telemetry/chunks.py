@@ -95,7 +95,7 @@ def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk
         OSError: The file cannot be read.
         LogError: Its chunks are compressed by lz4.
     """
-    size = file.seek(0, io.SEEK_END)
+    size, foreign = file.seek(0, io.SEEK_END), _writer(file) not in (None, LIBRARY)
     at, closed, unpacked, counts = len(MAGIC), False, 0, Counter[int]()
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
@@ -107,7 +107,7 @@ def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk
             kind, content, end = place
             closed = kind == Opcode.DATA_END
             if kind == Opcode.CHUNK:
-                place = _chunk(at, content, wanted is None or at in wanted)
+                place = _chunk(at, content, wanted is None or at in wanted, foreign)
         if isinstance(place, Chunk):
             unpacked += place.size
             if unpacked > _RATIO * size:
@@ -145,6 +145,8 @@ def _record(file: BinaryIO, at: int, size: int) -> tuple[int, bytes, int] | Faul
     if end > size:
         return Fault(at, "cut record")
     content = file.read(min(length, _LONGEST))
+    if (kind == Opcode.DATA_END and length != 4) or (kind == Opcode.HEADER and at != len(MAGIC)):
+        return Fault(at, "damaged record")  # a flipped bit makes them of an index
     if kind == Opcode.MESSAGE_INDEX and content[2:6] != struct.pack("<I", max(0, length - 6)):
         return Fault(at, "damaged record")  # its length may lead into the midst of a chunk
     return kind, content, end
@@ -176,8 +178,11 @@ def _frames_a_chunk(file: BinaryIO, at: int) -> bool:
     return length - _PREFIX.size - word - 8 == packed
 
 
-def _chunk(at: int, content: bytes, wanted: bool) -> Chunk | Fault:
-    """The chunk of a record, without what is in it unless that is wanted."""
+def _chunk(at: int, content: bytes, wanted: bool, foreign: bool) -> Chunk | Fault:
+    """The chunk of a record, without what is in it unless that is wanted.
+
+    Only other programs may leave out the CRC.
+    """
     if content[_PREFIX.size - 4 :].startswith(_LZ4):
         raise LogError(
             "expected chunks compressed by zstd, found lz4; `mcap compress --compression zstd` "
@@ -190,6 +195,8 @@ def _chunk(at: int, content: bytes, wanted: bool) -> Chunk | Fault:
         whole = len(content) == _PREFIX.size + len(chunk.compression) + 8 + packed
         if chunk.compression not in ("zstd", "") or not whole or unpacked not in (size, -1):
             return Fault(at, "damaged chunk")
+        if chunk.uncompressed_crc == 0 and not foreign:
+            return Fault(at, "chunk without a CRC")
         if size > _LARGEST:
             return Fault(at, f"chunk of more than {_LARGEST} bytes")
         records = list[McapRecord]()
@@ -243,10 +250,16 @@ def is_own(file: BinaryIO) -> bool:
     Raises:
         OSError: The file cannot be read.
     """
+    return _writer(file) == LIBRARY
+
+
+def _writer(file: BinaryIO) -> str | None:
+    """The program that the header of a file names, LIBRARY for antennate; None if it is damaged."""
     record = _record(file, len(MAGIC), file.seek(0, io.SEEK_END))
     if isinstance(record, Fault) or record[0] != Opcode.HEADER:
-        return False
+        return None
     try:
-        return Header.read(ReadDataStream(io.BytesIO(record[1]))).library.startswith(LIBRARY)
+        name = Header.read(ReadDataStream(io.BytesIO(record[1]))).library
     except UNSOUND:
-        return False
+        return None
+    return LIBRARY if name.startswith(LIBRARY) else name
