@@ -184,6 +184,10 @@ def test_a_bad_study_is_one_line(
     assert not Path("runs").exists()
 
 
+def test_an_experiment_may_be_named_as_its_command() -> None:
+    assert StudyConfig(experiment="bench wall") == StudyConfig(experiment="wall")
+
+
 def test_bad_words_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "nobody.toml: expected a readable file: No such file" in refusal(
         capsys, "study", "nobody.toml"

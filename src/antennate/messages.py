@@ -57,6 +57,12 @@ def command_of(words: Sequence[str]) -> str:
     return part if part in COMMAND_GROUPS.get(name, ()) else name
 
 
+def without_group(name: str) -> str:
+    """A command without its group, `wall` for `bench wall`; any other text as it is."""
+    command = command_of(name.split())
+    return command if command_words(command) == name else name
+
+
 def typed(command: str, *words: str) -> str:
     """The words that a person types to run a command of this program, as it was called itself.
 

@@ -79,7 +79,7 @@ def unused(robot: RobotSpec) -> dict[str, str]:
 
 
 TELEOP = "keys of teleop"
-"""Stands for the controller of `teleop`, which has no name."""
+"""Stands for the controller of `drive teleop`, which has no name."""
 BY_CONTACT = "closed-1 by contact"
 """Stands for `closed-1` with `escape.trigger` `contact`."""
 _BLOCKED = ("rule.strong", "rule.similar")

@@ -306,7 +306,7 @@ class RobotFile(DriveConfig):
         return self._part(DriveConfig)
 
     def for_teleop(self) -> TeleopConfig:
-        """What `teleop` takes: what `drive` takes, and its own table."""
+        """What `drive teleop` takes: what `drive` takes, and its own table."""
         return self._part(TeleopConfig)
 
     def for_doctor(self) -> DoctorConfig:

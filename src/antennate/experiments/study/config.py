@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import Tag
+from pydantic import Tag, field_validator
 from pydantic.fields import FieldInfo
 
 from antennate.errors import ConfigError
-from antennate.messages import nearest, shortened
+from antennate.messages import nearest, shortened, without_group
 from antennate.params.base import Params, number
 from antennate.studies.plan import RANGE_OR_CHOICES, Axes, Kind, Point, Range, make_points
 
@@ -50,6 +50,11 @@ class StudyConfig(Params):
     """Vary every assumed number of the experiment by this share of its default, up and down."""
     leave_out: tuple[str, ...] = number((), "1", "assumed: none is left out")
     """Assumed numbers that do not vary, or all of a group."""
+
+    @field_validator("experiment")
+    @classmethod
+    def _as_registered(cls, name: str) -> str:
+        return without_group(name)
 
     def points_of(self, model: type[Params] | None) -> list[Point]:
         """All points, in order.

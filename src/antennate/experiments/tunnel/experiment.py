@@ -207,8 +207,8 @@ def ending(row: TrialResult, config: TunnelConfig) -> str:
 
 
 CAPTIONS = {
-    "trajectories": "Trials from above, the first five at most: a row for each trial, a column for "
-    "each controller, coloured by maneuver.",
+    "trajectories": "Trials from above, the first five at most: the panels of a trial together, "
+    "one for each controller, coloured by maneuver.",
     "summary": "Success of each controller with its Wilson 95 % interval, time in the scene, and "
     "restricted mean time, with a 95 % interval from five trials on.",
 }

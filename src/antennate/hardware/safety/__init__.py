@@ -11,7 +11,7 @@ of that in every tick: the state, and with it torque. `session` carries the deci
 Torque comes on by an arm event (`drive --arm`, after a dry run that reads everything and moves
 nothing) against which no cause speaks; by nothing else while the robot walks. All servos get it, or
 none. A leg that forgets its turns (after a restart its servo counts from the nearest one) gets back
-what was taken from it for that. `jog` gives torque to one joint, slow and weak, without a
+what was taken from it for that. `setup jog` gives torque to one joint, slow and weak, without a
 supervisor: a person is there.
 
 Torque goes off, by a packet whose effect is read back,
@@ -29,6 +29,7 @@ supply takes it off, and a servo in overload or heat its own.
 
 With the parameters as they are (`params.safety`, at 100 Hz) a silent board is HOLD after 0.05 s, a
 silent servo FAULT after 5 missed answers, a joint that is not driven FAULT after 0.1 s, one that is
-stuck after 2 s of moving goals, and a loop that stood for 0.12 s FAULT. HOLD ends by itself after
-10 good samples in a row; the third one within 10 s is FAULT, which only an arm event ends.
+stuck after 2 s of moving goals, and a loop that stood for 0.12 s FAULT. A HOLD for lost data ends
+by itself after 10 good samples in a row, another with its cause; the third within 10 s is FAULT,
+which only an arm event ends. Holds because a key is released do not count.
 """

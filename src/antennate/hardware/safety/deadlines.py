@@ -58,7 +58,12 @@ def require_order(limits: SupervisorParams, period: float) -> None:
     _rise([*reads, answer])
     _rise([("a period of control.rate", period), answer, watchdog, pause])
     _rise([("limits.stale_age", limits.stale_age), answer])
-    _rise([("a read of `jog`", JOG_PERIOD), ("its watchdog", JOG_WATCHDOG_COUNTS * WATCHDOG_UNIT)])
+    _rise(
+        [
+            ("a read of `setup jog`", JOG_PERIOD),
+            ("its watchdog", JOG_WATCHDOG_COUNTS * WATCHDOG_UNIT),
+        ]
+    )
 
 
 def _rise(deadlines: Iterable[tuple[str, float]]) -> None:

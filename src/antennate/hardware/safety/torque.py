@@ -91,7 +91,7 @@ def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
     """Let each servo use all of the PWM that its EEPROM allows: that, by id.
 
     Goal PWM bounds the force in every mode of position. It stays as it is written until the supply
-    goes off, so that a `jog` that was killed would leave a joint without force.
+    goes off, so that a `setup jog` that was killed would leave a joint without force.
 
     Raises:
         BringUpError: A servo did not take it.
