@@ -210,6 +210,9 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
     ("argv", "parts"),
     [
         (["tunel"], ["antennate: error:", "did you mean tunnel?", "found tunel"]),
+        (["study", "desgin"], ["did you mean design?", "found desgin"]),
+        (["setup", "zreo"], ["did you mean zero?", "found zreo"]),
+        (["log", "veiw", "a.mcap"], ["did you mean view?", "found veiw"]),
         (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
         (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
         (

@@ -70,6 +70,8 @@ def test_info_tells_the_first_and_the_last_events(
 def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "info", str(log), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
+    assert main(["log", str(log), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found
     assert (found["ticks"], found["closed"], found["damaged"]) == (TICKS, True, 0)
     with log.open("rb") as file:
         summary = make_reader(file).get_summary()

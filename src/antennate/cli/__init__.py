@@ -10,6 +10,7 @@ import errno
 import importlib
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antennate import __version__
@@ -190,6 +191,8 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
             return OK
         if name in ("", *_GROUPS):
             raise BadInputError(_unknown(name, words[0]))
+        if words and (hint := _misspelt(name, words[0])):
+            raise BadInputError(f"{hint}, found {shortened(words[0])}")
         return carry_out(name, words)
     except HelpRequest as page:
         write_result(str(page))
@@ -214,6 +217,18 @@ def _unknown(group: str, word: str) -> str:
     known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"
     return f"expected a command{choices}, found {shortened(word)}"
+
+
+def _misspelt(name: str, word: str) -> str:
+    """What is expected in place of a word that is nearly a command of a group; else nothing."""
+    from antennate.messages import nearest
+
+    parts = COMMAND_GROUPS.get(name, ())
+    if not parts or word.startswith("-") or Path(word).exists():
+        return ""
+    actions = ("info", "recover", "export", "plot", "film") if name == "log" else ()
+    hint = "" if word in actions else nearest(word, (*parts, *actions))
+    return f"expected a command or a file{hint}" if hint else ""
 
 
 def _top() -> dict[str, str]:

@@ -91,6 +91,8 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The log cannot be read, or the file not written.
     """
+    if argv and Path(argv[0]).exists():
+        argv = ["info", *argv]
     _, options = parse("log", DESCRIPTION, Params, argv, LogOptions)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
