@@ -512,3 +512,22 @@ os.kill(os.getpid(), signal.SIGKILL)
         assert log.end is None
     with pytest.raises(LogError, match="expected a log that does not exist yet"):
         RowLog[Floats](tmp_path / "log.mcap", HEADER, in_rows)
+
+
+def test_a_scene_of_many_bodies_leaves_chunks_that_can_be_read(tmp_path: Path) -> None:
+    """256 ticks with 60 kB beside each are 15 MB; a reader takes chunks of 8 MB at most."""
+    places = np.random.default_rng(0).normal(size=7500)
+    message = COORDINATES.type.encode(0, tuple(places))
+
+    def rows(ticks: Sequence[int]) -> Rows:
+        table = np.zeros((len(ticks), HEAD + 4 * len(ROBOT.joint_names)))
+        table[:, 0] = 0.01 * np.array(ticks)
+        return table, {at: {COORDINATES: message} for at in range(len(ticks))}
+
+    path = tmp_path / "log.mcap"
+    with RowLog[int](path, HEADER, rows) as log:
+        for number in range(256):
+            log.add(number)
+    with LogReader(path) as reader:
+        np.testing.assert_allclose([tick.now for tick in reader], 0.01 * np.arange(256))
+        assert reader.damage == []

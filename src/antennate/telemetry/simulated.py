@@ -48,6 +48,9 @@ _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
 """Ticks that are encoded at once."""
+_MUCH = 1 << 22
+"""Bytes of bodies and contacts beyond which they are encoded in two parts: no reader takes a chunk
+of more than 8 MB."""
 _PATIENCE = 0.15
 """Longest that a tick waits for others [s]; where there are many logs, for their thread too."""
 
@@ -176,6 +179,11 @@ class RowLog(Generic[Taken]):
     def _write(self, ticks: Sequence[Taken]) -> None:
         """Encode ticks, and hand them to the operating system."""
         count, (rows, beside) = len(ticks), self._rows(ticks)
+        size = sum(len(data) for messages in beside.values() for data in messages.values())
+        if size > _MUCH and count > 1:
+            self._write(ticks[: count // 2])
+            self._write(ticks[count // 2 :])
+            return
         t, angles = rows[:, 0], self._angles
         joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
         stamps = self._out.stamps(t)
