@@ -113,7 +113,7 @@ def test_a_page_says_when_it_was_run_and_how_to_read_it() -> None:
         *("Progress over time", "Stuck episodes", "Hold"),
     ):
         assert f"{term}: " in reading
-    assert "Trials from above, the first five at most: a row for each trial" in page.text
+    assert "Trials from above, the first five at most: the panels of a trial" in page.text
     assert "<code>invalid</code>" in page.source
     assert "`" not in page.text.partition("Parameters")[0]
 
