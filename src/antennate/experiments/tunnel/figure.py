@@ -61,7 +61,7 @@ def trajectories(
     rows: Sequence[TrialResult],
     trials: Sequence[int],
 ) -> Figure:
-    """Trials from above: a row for each trial, a column for each controller.
+    """Trials from above: a group of panels for each trial, a panel for each controller.
 
     Of a single trial the panels are larger and stand below one another. More than three
     controllers stand in lines of two, or nobody could read their letters on a phone.
