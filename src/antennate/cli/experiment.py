@@ -199,10 +199,10 @@ def _require_possible(options: Options, config: Params) -> None:
         for name in OF_WORKERS:
             value = getattr(options, name)
             if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
-                found = "one" if value is True else as_typed(value)
+                words = "one" if value is True else as_typed(value)
                 raise ConfigError(
                     f"{flag_of((name,))}: expected none beside --view or --foxglove, which show "
-                    f"one trial after the other, found {found}"
+                    f"one trial after the other, found {words}"
                 )
         if getattr(config, "solver", "mujoco") != "mujoco":
             raise ConfigError(
@@ -314,8 +314,8 @@ def _end(
         raise
     show_result(result, options, *_shown(experiment, result), experiment.explained)
     if interrupted:
-        kept = f"kept {len(outcome.rows)} trials, all that had ended"
-        sys.stderr.write(f"{title}: interrupted: {kept}\n{again}")
+        rest = f"kept {len(outcome.rows)} trials, all that had ended"
+        sys.stderr.write(f"{title}: interrupted: {rest}\n{again}")
         return INTERRUPTED
     if options.video:
         try:

@@ -238,8 +238,8 @@ def _bash(options: Mapping[str, Sequence[Option]]) -> str:
     ]
     flags = []
     for command, own in options.items():
-        every = [w for o in own for w in (o.values if o.positional else [o.offered])]
-        flags.append(f"                '{command}') words='{' '.join([*every, *_HELP])}';;")
+        words = [w for o in own for w in (o.values if o.positional else [o.offered])]
+        flags.append(f"                '{command}') words='{' '.join([*words, *_HELP])}';;")
     parts = [
         f"        {name}) parts='{' '.join(names)}';;" for name, names in COMMAND_GROUPS.items()
     ]

@@ -63,8 +63,8 @@ UNDRIVEN = tuple(path for path in SIMULATION_ALONE if path not in _OF_FOLLOWING)
 def unused(robot: RobotSpec) -> dict[str, str]:
     """Parameters of what a robot does not have, as `robot.servos...`, and why."""
     used = {f"robot.servos.{name}" for name in robot.servo_names}
-    every = paths_of(ServosParams, "robot.servos")
-    servos = (path for path in every if path.rpartition(".")[0] not in used)
+    paths = paths_of(ServosParams, "robot.servos")
+    servos = (path for path in paths if path.rpartition(".")[0] not in used)
     reasons = dict.fromkeys(servos, "no joint of the robot has this servo")
     if robot.legs.kind == "rolling":
         lifting = ("robot.legs.limit", "robot.legs.reach")

@@ -57,11 +57,9 @@ class Outcome(Protocol):
 Config = TypeVar("Config", bound=Params)
 Trial = tuple[str, int]
 """A condition, such as a controller or a profile, and the number of a trial."""
-Found = TypeVar("Found", bound=Outcome)
-
-
-Emit = Callable[[Any], None]
+OnTrial = Callable[[Any], None]
 """Takes what a trial came to: its row and what figures draw of it, None for nothing."""
+Found = TypeVar("Found", bound=Outcome)
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,7 @@ class Trials(Generic[Config]):
         config: Config,
         condition: str,
         number: int,
-        emit: Emit,
+        emit: OnTrial,
         logs: Path | None,
         view: SimulationView,
     ) -> None:
@@ -243,7 +241,7 @@ class OneByOne:
     trial: Callable[..., tuple[Any, Any]]
 
     def __call__(
-        self, config: Any, condition: str, numbers: Sequence[int], emit: Emit, **how: Any
+        self, config: Any, condition: str, numbers: Sequence[int], emit: OnTrial, **how: Any
     ) -> None:
         """Run the trials of these numbers, and emit each."""
         for number in numbers:
