@@ -250,7 +250,7 @@ def _usage() -> str:
     }
     width = max(map(len, top))
     lines = ["usage: antennate COMMAND [OPTIONS]", ""]
-    lines += ["Simulate and study a pair of tactile antennae on a many-legged robot.", ""]
+    lines += ["Simulate, calibrate, drive and study tactile antennae on a many-legged robot.", ""]
     for title, names in sections.items():
         lines += [f"{title}:"]
         for name in (name for name in names if name in top):

@@ -65,7 +65,7 @@ class RunOptions(ResultOptions):
     )
     trial_timeout: float | None = option(
         None,
-        f"give a trial up after this time [s], else {TIMEOUT:g}; unless said, one worker waits on",
+        f"give a trial up after this time [s]; else after {TIMEOUT:g}, with one worker never",
         gt=0,
     )
     video: bool = option(False, "film one trial of each condition, drawn without a display")
