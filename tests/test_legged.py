@@ -13,8 +13,6 @@ from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import (
     body_of,
     cycles,
-    feet_of,
-    goals_of,
     phase_law,
     require_wave,
     wave_of,
@@ -22,22 +20,6 @@ from antennate.robots.mechanics import (
 from antennate.robots.spec import RobotSpec
 
 ROBOT, GAIT = RobotSpec(), GaitParams()
-STIFF = {"yaw_stiffness": 1e4, "yaw_braking": 0.0}
-"""Yaw joints that follow their goals."""
-
-
-def stiff_body(**more: float) -> Body:
-    body = body_of(ROBOT, 0.6)
-    return Body(**{**body.__dict__, **STIFF, **more})
-
-
-def stiff_cycle(wave: Wave, body: Body | None = None, phases: int = 48):
-    phase = 2 * math.pi * np.arange(phases) / phases
-    slow = GaitParams(frequency=1e-6)
-    number = np.atleast_1d(np.asarray(wave.wave_number, float))
-    feet = feet_of(ROBOT, slow, number, phase + math.pi / phases)
-    wave = Wave(*(np.broadcast_to(part, number.shape) for part in wave))
-    return cycle(body or stiff_body(), goals_of(ROBOT, wave, phase), feet)
 
 
 def test_round_legs_roll_without_slip():
@@ -74,7 +56,7 @@ def test_loads_of_three_feet_are_those_of_the_lever():
 
 def test_twist_is_that_of_another_optimiser():
     """SciPy's minimum of Σ N |v| over the twist, with velocities by finite differences."""
-    body = stiff_body()
+    body = body_of(ROBOT, 0.6)
     bend = np.array([[0.2, -0.1, 0.3, 0.1, -0.2]])
     rate = np.array([[0.3, 0.1, -0.2, 0.4, 0.1]])
     lateral = (ROBOT.width - ROBOT.leg_width) / 2
@@ -124,9 +106,10 @@ def test_mirror_image_turns_the_other_way():
 
 def test_friction_and_stiff_servos_leave_the_step():
     """Least dissipation does not depend on μ where the joints follow their goals."""
-    wave = Wave(0.4, np.array([1.0]), 3.5, 0.1)
-    first = stiff_cycle(wave, stiff_body(friction=0.3))
-    second = stiff_cycle(wave, stiff_body(friction=0.9))
+    wave = Wave(0.4, 1.0, 3.5, 0.1)
+    first, second = (
+        cycles(RobotSpec(leg_friction=mu), GAIT, wave, stiff=True) for mu in (0.3, 0.9)
+    )
     assert first.step[0] == pytest.approx(second.step[0], rel=1e-3)
     assert 3 * first.work[0] == pytest.approx(second.work[0], rel=1e-2)
 
@@ -135,7 +118,7 @@ def test_phase_law_on_stiff_servos():
     """First harmonic of speed over the lead of a small wave, within 1 deg of the law."""
     lead = np.arange(24) * math.pi / 12
     for number in (0.5, 0.75, 1.0, 1.25, 1.5):
-        speed = stiff_cycle(Wave(0.1, np.full(24, number), lead, 0.0)).step
+        speed = cycles(ROBOT, GAIT, Wave(0.1, number, lead, 0.0), stiff=True).step
         best = np.angle((speed * np.exp(1j * lead)).sum())
         apart = (best - phase_law(6, number) + math.pi) % (2 * math.pi) - math.pi
         assert abs(math.degrees(apart)) < 1.0

@@ -6,11 +6,21 @@ Nothing here is fitted: geometry, masses, friction and servos are those of the `
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.mechanics.legged import Body, Cycle, Feet, cycle, lifting_feet, rolling_feet
+from antennate.mechanics.legged import (
+    Body,
+    Cycle,
+    Feet,
+    Plan,
+    cycle,
+    lifting_feet,
+    rolling_feet,
+    twists,
+)
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.params.gaits import GaitParams, LiftParams
 from antennate.params.scene import GRAVITY
@@ -21,6 +31,10 @@ from antennate.types import Floats
 PHASES = 48
 """Steps of a cycle; 96 change speeds by less than 2 %."""
 _TURN = 2.0 * math.pi
+_INSTANT = 1e-6
+"""Step of phase for velocities of the mean frame [rad]."""
+_STIFF, _CALM = 1e4, 1e-6
+"""Stiffness of a yaw joint that follows its goal [N·m/rad], frequency without any lag [Hz]."""
 _SIDES = np.array([0.0, math.pi])
 
 
@@ -95,7 +109,9 @@ def _arrays(wave: Wave) -> list[Floats]:
     return [np.array(part) for part in parts]
 
 
-def cycles(robot: RobotSpec, gait: GaitParams, wave: Wave, phases: int = PHASES) -> Cycle:
+def cycles(
+    robot: RobotSpec, gait: GaitParams, wave: Wave, phases: int = PHASES, stiff: bool = False
+) -> Cycle:
     """Cycles of G body waves on a robot.
 
     Args:
@@ -103,12 +119,51 @@ def cycles(robot: RobotSpec, gait: GaitParams, wave: Wave, phases: int = PHASES)
         gait: Frequency, and the step of lifting legs; its body wave is not read.
         wave: The body waves, numbers or arrays of shape (G,).
         phases: Steps n of a cycle.
+        stiff: Whether all joints follow their goals at once, as those of stiff servos would.
     """
     wave = Wave(*_arrays(wave))
+    frequency = _CALM if stiff else gait.frequency
+    gait = gait.model_copy(update={"frequency": frequency})
     phase = _TURN * np.arange(phases) / phases
     goal = goals_of(robot, wave, phase)
     feet = feet_of(robot, gait, np.asarray(wave.wave_number), phase + math.pi / phases)
-    return cycle(body_of(robot, gait.frequency), goal, feet)
+    body = body_of(robot, frequency)
+    return cycle(replace(body, yaw_stiffness=_STIFF) if stiff else body, goal, feet)
+
+
+def phase_twists(
+    robot: RobotSpec, wave: Wave, body: Floats, leg: Floats, body_rate: float, leg_rate: float
+) -> Floats:
+    """Twists of the mean frame where body and legs have phases of their own, shape (G, 3).
+
+    The mean frame sits in the middle of the links and has their mean heading. The yaw joints follow
+    their goals: A sin(2 pi xi j / Y - body).
+
+    Args:
+        robot: A robot with rolling legs.
+        wave: One body wave; its lead and offset are not read.
+        body: Phase of the body wave [rad], shape (G,).
+        leg: Phase of the legs [rad], shape (G,).
+        body_rate: Rate of the body's phase, 1 in a gait.
+        leg_rate: Rate of the legs' phase, 1 in a gait.
+    """
+    joint = _TURN * wave.wave_number * np.arange(1, robot.links) / robot.yaw_count
+    angle = joint - body[:, None]
+    bend = wave.amplitude * np.sin(angle)
+    rate = -body_rate * wave.amplitude * np.cos(angle)
+    link = _TURN * wave.wave_number * np.arange(robot.links) / robot.links
+    legs = (leg[:, None] - link)[..., None] + _SIDES
+    lateral = (robot.width - robot.leg_width) / 2
+    feet = rolling_feet(robot.leg_radius, robot.leg_eccentricity, lateral, legs, leg_rate)
+    head = twists(body_of(robot, 0.0), bend, rate, feet)
+    plan, ahead = (Plan.of(robot.link_pitch, bend + t * rate) for t in (0.0, _INSTANT))
+    heading, middle = plan.heading.mean(1), plan.middle.mean(1)
+    turning = (ahead.heading.mean(1) - heading) / _INSTANT
+    moving = (ahead.middle.mean(1) - middle) / _INSTANT
+    x = head[:, 0] - head[:, 2] * middle[:, 1] + moving[:, 0]
+    y = head[:, 1] + head[:, 2] * middle[:, 0] + moving[:, 1]
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack([cos * x + sin * y, cos * y - sin * x, head[:, 2] + turning], 1)
 
 
 def wave_of(gait: GaitParams, offset: float = 0.0) -> Wave:

@@ -1,0 +1,188 @@
+"""Figures of `antennate geometry`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+
+from antennate import figures as style
+from antennate.experiments.geometry.experiment import GeometryOutcome
+from antennate.experiments.geometry.physics import Walked, columns
+from antennate.experiments.geometry.torus import Torus
+from antennate.mechanics.twist import TwistMap
+
+_DASHED = (0, (4, 2))
+
+
+def figures(outcome: GeometryOutcome) -> dict[str, Figure]:
+    """The figures of a run; torus and twist map only where legs roll."""
+    result = outcome.result()
+    drawn = {
+        "agreement": agreement(outcome.part("random"), result["agreement"]),
+        "leads": leads(result["leads"]),
+        "front": front(outcome.part("front"), outcome.part("named")),
+    }
+    if outcome.torus is not None:
+        drawn["torus"] = torus(outcome.torus, outcome.config.gait.body_phase)
+    if outcome.twists is not None:
+        drawn["twists"] = twists(outcome.twists, outcome.part("turn"))
+    return drawn
+
+
+@style.styled
+def agreement(rows: Sequence[Walked], entry: Mapping[str, Any]) -> Figure:
+    """Speed and yaw by the model against those by the engine."""
+    figure = style.canvas(style.WIDTH, 8.2)
+    speed, yaw = figure.subplots(2, 1)
+    x, y, a, b = columns(
+        rows, "model_speed_m_s", "speed_m_s", "model_yaw_deg_per_cycle", "yaw_deg_per_cycle"
+    )
+    _draw_pair(speed, x, y, "speed [m/s]", entry["speed_r"]["value"])
+    speed.axvline(
+        entry["rival_speed_m_s"],
+        color=style.SERIES[1],
+        linestyle=_DASHED,
+        label=f"rival, {entry['rival_speed_m_s']:.3f} m/s for all",
+    )
+    speed.legend(loc="upper left")
+    _draw_pair(yaw, a, b, "yaw [deg a cycle]", entry["yaw_r"]["value"])
+    return figure
+
+
+def _draw_pair(panel: Axes, model: Any, engine: Any, what: str, r: float) -> None:
+    ends = [min(model.min(), engine.min()), max(model.max(), engine.max())]
+    panel.plot(ends, ends, color=style.MUTED, linewidth=1.0, label="equal")
+    panel.plot(model, engine, "o", color=style.SERIES[0], markersize=4)
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.set(
+        xlabel=f"{what}, model",
+        ylabel=f"{what}, engine",
+        title=f"{len(model)} random gaits, correlation {r:.3f}",
+    )
+
+
+@style.styled
+def leads(entries: Sequence[Mapping[str, Any]]) -> Figure:
+    """The best lead over wave numbers."""
+    figure = style.canvas(style.WIDTH, 3.8)
+    panel = figure.subplots()
+    number = [entry["wave_number"] for entry in entries]
+    looks = {
+        "law_deg": ("law of stiff servos", style.MUTED, "", _DASHED),
+        "model_deg": ("model", style.SERIES[0], "o", "solid"),
+        "engine_deg": ("engine", style.SERIES[1], "s", ""),
+    }
+    for name, (label, colour, marker, line) in looks.items():
+        if name in entries[0]:
+            angles = np.degrees(np.unwrap(np.radians([entry[name] for entry in entries])))
+            panel.plot(number, angles, color=colour, marker=marker, linestyle=line, label=label)
+    panel.set(xlabel="wave number", ylabel="best lead [deg]", title="Lead that walks fastest")
+    panel.legend()
+    return figure
+
+
+@style.styled
+def front(rows: Sequence[Walked], named: Sequence[Walked]) -> Figure:
+    """Speed and cost of transport of the gaits that may be fast or cheap."""
+    figure = style.canvas(style.WIDTH, 4.6)
+    panel = figure.subplots()
+    speed, cost, number = columns(rows, "speed_m_s", "cost_of_transport", "wave_number")
+    dots = panel.scatter(speed, cost, c=number, cmap="viridis", s=18, label="largest amplitude")
+    for row, colour, marker in zip(named, style.series(len(named) + 1)[1:], "*D^vPX", strict=False):
+        panel.plot(
+            *(row.speed_m_s, row.cost_of_transport or math.nan),
+            color=colour,
+            marker=marker,
+            markersize=11 if marker == "*" else 7,
+            linestyle="",
+            label=row.name,
+            markeredgecolor="white",
+        )
+    panel.axhline(named[0].cost_of_transport or 0.0, color=style.MUTED, linewidth=0.8)
+    panel.axvline(named[0].speed_m_s, color=style.MUTED, linewidth=0.8)
+    panel.set(
+        xlabel="speed [m/s]", ylabel="cost of transport", title="Engine; right and low is good"
+    )
+    low, high = np.nanpercentile(cost, [0, 75])
+    panel.set_ylim(0.9 * low, 1.25 * high)
+    figure.colorbar(dots, ax=panel, label="wave number", location="bottom", shrink=0.7)
+    panel.legend(loc="upper left")
+    return figure
+
+
+@style.styled
+def torus(motion: Torus, lead: float) -> Figure:
+    """Curvature over body and leg phase, with the loops of two leads, and steps over the lead."""
+    figure = style.canvas(style.WIDTH, 7.4)
+    panel, below = figure.subplots(2, 1, height_ratios=(4.4, 2.4))
+    largest = 1e3 * float(abs(motion.curvature).max())
+    image = panel.pcolormesh(
+        *(np.degrees(motion.phase), np.degrees(motion.phase), 1e3 * motion.curvature.T),
+        cmap="RdBu_r",
+        vmin=-largest,
+        vmax=largest,
+        shading="nearest",
+    )
+    best = float(motion.phase[motion.steps.argmax()])
+    loops = {"configured lead": (lead, "solid"), "best lead": (best, (0, (2, 2)))}
+    for name, (angle, line) in loops.items():
+        body = np.linspace(0.0, 360.0, 721)
+        leg = (body + math.degrees(angle)) % 360.0
+        leg[1:][abs(np.diff(leg)) > 180.0] = math.nan
+        label = f"{name}, {math.degrees(angle) % 360.0:.0f} deg"
+        panel.plot(body, leg, color=style.INK, linestyle=line, label=label)
+    panel.set(
+        xlim=(0, 360),
+        ylim=(0, 360),
+        xlabel="body phase [deg]",
+        ylabel="leg phase [deg]",
+        title="Curvature of the forward motion [mm/rad²]",
+    )
+    panel.set_aspect("equal")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(MultipleLocator(90))
+    figure.colorbar(image, ax=panel)
+    panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2, fontsize=8)
+    below.plot(np.degrees(motion.phase), 1e3 * motion.steps, color=style.SERIES[0], marker="o")
+    below.axhline(0.0, color=style.MUTED, linewidth=0.8)
+    below.xaxis.set_major_locator(MultipleLocator(90))
+    below.set(xlabel="lead [deg]", ylabel="step a cycle [mm]", title="Step along each loop")
+    return figure
+
+
+@style.styled
+def twists(table: TwistMap, rows: Sequence[Walked]) -> Figure:
+    """The twist map, and wanted twists as the engine walked them."""
+    figure = style.canvas(style.WIDTH, 8.4)
+    panel, walked = figure.subplots(2, 1)
+    amplitude, offset = np.degrees(table.amplitude), np.degrees(table.offset)
+    for i, value in enumerate(amplitude):
+        colour = style.SERIES[0] if i in (0, len(amplitude) - 1) else style.FAINT
+        panel.plot(table.curvature[i], table.speed[i], color=colour, linewidth=1.2)
+        panel.annotate(f"{value:.0f}°", (table.curvature[i, 0], table.speed[i, 0]), fontsize=7)
+    for j in range(len(offset)):
+        panel.plot(table.curvature[:, j], table.speed[:, j], color=style.FAINT, linewidth=1.2)
+        place = table.curvature[0, j], table.speed[0, j]
+        panel.annotate(f"{offset[j]:.0f}°", place, fontsize=7, va="top", color=style.SERIES[1])
+    panel.set(
+        xlabel="curvature [1/m]",
+        ylabel="forward speed [m/s]",
+        title="Amplitudes (at the left) and offsets (below) of the map",
+    )
+    if rows:
+        bend, speed = columns(rows, "wanted_per_m", "speed_m_s")
+        (wanted,) = columns(rows, "wanted_m_s")
+        curvature = np.array([row.curvature for row in rows])
+        for ends in zip(bend, curvature, wanted, speed, strict=True):
+            walked.plot(ends[:2], ends[2:], color=style.MUTED, linewidth=1.0)
+        walked.plot(bend, wanted, "o", color="none", markeredgecolor=style.INK, label="wanted")
+        walked.plot(curvature, speed, "o", color=style.SERIES[1], markersize=5, label="engine")
+        walked.legend(loc="lower center")
+    walked.set(xlabel="curvature [1/m]", ylabel="forward speed [m/s]", title="Twists as walked")
+    return figure
