@@ -1,10 +1,13 @@
 """The twist map: there and back, its reach, and the time of a call."""
 
+import math
 import time
 
 import numpy as np
 import pytest
 
+from antennate.control.gait import targets
+from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE, TwistGait
 from antennate.errors import ConfigError
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.params.gaits import GaitParams
@@ -69,3 +72,32 @@ def test_a_call_takes_less_than_20_microseconds(map_of_robot):
 def test_lifting_legs_are_refused():
     with pytest.raises(ConfigError, match="rolling legs, found lifting"):
         twist_map(RobotSpec.named("hexapod"), GAIT)
+
+
+def test_targets_do_not_jump_when_the_wanted_twist_does(map_of_robot):
+    """A joint goes no farther in a tick than wave, offset, amplitude and lead can change."""
+    robot, period = RobotSpec(), 0.01
+    gait = TwistGait(GAIT, robot, 2, period, map_of_robot)
+    rng = np.random.default_rng(5)
+    yaw = []
+    for _ in range(400):
+        if rng.random() < 0.05 or not yaw:
+            speed, curvature = rng.uniform(0.1, 0.25, 2), rng.uniform(-3.0, 3.0, 2)
+        yaw.append(gait.step(speed, curvature).yaw)
+    turning = 2 * math.pi * GAIT.frequency + LEAD_RATE
+    most = robot.yaw_limit * turning + AMPLITUDE_RATE + GAIT.offset_rate
+    assert abs(np.diff(yaw, axis=0)).max() <= period * most
+    assert abs(np.array(yaw)).max() > 0.8 * robot.yaw_limit
+
+
+def test_it_settles_at_the_gait_of_the_map(map_of_robot):
+    """After a second the commands are those of the plain gait with the numbers of the map."""
+    robot, period = RobotSpec(), 0.01
+    gait = TwistGait(GAIT, robot, 1, period, map_of_robot)
+    for _ in range(200):
+        command = gait.step(np.array([0.17]), np.array([0.8]))
+    wave = map_of_robot.gait(0.17, 0.8)
+    params = GaitParams(amplitude=wave.amplitude, body_phase=wave.lead)
+    plain = targets(params, robot, gait.phase, np.array([wave.offset]))
+    np.testing.assert_allclose(command.yaw, plain.yaw, atol=1e-12)
+    np.testing.assert_allclose(command.leg, plain.leg, atol=1e-12)

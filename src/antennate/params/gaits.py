@@ -55,12 +55,26 @@ def _hexapod(ahead: float, lift: float) -> Mapping[str, Any]:
     }
 
 
+def _wave(amplitude: float, wave_number: float, lead: float) -> Mapping[str, Any]:
+    """A gait of rolling legs; amplitude and lead of the body over the legs [deg]."""
+    return {
+        "amplitude": math.radians(amplitude),
+        "wave_number": wave_number,
+        "body_phase": math.radians(lead),
+    }
+
+
 GAITS: Mapping[str, Mapping[str, Any]] = {
     "serpenoid": {},
+    "swift": _wave(29.0, 0.75, 217.0),
+    "thrifty": _wave(29.0, 0.9, 208.0),
     "b11bl0": _hexapod(11 * math.pi / 8, math.pi / 4),
     "in_phase": _hexapod(math.pi, math.pi / 2),
 }
 """Gaits by name: what differs from the defaults.
+
+`swift` and `thrifty` are of the default robot and fitted by `antennate geometry`: the first walks
+17 % faster than `serpenoid` at the same cost of transport, the second 10 % faster at less.
 
 `b11bl0` and `in_phase` are of the six-legged robot `hexapod`, after a table of its simulated gaits
 (psu-LiBR) with 49 rows a cycle and the columns -b and f. In `b11bl0` the middle left, back right

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, ClassVar, Literal, TypeVar, cast
 
 import numpy as np
 from pydantic import model_validator
@@ -26,6 +26,7 @@ from antennate.params.base import (
 )
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
+from antennate.robots.mechanics import require_wave
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 
@@ -139,6 +140,10 @@ class GaitStudyConfig(Params):
     """Draws of the unknown numbers, if there are any."""
     seed: int = number(1, "1", "assumed: any", ge=0)
     """Seed of the draws."""
+    optimise: Literal["none", "speed", "cost", "turning"] = number(
+        "none", "1", "assumed: the gait is walked as it is given"
+    )
+    """What one more gait is best at by the model; `cost` is that of gaits as fast as the given."""
     robot: RobotSpec = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
@@ -171,6 +176,11 @@ class GaitStudyConfig(Params):
         require_whole_steps("rate", self.rate, self.physics.timestep)
         if not self.unknown:
             require_default(self, "all is known", *_OF_UNKNOWN)
+        if self.optimise != "none":
+            try:
+                require_wave(self.robot, self.gait)
+            except ConfigError as error:
+                raise ValueError(str(error)) from None
         unknowns = self.unknowns
         require_different("unknown", [one.name for one in unknowns])
         for one in unknowns:

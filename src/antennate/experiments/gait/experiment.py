@@ -17,6 +17,7 @@ import numpy as np
 
 from antennate.colours import called
 from antennate.experiments.gait.config import GaitStudyConfig, drawn
+from antennate.experiments.gait.optimise import optimise
 from antennate.experiments.gait.physics import (
     Pace,
     Walk,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from antennate.telemetry.film import Film
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
-WAVE_OFF = "wave_off"
+WAVE_OFF, OPTIMISED = "wave_off", "optimised"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,8 @@ class GaitOutcome(Outcome):
     Attributes:
         drawn: FORWARD for each draw of the unknown numbers.
         ends: FORWARD with each of them alone at its lower and its upper end.
+        optimised: A gait that is best at something by the model, TURN_L where that is turning; None
+            unless asked for.
     """
 
     config: GaitStudyConfig
@@ -55,6 +58,7 @@ class GaitOutcome(Outcome):
     sweep: list[Walk]
     drawn: list[Walk]
     ends: dict[str, tuple[Walk, Walk]]
+    optimised: Walk | None
 
     def pace(self, walk: Walk) -> Pace:
         """What a walk of this study comes to."""
@@ -98,6 +102,26 @@ class GaitOutcome(Outcome):
             },
             "measured_body_lengths_per_cycle": config.measured,
             "unknown": self._unknown() if self.drawn else None,
+            "optimised": None if self.optimised is None else self._optimised(self.optimised),
+        }
+
+    def _optimised(self, walk: Walk) -> dict[str, Any]:
+        """The optimised gait beside the one it is compared with."""
+        goal = self.config.optimise
+        name = "turn_l" if goal == "turning" else "forward"
+        rows = {name: self.maneuvers[name], OPTIMISED: walk}
+        return {
+            "goal": goal,
+            "gaits": {
+                name: {
+                    "amplitude_rad": row.gait.amplitude,
+                    "wave_number": row.gait.wave_number,
+                    "body_phase_rad": row.gait.body_phase,
+                    "turn_offset_rad": row.gait.turn_offset if goal == "turning" else None,
+                    **self._row(row),
+                }
+                for name, row in rows.items()
+            },
         }
 
     def _unknown(self) -> dict[str, Any]:
@@ -158,7 +182,16 @@ def _tasks(config: GaitStudyConfig) -> list[_Task]:
         *((config, m.name.lower(), gait, m) for m in MANEUVERS),
         *((config, name, one, Maneuver.FORWARD) for name, one in forward.items()),
         *((one, name, one.gait, Maneuver.FORWARD) for name, one in _unknown(config).items()),
+        *_optimum(config),
     ]
+
+
+def _optimum(config: GaitStudyConfig) -> Iterator[_Task]:
+    """The walk of the gait that is best by the model, if one is asked for."""
+    if config.optimise != "none":
+        best = optimise(config.robot, config.gait, config.optimise)
+        turning = config.optimise == "turning"
+        yield config, OPTIMISED, best, Maneuver.TURN_L if turning else Maneuver.FORWARD
 
 
 def _unknown(config: GaitStudyConfig) -> dict[str, GaitStudyConfig]:
@@ -233,6 +266,7 @@ def run(
             one.name: (by_name[f"{one.name}:low"], by_name[f"{one.name}:high"])
             for one in config.unknowns
         },
+        optimised=by_name.get(OPTIMISED),
     )
 
 
@@ -259,7 +293,24 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"gives {100 * cost['chosen_over_best']:.0f} % of its speed;\n"
         f"the slowest one gives {100 * cost['worst_over_best']:.0f} %.",
     )
-    return (maneuvers, *_unknown_tables(result))
+    return (maneuvers, *_optimised_tables(result), *_unknown_tables(result))
+
+
+_OPTIMISED = (
+    Measure("amplitude_rad", "amplitude", "deg", form=".1f", scale=math.degrees(1.0)),
+    Measure("wave_number", "wave number"),
+    Measure("body_phase_rad", "lead", "deg", form=".0f", scale=math.degrees(1.0)),
+    Measure("turn_offset_rad", "yaw offset", "deg", form=".1f", scale=math.degrees(1.0)),
+    *MANEUVER,
+)
+
+
+def _optimised_tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """The gait that is best at something by the model, beside the given one."""
+    if (found := result["optimised"]) is None:
+        return ()
+    note = "Chosen by the quasi-static model, walked in the engine; see docs/science/geometry.md."
+    return (Table.of(f"Best {found['goal']}", found["gaits"], _OPTIMISED, note),)
 
 
 def _unknown_tables(result: Mapping[str, Any]) -> Sequence[Table]:

@@ -104,6 +104,8 @@ def agreement(config: GeometryConfig, rows: Sequence[Walked]) -> dict[str, Any]:
     """
     speed, model = columns(rows, "speed_m_s", "model_speed_m_s")
     yaw, turn = columns(rows, "yaw_deg_per_cycle", "model_yaw_deg_per_cycle")
+    model_cost, cost = columns(rows, "model_cost", "cost_of_transport")
+    cost = np.nan_to_num(cost, nan=np.inf)  # it hardly moves
     rolling = rolling_speed(config.gait, config.robot) if config.rolls else float(speed.mean())
     sample = np.random.default_rng(config.seed).integers(len(speed), size=(_RESAMPLES, len(speed)))
 
@@ -119,6 +121,7 @@ def agreement(config: GeometryConfig, rows: Sequence[Walked]) -> dict[str, Any]:
         "speed_rmse_m_s": of(_rmse, model, speed),
         "yaw_r": of(_correlation, turn, yaw),
         "yaw_rmse_deg": of(_rmse, turn, yaw),
+        "cost_rank_r": of(_correlation, _ranks(model_cost), _ranks(cost)),
         "rival_speed_m_s": rolling,
         "rival_rmse_m_s": of(_rmse, rival, speed),
         "rival_less_model_m_s": of(lambda a, b, c: _rmse(b, c) - _rmse(a, c), model, rival, speed),
@@ -135,6 +138,11 @@ def agreement(config: GeometryConfig, rows: Sequence[Walked]) -> dict[str, Any]:
 def _correlation(a: Floats, b: Floats) -> float:
     a, b = a - a.mean(), b - b.mean()
     return float((a * b).sum() / max(math.sqrt((a**2).sum() * (b**2).sum()), 1e-300))
+
+
+def _ranks(values: Floats) -> Floats:
+    """Rank of each value from 0 on."""
+    return values.argsort().argsort().astype(float)
 
 
 def _rmse(a: Floats, b: Floats) -> float:
@@ -288,6 +296,7 @@ def _agreement_table(entry: Mapping[str, Any]) -> Table:
         ("  rival less model", "rival_less_model_m_s", "above 0", ".4f"),
         ("yaw, correlation", "yaw_r", f"at least {YAW_R:g}", ".3f"),
         ("yaw, rms difference [deg a cycle]", "yaw_rmse_deg", "", ".1f"),
+        ("cost of transport, rank correlation", "cost_rank_r", "", ".2f"),
     ]
     rows = [
         (
@@ -329,10 +338,10 @@ def sentence(result: Mapping[str, Any]) -> str:
     speed, yaw = entry["speed_rmse_m_s"]["value"], entry["yaw_rmse_deg"]["value"]
     return (
         f"On {entry['gaits']} random gaits the model foretells the speed of the engine within "
-        f"{speed:.3f} m/s (r {entry['speed_r']['value']:.3f}) and yaw within {yaw:.1f} deg a cycle "
-        f"(r {entry['yaw_r']['value']:.3f}), the best lead within {worst:.0f} deg; the fastest gait "
-        f"at no more cost walks at {best['speed_over_default']:.2f} of the speed of the configured "
-        "one."
+        f"{speed:.3f} m/s (r {entry['speed_r']['value']:.3f}), its yaw within {yaw:.1f} deg a "
+        f"cycle (r {entry['yaw_r']['value']:.3f}) and its best lead within {worst:.0f} deg; the "
+        f"fastest gait at no more cost walks at {best['speed_over_default']:.2f} of the speed of "
+        "the configured one."
     )
 
 

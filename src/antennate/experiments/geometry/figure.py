@@ -90,7 +90,7 @@ def leads(entries: Sequence[Mapping[str, Any]]) -> Figure:
 @style.styled
 def front(rows: Sequence[Walked], named: Sequence[Walked]) -> Figure:
     """Speed and cost of transport of the gaits that may be fast or cheap."""
-    figure = style.canvas(style.WIDTH, 4.6)
+    figure = style.canvas(style.WIDTH, 5.0)
     panel = figure.subplots()
     speed, cost, number = columns(rows, "speed_m_s", "cost_of_transport", "wave_number")
     dots = panel.scatter(speed, cost, c=number, cmap="viridis", s=18, label="largest amplitude")
@@ -112,7 +112,7 @@ def front(rows: Sequence[Walked], named: Sequence[Walked]) -> Figure:
     low, high = np.nanpercentile(cost, [0, 75])
     panel.set_ylim(0.9 * low, 1.25 * high)
     figure.colorbar(dots, ax=panel, label="wave number", location="bottom", shrink=0.7)
-    panel.legend(loc="upper left")
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return figure
 
 
