@@ -26,6 +26,11 @@ FIGURES = {
     "tunnel.png": "trajectories.png",
     "hexapod.png": "unknown.png",
     "study.png": "map.png",
+    "geometry_agreement.png": "agreement.png",
+    "geometry_leads.png": "leads.png",
+    "geometry_front.png": "front.png",
+    "geometry_torus.png": "torus.png",
+    "geometry_twists.png": "twists.png",
 }
 """Names in the run where they are not those of the picture."""
 SCRIPTS = {
@@ -38,6 +43,7 @@ SCRIPTS = {
 FEW = {
     "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
+    "geometry": "--gaits 4 --wave-numbers 1 --leads 3 --front-waves 2 --turns 2 --cells 12",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",

@@ -208,7 +208,7 @@ BAD = [
     ),
     (["twin"], "expected a robot with antennae for the twin, found one without"),
     (["gait", "--gait", "b12bl0"], "(did you mean b11bl0?), found 'b12bl0'"),
-    (["gait", "--gait", ""], "expected serpenoid, b11bl0, in_phase or a TOML file"),
+    (["gait", "--gait", ""], "expected serpenoid, swift, thrifty, b11bl0, in_phase or a TOML file"),
     (["gait", "--draws", "3"], "draws: expected the default, as all is known"),
     (["gait", "--unknown", "robot.mass"], "such as robot.leg_friction=0.18:0.25, found"),
     (["gait", "--unknown", "robot.mass=2:1"], "such as robot.leg_friction=0.18:0.25, found"),

@@ -119,6 +119,31 @@ TINY: dict[str, list[dict[str, Any]]] = {
             ("xc430_w240", {}, "rolling"),
         )
     ],
+    "geometry": [
+        {
+            "gaits": 3,
+            "wave_numbers": [1.0],
+            "leads": 3,
+            "front_waves": 1,
+            "turns": 1,
+            "cells": 6,
+            "cycles": 2,
+            "settling_cycles": 0,
+            "gait": {"frequency": 1.0, "amplitude": 0.3},
+            "robot": {
+                "yaw": {"servo": servo, "fastest": 4.0},
+                "pitch": {"kind": pitch},
+                "antenna": {"sensor": sensor},
+                "legs": {"kind": kind, "servo": "xl430_w250"},
+            },
+            "physics": {"timestep": 0.004, "contact_time": 0.008},
+            "rate": 50.0,
+        }
+        for servo, sensor, kind, pitch in (
+            ("xl330_m288", OTHER_SENSOR, "lifting", "actuated"),
+            ("xc430_w240", {}, "rolling", "locked"),
+        )
+    ],
     "wall": [
         {
             "trials": 1,

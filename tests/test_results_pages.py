@@ -11,6 +11,8 @@ import pytest
 from antennate.experiments.force.experiment import MEASURES as FORCE
 from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
+from antennate.experiments.geometry import experiment as geometry
+from antennate.experiments.geometry.physics import Walked
 from antennate.experiments.sweep.experiment import SweepRow
 from antennate.experiments.touch.experiment import AVERAGING, PROFILE
 from antennate.experiments.tracks.run import TrackRow
@@ -24,12 +26,14 @@ DOCS = Path(__file__).parents[1] / "docs"
 MEASURES = {
     ("results.md", "tunnel"): (*tunnel.CONTROLLER, *tunnel.PAIR),
     ("results.md", "gait"): MANEUVER,
+    ("results.md", "geometry"): geometry.GAIT,
     ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
     ("results.md", "touch"): (*PROFILE, *AVERAGING),
     ("results.md", "force"): FORCE,
 }
 ROWS = {
     ("results.md", "tunnel"): TrialResult,
+    ("results.md", "geometry"): Walked,
     ("results.md", "wall"): WallTrial,
     ("results.md", "force"): TraverseRow,
     ("tracks.md", "tracks"): TrackRow,
