@@ -25,7 +25,7 @@ from antennate.robots.spec import RobotSpec
 
 TINY = [
     *("--gaits", "4", "--wave-numbers", "1", "--leads", "3", "--front-waves", "1"),
-    *("--turns", "2", "--cells", "8", "--cycles", "2", "--settling-cycles", "1"),
+    *("--turns", "2", "--cells", "8", "--repeats", "2", "--cycles", "2", "--settling-cycles", "1"),
 ]
 
 

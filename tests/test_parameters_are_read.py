@@ -127,6 +127,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "front_waves": 1,
             "turns": 1,
             "cells": 6,
+            "repeats": 1,
             "cycles": 2,
             "settling_cycles": 0,
             "gait": {"frequency": 1.0, "amplitude": 0.3},

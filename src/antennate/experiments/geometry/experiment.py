@@ -23,6 +23,7 @@ from antennate.robots.mechanics import cycles, peaks, phase_law
 from antennate.studies.experiment import Experiment, OnRow, OnStep, Outcome, no_row, no_step
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.pool import Workers, gather
+from antennate.studies.statistics import mean95
 from antennate.types import Floats
 
 SPEED_R, SPEED_RMSE, YAW_R, LEAD_DEG = 0.96, 0.02, 0.95, 15.0
@@ -58,7 +59,8 @@ class GeometryOutcome(Outcome):
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        named = [_numbers(row, self.config) for row in self.part("named")]
+        names = dict.fromkeys(row.name for row in self.part("named"))
+        named = [self._repeated(name) for name in names]
         front = [_numbers(row, self.config) for row in self.part("front")]
         default = named[0]
         return {
@@ -75,6 +77,15 @@ class GeometryOutcome(Outcome):
             "torus": None if self.torus is None else _torus(self.config, self.torus),
             "turns": turns(self.part("turn")),
         }
+
+    def _repeated(self, name: str) -> dict[str, Any]:
+        """A named gait: means over its walks, with their intervals."""
+        rows = [_numbers(row, self.config) for row in self.part("named") if row.name == name]
+        middle = dict(rows[len(rows) // 2])
+        for key in ("speed_m_s", "cost_of_transport", "body_lengths_per_cycle"):
+            values = np.array([row[key] for row in rows], float)
+            middle[key], middle[f"{key}_95"] = mean95(values)
+        return middle
 
 
 def _numbers(row: Walked, config: GeometryConfig) -> dict[str, Any]:
@@ -247,11 +258,11 @@ GAIT = (
     Measure("amplitude_rad", "amplitude", "deg", form=".1f", scale=math.degrees(1.0)),
     Measure("wave_number", "wave number"),
     Measure("lead_rad", "lead", "deg", form=".0f", scale=math.degrees(1.0)),
-    Measure("speed_m_s", "speed", "m/s", form=".3f"),
+    Measure("speed_m_s", "speed", "m/s", form=".3f", interval="speed_m_s_95"),
     Measure("model_speed_m_s", "  by the model", "m/s", form=".3f"),
     Measure("body_lengths_per_cycle", "body lengths a cycle"),
     Measure("model_body_lengths_per_cycle", "  by the model"),
-    Measure("cost_of_transport", "cost of transport", form=".3f"),
+    Measure("cost_of_transport", "cost of transport", form=".3f", interval="cost_of_transport_95"),
     Measure("model_cost", "  friction alone, model", form=".3f"),
     Measure("model_torque_n_m", "torque of a yaw servo, model", "N·m"),
 )

@@ -26,7 +26,7 @@ def figures(outcome: GeometryOutcome) -> dict[str, Figure]:
     drawn = {
         "agreement": agreement(outcome.part("random"), result["agreement"]),
         "leads": leads(result["leads"]),
-        "front": front(outcome.part("front"), outcome.part("named")),
+        "front": front(outcome.part("front"), result["named"]),
     }
     if outcome.torus is not None:
         drawn["torus"] = torus(outcome.torus, outcome.config.gait.body_phase)
@@ -88,24 +88,26 @@ def leads(entries: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 @style.styled
-def front(rows: Sequence[Walked], named: Sequence[Walked]) -> Figure:
+def front(rows: Sequence[Walked], named: Sequence[Mapping[str, Any]]) -> Figure:
     """Speed and cost of transport of the gaits that may be fast or cheap."""
     figure = style.canvas(style.WIDTH, 5.0)
     panel = figure.subplots()
     speed, cost, number = columns(rows, "speed_m_s", "cost_of_transport", "wave_number")
     dots = panel.scatter(speed, cost, c=number, cmap="viridis", s=18, label="largest amplitude")
-    for row, colour, marker in zip(named, style.series(len(named) + 1)[1:], "*D^vPX", strict=False):
+    for row, colour, marker in zip(
+        named, ("#D55E00", "#CC79A7", "#222222", "#E69F00") * 9, "*D^vPX", strict=False
+    ):
         panel.plot(
-            *(row.speed_m_s, row.cost_of_transport or math.nan),
+            *(row["speed_m_s"], row["cost_of_transport"]),
             color=colour,
             marker=marker,
             markersize=11 if marker == "*" else 7,
             linestyle="",
-            label=row.name,
+            label=row["name"],
             markeredgecolor="white",
         )
-    panel.axhline(named[0].cost_of_transport or 0.0, color=style.MUTED, linewidth=0.8)
-    panel.axvline(named[0].speed_m_s, color=style.MUTED, linewidth=0.8)
+    panel.axhline(named[0]["cost_of_transport"], color=style.MUTED, linewidth=0.8)
+    panel.axvline(named[0]["speed_m_s"], color=style.MUTED, linewidth=0.8)
     panel.set(
         xlabel="speed [m/s]", ylabel="cost of transport", title="Engine; right and low is good"
     )

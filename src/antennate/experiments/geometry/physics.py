@@ -32,6 +32,8 @@ WAVES = (0.5, 1.5)
 """Wave numbers of random gaits; leads are those of a full turn."""
 STEP_OF_LEAD = math.radians(10.0)
 """Between two leads that are walked."""
+_SPREAD = math.radians(1.0)
+"""Between the first and the last lead of a gait that is walked again and again [rad]."""
 SPARE = 0.003
 """What the fastest gaits leave of the joints' limit [rad]."""
 
@@ -60,6 +62,8 @@ class GeometryConfig(Params):
     """Twists of the map that are walked; robots with lifting legs have no map."""
     cells: int = number(24, "1", "assumed: steps of 15 deg", ge=6, le=200)
     """Cells of the map over body and leg phase, each way."""
+    repeats: int = number(9, "1", "assumed: enough for an interval", ge=1, le=1000)
+    """Walks of each named gait, its lead spread over 1 deg: contacts magnify what is tiny."""
     largest_amplitude: float | None = number(None, "rad", "assumed: see below", gt=0.1, le=1.2)
     """Largest amplitude; the limit of the yaw joints if legs roll, else that of the gait."""
     cycles: int = number(4, "1", "measured: antennate gait, as there", ge=2, le=100)
@@ -228,10 +232,14 @@ def plan(config: GeometryConfig) -> Plans:
         *_modelled(config, "lead", lead_waves(config)),
         *_modelled(config, "front", front_waves(config)),
     ]
-    for i, (name, gait) in enumerate(named_gaits(config).items()):
-        alone = Wave(gait.amplitude, gait.wave_number, gait.body_phase, 0.0)
-        (row,) = _modelled(config, "named", alone, gait.frequency)
-        rows.append(replace(row, trial=i, name=name))
+    count = 0
+    for name, gait in named_gaits(config).items():
+        shifts = _SPREAD * (np.arange(config.repeats) - (config.repeats - 1) / 2)
+        shifts /= max(config.repeats - 1, 1)
+        many = Wave(gait.amplitude, gait.wave_number, np.array(gait.body_phase + shifts), 0.0)
+        for row in _modelled(config, "named", many, gait.frequency):
+            rows.append(replace(row, trial=count, name=name))
+            count += 1
     if not config.rolls:
         return Plans(rows, None)
     twists = twist_map(config.robot, config.gait)
