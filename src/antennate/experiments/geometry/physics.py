@@ -234,9 +234,9 @@ def plan(config: GeometryConfig) -> Plans:
     ]
     count = 0
     for name, gait in named_gaits(config).items():
-        shifts = _SPREAD * (np.arange(config.repeats) - (config.repeats - 1) / 2)
-        shifts /= max(config.repeats - 1, 1)
-        many = Wave(gait.amplitude, gait.wave_number, np.array(gait.body_phase + shifts), 0.0)
+        steps = (np.arange(config.repeats) - (config.repeats - 1) / 2) / max(config.repeats - 1, 1)
+        leads: Floats = gait.body_phase + _SPREAD * steps
+        many = Wave(gait.amplitude, gait.wave_number, leads, 0.0)
         for row in _modelled(config, "named", many, gait.frequency):
             rows.append(replace(row, trial=count, name=name))
             count += 1
