@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.errors import ConfigError
@@ -50,8 +50,12 @@ class GeometryConfig(Params):
     """Random gaits, all at the frequency of the gait."""
     seed: int = number(SEED, "1", "assumed: any, chosen before the first run", ge=0)
     """Seed of the random gaits."""
-    wave_numbers: tuple[float, ...] = number(
-        (0.5, 0.75, 1.0, 1.25, 1.5), "1", "assumed: the range of the random gaits", max_length=50
+    wave_numbers: tuple[Annotated[float, Field(gt=0, le=3)], ...] = number(
+        (0.5, 0.75, 1.0, 1.25, 1.5),
+        "1",
+        "assumed: the range of the random gaits",
+        min_length=1,
+        max_length=50,
     )
     """Wave numbers whose best lead is sought."""
     leads: int = number(9, "1", "assumed: 40 deg to both sides of the model's best", ge=3, le=36)
