@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 
@@ -10,6 +11,8 @@ import pytest
 from scipy.optimize import minimize
 
 from antennate.errors import BadInputError
+from antennate.experiments.swimmers import swimmer_figure
+from antennate.figures import render
 from antennate.mechanics import lie
 from antennate.mechanics.chain import PlanarChain, purcell
 from antennate.mechanics.coordinates import minimum_perturbation, square
@@ -20,6 +23,7 @@ from antennate.mechanics.curvature import (
     gradient,
     velocity_integral,
 )
+from antennate.mechanics.maps import CurvatureMap, curvature_map
 from antennate.mechanics.optimal import (
     best_stroke,
     distance,
@@ -43,6 +47,8 @@ PUBLISHED = FourierStroke(
     np.array([-1.353 * ZIGZAG, 0 * ARC, -0.264 * ZIGZAG]),
 )
 """Of the largest displacement: `shchf_LowRe_MaxDisplacement` of OSU-LRAM/GeometricSystemPlotter."""
+ARM = 1.336
+"""Outer over middle link at which the best loop about the straight chain is most efficient."""
 PUBLISHED_DISTANCE = 0.1035
 """Body lengths by that stroke."""
 
@@ -310,21 +316,63 @@ def test_small_strokes_of_least_energy_are_the_ellipse_of_the_largest_eigenvalue
         assert np.linalg.norm(root.T @ second) < 0.05 * np.linalg.norm(root.T @ direct.cosine[0])
 
 
-def test_many_links_swim_best_by_a_wave_that_travels_towards_the_tail() -> None:
-    """Arguments of the complex amplitude go one way along the chain; then it swims forward."""
-    small = small_stroke(PlanarChain.equal(10))
-    assert displacement(PlanarChain.equal(10).twist, small.stroke(0.05))[0] > 0
-    phase = np.unwrap(np.angle(small.first + 1j * small.second))
-    steps = np.diff(phase)
-    assert (steps > 0.5).all() or (steps < -0.5).all()
+def test_many_links_swim_best_by_a_wave_three_links_long() -> None:
+    """It travels from head to tail (1801.04687, version 1: the shortest wave there can be)."""
+    chain = PlanarChain.equal(10)
+    small = small_stroke(chain)
+    assert displacement(chain.twist, small.stroke(0.05))[0] > 0
+    steps = np.diff(np.unwrap(np.angle(small.first + 1j * small.second)))
+    np.testing.assert_allclose(np.degrees(steps), 120, atol=5)
+
+
+def test_the_published_efficient_ellipse_is_as_efficient_as_ours() -> None:
+    """Half-axes 1.495 and 1.327 rad: of OSU-LRAM/GeometricSystemPlotter, by another search."""
+    published = efficiency(purcell(), ellipse(-1.327 * ZIGZAG, 1.495 * ARC))
+    best = efficiency(purcell(), best_stroke(purcell(), "efficiency", harmonics=1))
+    assert 0.99 * best < published < best
+
+
+@pytest.fixture(scope="module")
+def maps() -> CurvatureMap:
+    return curvature_map(purcell(), count=5)
+
+
+def test_the_farthest_stroke_follows_the_line_of_no_curvature(maps: CurvatureMap) -> None:
+    """Beyond it, in good coordinates, the chain would go back."""
+    assert maps.forward[2, 2] == pytest.approx(5 / 243, rel=0.02)
+    assert maps.middle[2, 2] == pytest.approx(5 / 243, rel=1e-6)
+    np.testing.assert_allclose(maps.corrected, maps.exact, rtol=0.03)
+    assert maps.corrected_middle[-1] > 1.5 * maps.exact[-1]
+
+    frame = minimum_perturbation(purcell().connection, square(2.2))
+    loop = maps.loops["distance"].shape
+    values = curvature(frame.change(purcell().connection), loop)[:, 0, 0, 1]
+    assert np.abs(values).max() < 0.15 * 5 / 243
+    assert np.abs(curvature(purcell().connection, loop)[:, 0, 0, 1]).max() > 0.5 * 5 / 243
+
+
+def test_the_figure_shows_both_frames_and_both_strokes(maps: CurvatureMap) -> None:
+    figure = swimmer_figure(maps)
+    first, second, sizes, bar = figure.axes[0], figure.axes[1], figure.axes[-1], figure.axes[2]
+    assert [len(panel.lines) for panel in (first, second)] == [2, 2]
+    assert len(sizes.lines) == 3
+    assert "rad²" in bar.get_xlabel()
+    assert render(figure)["png"].startswith(b"\x89PNG")
+
+
+@functools.cache
+def centred(arm: float) -> float:
+    """Efficiency of the best loop about the straight chain, for outer over middle link."""
+    chain = purcell(2.0, (arm, 1.0, arm))
+    return efficiency(chain, best_stroke(chain, "efficiency"))
 
 
 def gain(bound: float) -> float:
     """Efficiency of the best zigzag oval over the best loop about the straight chain."""
-    chain = purcell(2.0, (1.336, 1.0, 1.336))  # arms at which the centred loop is best
+    chain = purcell(2.0, (ARM, 1.0, ARM))
     oval = best_stroke(chain, "efficiency", bound=bound, centre=1.6, harmonics=4)
     assert abs(oval.centre[0]) > 1
-    return efficiency(chain, oval) / efficiency(chain, best_stroke(chain, "efficiency"))
+    return efficiency(chain, oval) / centred(ARM)
 
 
 def test_large_strokes_gain_for_slender_links_alone() -> None:
@@ -336,6 +384,10 @@ def test_large_strokes_gain_for_slender_links_alone() -> None:
     assert gain(2.8) < 1.53 < gain(2.9)
 
 
+def test_the_links_are_those_at_which_the_centred_loop_is_best() -> None:
+    assert max((1.2, ARM, 1.5), key=centred) == ARM
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -344,6 +396,7 @@ def test_large_strokes_gain_for_slender_links_alone() -> None:
         (lambda: PlanarChain((1.0, 1.0), math.nan), "ratio of a chain must be above 0, found nan"),
         (lambda: FourierStroke(np.zeros(2), np.zeros((1, 3)), np.zeros((1, 3))), "found"),
         (lambda: best_stroke(PlanarChain((1.0, 2.0, 3.0))), "alike from both ends"),
+        (lambda: curvature_map(PlanarChain.equal(4)), "3 links, found 4"),
         (
             lambda: minimum_perturbation(purcell().connection, square(1.0, 2), 8),
             "more shapes or a lower degree",

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from antennate import figures as style
 from antennate.mechanics.maps import CurvatureMap
+from antennate.mechanics.optimal import Objective
 from antennate.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_LOOPS = {
-    "distance": ("farthest", style.INK, "solid"),
-    "efficiency": ("most efficient", style.INK, (0, (4, 1.5))),
+_LOOPS: dict[Objective, tuple[str, Any]] = {
+    "distance": ("farthest", "solid"),
+    "efficiency": ("most efficient", (0, (4, 1.5))),
 }
 
 
@@ -28,11 +29,14 @@ def swimmer_figure(maps: CurvatureMap) -> Figure:
     panels = np.array(upper.subplots(2, 1, sharex=True))
     top = float(np.abs(maps.forward).max())
     titles = ("Minimum-perturbation coordinates", "Frame of the middle link")
-    for panel, values, title in zip(panels, (maps.forward, maps.middle), titles, strict=True):
-        image = _draw_map(panel, maps, values, top)
+    images = [
+        _draw_map(panel, maps, values, top)
+        for panel, values in zip(panels, (maps.forward, maps.middle), strict=True)
+    ]
+    for panel, title in zip(panels, titles, strict=True):
         panel.set_title(title)
     label = "displacement over area of a small loop [lengths/rad²]"
-    upper.colorbar(image, ax=panels, label=label, **style.above(figure))
+    upper.colorbar(images[0], ax=panels, label=label, **style.above(figure))
     panels[1].set_xlabel("front joint [rad]")
     upper.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=1)
     _draw_sizes(lower.subplots(), maps)
@@ -40,16 +44,16 @@ def swimmer_figure(maps: CurvatureMap) -> Figure:
     return figure
 
 
-def _draw_map(panel: Axes, maps: CurvatureMap, values: Floats, top: float) -> object:
+def _draw_map(panel: Axes, maps: CurvatureMap, values: Floats, top: float) -> Any:
     """The curvature over both joints, and the optimal strokes on it."""
     image = panel.pcolormesh(
         maps.angle, maps.angle, values.T, cmap="RdBu", vmin=-top, vmax=top, rasterized=True
     )
     panel.contour(maps.angle, maps.angle, values.T, levels=[0.0], colors=style.MUTED, linewidths=1)
-    for objective, (name, colour, line) in _LOOPS.items():
+    for objective, (name, line) in _LOOPS.items():
         loop = maps.loops[objective]
         label = f"{name}: {loop.distance:.4f} lengths, efficiency {loop.efficiency:.2%}"
-        panel.plot(*loop.shape.T, color=colour, linestyle=line, label=label)
+        panel.plot(*loop.shape.T, color=style.INK, linestyle=line, label=label)
     panel.set_aspect("equal")
     panel.grid(visible=False)
     panel.set_ylabel("rear joint [rad]")
