@@ -25,6 +25,8 @@ Goal = Callable[[PlanarChain, Stroke], float]
 
 _NEAR = 1.0
 """Farthest that a search moves a coefficient [rad]: strokes that go round once stay so."""
+_SEARCHES = 10
+"""Most searches one after the other, each from where the last one had to stop."""
 _TIMES = 64
 """Times of a stroke at which its angles are held within the bound."""
 _SIZE = 1.3
@@ -130,21 +132,23 @@ def _search(chain: PlanarChain, goal: Goal, rows: Floats, start: Floats, bound: 
     def cost(x: Floats) -> float:
         return -goal(chain, _as_stroke(x @ rows, chain.joints))
 
-    result = minimize(
-        cost,
-        start,
-        method="SLSQP",
-        bounds=np.stack([start - _NEAR, start + _NEAR], axis=-1),
-        constraints={
-            "type": "ineq",
-            "fun": lambda x: np.concatenate([bound - limits @ x, bound + limits @ x]),
-            "jac": lambda x: np.concatenate([-limits, limits]),
-        },
-        options={"maxiter": 300, "ftol": 1e-9},
-    )
-    if not result.success:
-        raise BadInputError(f"no optimal stroke within {bound:g} rad: {result.message}")
-    return result.x @ rows
+    inside = {
+        "type": "ineq",
+        "fun": lambda x: np.concatenate([bound - limits @ x, bound + limits @ x]),
+        "jac": lambda _: np.concatenate([-limits, limits]),
+    }
+    for _ in range(_SEARCHES):
+        near = np.stack([start - _NEAR, start + _NEAR], axis=-1)
+        options = {"maxiter": 300, "ftol": 1e-9}
+        result = minimize(
+            cost, start, method="SLSQP", bounds=near, constraints=inside, options=options
+        )
+        if not result.success:
+            raise BadInputError(f"no optimal stroke within {bound:g} rad: {result.message}")
+        if np.abs(result.x - start).max() < 0.99 * _NEAR:
+            return result.x @ rows
+        start = result.x
+    raise BadInputError(f"no optimal stroke within {bound:g} rad after {_SEARCHES} searches")
 
 
 def _mirrored(joints: int, harmonics: int, about_zero: bool) -> Floats:
