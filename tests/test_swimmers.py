@@ -195,6 +195,8 @@ def test_the_search_finds_the_published_stroke() -> None:
     assert abs(stroke.cosine[0] @ ZIGZAG) == pytest.approx(1.353, rel=0.02)
     assert abs(stroke.sine[0] @ ARC) == pytest.approx(2.018, rel=0.02)
     assert abs(stroke.cosine[2] @ ZIGZAG) == pytest.approx(0.264, rel=0.05)
+    metres = best_stroke(PlanarChain.equal(3, 0.02), "distance")  # the unit of length is free
+    np.testing.assert_allclose(metres.cosine, stroke.cosine, atol=1e-3)
 
 
 def test_the_corrected_integral_is_good_in_minimum_perturbation_coordinates_alone() -> None:
@@ -384,6 +386,34 @@ def test_large_strokes_gain_for_slender_links_alone() -> None:
     assert gain(2.8) < 1.53 < gain(2.9)
 
 
+def lobe(bound: float) -> Floats:
+    """Where a loop about a zigzag takes the straight chain, with the way there and back."""
+    chain = purcell(2.0, (ARM, 1.0, ARM))
+    stroke = best_stroke(chain, "distance", bound=bound, centre=1.6)
+    start = stroke(np.zeros(1))[0][0]
+
+    def way(t: Floats) -> tuple[Floats, Floats]:
+        return np.multiply.outer(t, start), np.broadcast_to(start, (len(t), 2))
+
+    there = path(chain.twist, way)[-1]
+    moved = there @ path(chain.twist, stroke)[-1] @ lie.se2_inverse(there)
+    return lie.se2_log(moved) / chain.length
+
+
+def test_two_mirrored_lobes_go_farther_the_other_way() -> None:
+    """Raz and Avron (arXiv 0706.3906): 1.14 times as far as the best loop about the straight chain.
+
+    A lobe about the opposite zigzag moves as far forward and the opposite way to the side.
+    """
+    chain = purcell(2.0, (ARM, 1.0, ARM))
+    centred = best_stroke(chain, "distance")
+    assert displacement(chain.twist, centred)[0] > 0
+    least, most = (lobe(bound) for bound in (2.2, 2.4))
+    once = distance(chain, centred) / chain.length
+    assert -2 * least[0] < 1.14 * once < -2 * most[0]
+    np.testing.assert_allclose([least[2], most[2]], 0, atol=1e-4)
+
+
 def test_the_links_are_those_at_which_the_centred_loop_is_best() -> None:
     assert max((1.2, ARM, 1.5), key=centred) == ARM
 
@@ -397,6 +427,7 @@ def test_the_links_are_those_at_which_the_centred_loop_is_best() -> None:
         (lambda: FourierStroke(np.zeros(2), np.zeros((1, 3)), np.zeros((1, 3))), "found"),
         (lambda: best_stroke(PlanarChain((1.0, 2.0, 3.0))), "alike from both ends"),
         (lambda: curvature_map(PlanarChain.equal(4)), "3 links, found 4"),
+        (lambda: best_stroke(purcell(), bound=2.6, centre=1.6), "lower the bound"),
         (
             lambda: minimum_perturbation(purcell().connection, square(1.0, 2), 8),
             "more shapes or a lower degree",

@@ -17,9 +17,10 @@ from antennate.mechanics.chain import PlanarChain, purcell
 from antennate.mechanics.coordinates import minimum_perturbation, square
 from antennate.mechanics.curvature import corrected_integral, velocity_integral
 from antennate.mechanics.friction import coulomb_twist
+from antennate.mechanics.lie import se2_inverse
 from antennate.mechanics.maps import curvature_map
 from antennate.mechanics.optimal import best_stroke, distance, efficiency, small_stroke
-from antennate.mechanics.stroke import Connection, FourierStroke, displacement, ellipse
+from antennate.mechanics.stroke import Connection, FourierStroke, displacement, ellipse, path
 from antennate.types import Floats
 
 HERE = Path(__file__).parent
@@ -96,6 +97,29 @@ def gains() -> None:
         row(arm, f"{centred:.4f}", *values)
 
 
+def lobes() -> None:
+    """Distance of two mirrored loops about zigzags, over the best about the straight chain."""
+    bounds = (2.2, 2.3, 2.4)
+    row("outer over middle link", "straight [lengths]", *bounds)
+    for arm in (1.0, 1.336, 1.49):
+        chain = purcell(2.0, (arm, 1.0, arm))
+        far = distance(chain, best_stroke(chain, "distance"))
+        row(arm, f"{far / chain.length:.4f}", *(f"{2 * _lobe(chain, b) / far:.2f}" for b in bounds))
+
+
+def _lobe(chain: PlanarChain, bound: float) -> float:
+    """How far forward a loop about a zigzag takes the straight chain, with the way to it."""
+    stroke = best_stroke(chain, "distance", bound=bound, centre=1.6)
+    start = stroke(np.zeros(1))[0][0]
+
+    def way(t: Floats) -> tuple[Floats, Floats]:
+        return np.multiply.outer(t, start), np.broadcast_to(start, (len(t), 2))
+
+    there = path(chain.twist, way)[-1]
+    moved = there @ path(chain.twist, stroke)[-1] @ se2_inverse(there)
+    return float(moved[0, 2])
+
+
 def crawling() -> None:
     """Distances by circles of 0.5 and 1 rad in a fluid and on dry ground, by drag ratio."""
     row("drag ratio", "fluid, 0.5 rad", "ground, 0.5 rad", "fluid, 1 rad", "ground, 1 rad")
@@ -123,4 +147,5 @@ if __name__ == "__main__":
     integrals(maps.loops["distance"].stroke)
     small()
     gains()
+    lobes()
     crawling()

@@ -90,6 +90,10 @@ def efficiency(chain: PlanarChain, stroke: Stroke) -> float:
     return chain.length * (distance(chain, stroke) / effort(chain, stroke)) ** 2
 
 
+def _lengths(chain: PlanarChain, stroke: Stroke) -> float:
+    return distance(chain, stroke) / chain.length
+
+
 def best_stroke(
     chain: PlanarChain,
     objective: Objective = "distance",
@@ -113,16 +117,30 @@ def best_stroke(
         harmonics: Harmonics of the Fourier series.
 
     Raises:
-        BadInputError: Lengths that differ from end to end, or a search without an optimum.
+        BadInputError: Lengths that differ from end to end, a search without an optimum, or three
+            links for which a stroke of several loops is better.
     """
     if not np.allclose(chain.lengths, chain.lengths[::-1]):
         raise BadInputError(f"lengths must be alike from both ends, found {chain.lengths}")
-    goal = distance if objective == "distance" else efficiency
+    goal = _lengths if objective == "distance" else efficiency
     values = _start(chain, centre, bound)
     for count in sorted({1, harmonics}):  # the best ellipse first, then its neighbourhood
         rows = _mirrored(chain.joints, count, about_zero=centre == 0)
         values = _search(chain, goal, rows, _padded(values, count, chain.joints) @ rows.T, bound)
-    return _as_stroke(values, chain.joints)
+    stroke = _as_stroke(values, chain.joints)
+    if chain.joints == 2 and not _goes_round_once(stroke):
+        raise BadInputError(
+            f"no stroke that goes round once is best within {bound:g} rad: lower the bound, or "
+            f"give fewer than {harmonics} harmonics"
+        )
+    return stroke
+
+
+def _goes_round_once(stroke: Stroke) -> bool:
+    """Whether a loop of two joints, and its direction, turn once about the mean shape."""
+    vectors = stroke(np.linspace(0, 1, 721))
+    angles = (np.unwrap(np.arctan2(*(v - v[:-1].mean(axis=0)).T)) for v in vectors)
+    return all(abs(abs(angle[-1] - angle[0]) - 2 * np.pi) < 1 for angle in angles)
 
 
 def _search(chain: PlanarChain, goal: Goal, rows: Floats, start: Floats, bound: float) -> Floats:
