@@ -426,6 +426,9 @@ def test_the_links_are_those_at_which_the_centred_loop_is_best() -> None:
         (lambda: PlanarChain((1.0, 1.0), math.nan), "ratio of a chain must be above 0, found nan"),
         (lambda: FourierStroke(np.zeros(2), np.zeros((1, 3)), np.zeros((1, 3))), "found"),
         (lambda: best_stroke(PlanarChain((1.0, 2.0, 3.0))), "alike from both ends"),
+        (lambda: best_stroke(PlanarChain((1.0, 1.0))), "3 links or more"),
+        (lambda: best_stroke(purcell(), bound=1.0, centre=-1.2), "centre -1.2 and the bound 1 rad"),
+        (lambda: best_stroke(purcell(), harmonics=0), "1 harmonic or more"),
         (lambda: curvature_map(PlanarChain.equal(4)), "3 links, found 4"),
         (lambda: best_stroke(purcell(), bound=2.6, centre=1.6), "lower the bound"),
         (

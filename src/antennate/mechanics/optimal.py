@@ -117,11 +117,19 @@ def best_stroke(
         harmonics: Harmonics of the Fourier series.
 
     Raises:
-        BadInputError: Lengths that differ from end to end, a search without an optimum, or three
-            links for which a stroke of several loops is better.
+        BadInputError: Less than three links, lengths that differ from end to end, a centre beyond
+            the bound, a search without an optimum, or three links that go farther in several loops.
     """
-    if not np.allclose(chain.lengths, chain.lengths[::-1]):
-        raise BadInputError(f"lengths must be alike from both ends, found {chain.lengths}")
+    if chain.links < 3 or not np.allclose(chain.lengths, chain.lengths[::-1]):
+        raise BadInputError(
+            "a stroke needs 3 links or more with lengths alike from both ends, found "
+            f"{chain.lengths}"
+        )
+    if harmonics < 1 or not abs(centre) < bound:
+        raise BadInputError(
+            f"a stroke needs 1 harmonic or more and a centre within its bound, found {harmonics} "
+            f"harmonics, the centre {centre:g} and the bound {bound:g} rad"
+        )
     goal = _lengths if objective == "distance" else efficiency
     values = _start(chain, centre, bound)
     for count in sorted({1, harmonics}):  # the best ellipse first, then its neighbourhood
