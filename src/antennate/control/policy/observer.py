@@ -1,0 +1,123 @@
+"""The observation of a policy, built tick by tick from what a robot has."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from antennate.control.conditioning import RunningMean, curves, level_and_fraction
+from antennate.control.policy.interface import PolicyInterface, bounds, channels, observations
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Bools, Floats, Ints
+
+Vector = NDArray[np.float32]
+
+
+class GaitState(Protocol):
+    """What a robot knows of its own gait: rows of what it commanded last."""
+
+    phase: Floats
+    pace: Floats
+    offset: Floats
+    amplitude: Floats
+
+    def goals(self) -> Floats | None:
+        """Goals of all joints as a policy is given them, shape (B, n); None if it is not."""
+        ...
+
+
+class Observer:
+    """Observations of B robots. A reading that cannot be used counts as that of a free antenna.
+
+    Args:
+        interface: What a policy is given.
+        control: Curves, averaging time and rate.
+        robot: The robot.
+        batch: Number of robots B.
+
+    Attributes:
+        unknown: Rows whose newest readings cannot be used, shape (B,); they hold.
+        mean: Mean readings over T_avg [counts], shape (B, 2); NaN where they cannot be used.
+        size: Numbers of an observation n.
+    """
+
+    def __init__(
+        self, interface: PolicyInterface, control: ControlParams, robot: RobotSpec, batch: int
+    ) -> None:
+        self._interface, self._curves = interface, curves(control)
+        self._average = RunningMean(control.conditioning, batch, control.period)
+        each = channels(interface, robot)
+        self._scale = np.array([c.scale for c in each])
+        self._low, self._high = bounds(each)
+        self._past: Floats = np.zeros((batch, len(each), interface.history))
+        self._memory: Floats = np.zeros((batch, len(each)))
+        decision = interface.ticks * control.period
+        self._pace = -math.expm1(-decision / interface.memory_time)
+        quantities = observations(interface, control, robot)
+        self.size = len(quantities)
+        self._bounds = tuple(b.astype(np.float32) for b in bounds(quantities))
+        self._free = self._felt(np.full((1, 2), np.nan))[0]
+        self.unknown: Bools = np.zeros(batch, dtype=bool)
+        self.mean: Floats = np.zeros((batch, 2))
+
+    def reset(self, rows: Ints | Bools) -> None:
+        """Some rows have felt nothing yet, and stood still."""
+        self._average.reset(rows)
+        self._past[rows] = 0.0
+        self._past[rows, :2] = self._free[:, None]
+        self._memory[rows] = 0.0
+        self._memory[rows, :2] = self._free
+        self.unknown[rows] = False
+
+    def feel(self, counts: Floats, rows: Bools | None = None) -> None:
+        """Take the readings of one tick [counts], shape (B, 2).
+
+        Args:
+            counts: What was read.
+            rows: Rows that begin with this reading, where the others had theirs, shape (B,).
+        """
+        mean = self._average.step(counts) if rows is None else self._average.begin(counts, rows)
+        self.mean = mean if rows is None else np.where(rows[:, None], mean, self.mean)
+        self.unknown = np.isnan(self.mean[:, 0] + self.mean[:, 1])
+
+    def look(self, state: GaitState, rows: Bools | None = None) -> Vector:
+        """Sample all channels; the observations, shape (B, n). Rows not meant do not go on."""
+        sample = self._sample(state)
+        past, memory = self._past.copy(), self._memory.copy()
+        past[:, :, 1:] = self._past[:, :, :-1]
+        past[:, :, 0] = sample
+        memory += self._pace * (sample - memory)
+        if rows is not None:
+            past[~rows], memory[~rows] = self._past[~rows], self._memory[~rows]
+        self._past, self._memory = past, memory
+        phase = np.stack([np.sin(state.phase), np.cos(state.phase)], axis=1)
+        parts = [past.reshape(len(past), -1), memory, phase]
+        if (goals := state.goals()) is not None:
+            parts.append(goals)
+        vector = np.concatenate(parts, axis=1).astype(np.float32)
+        return np.clip(vector, *self._bounds)
+
+    def _sample(self, state: GaitState) -> Floats:
+        """All channels now, scaled and clipped, shape (B, C)."""
+        gait = [state.pace, state.offset]
+        if self._interface.action == "gait":
+            gait.append(state.amplitude)
+        felt = np.where(self.unknown[:, None], self._free, self._felt(self.mean))
+        sample = np.concatenate([felt, np.stack(gait, axis=1)], axis=1) / self._scale
+        return np.clip(sample, self._low, self._high)
+
+    def _felt(self, mean: Floats) -> Floats:
+        """What is given of mean readings (B, 2); of NaN what a free antenna gives."""
+        if self._interface.felt == "counts":
+            return np.where(np.isnan(mean), self._straight(), mean)
+        level, flex = level_and_fraction(self._curves, mean)
+        return np.nan_to_num(flex if self._interface.felt == "flex" else level)
+
+    def _straight(self) -> Floats:
+        """Readings of straight antennae by the curves of the control [counts], shape (2,)."""
+        c = self._curves
+        return np.where(np.asarray(c.polarity) > 0, c.counts_low, c.counts_high) * np.ones(2)
