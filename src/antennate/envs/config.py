@@ -14,6 +14,7 @@ from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.sim.trial import TrialConfig, require_own_curves
+from antennate.types import Floats
 
 Range = tuple[float, float]
 
@@ -47,12 +48,10 @@ class Randomisation(Params):
                 )
         return self
 
-    def draw(self, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
-        """One draw of all: a number each, of the sensors one for each antenna, shape (2,)."""
-        return {
-            name: rng.uniform(*getattr(self, name), 2 if name.startswith("sensor") else None)
-            for name in type(self).model_fields
-        }
+    def draw(self, rng: np.random.Generator) -> Mapping[str, Floats]:
+        """One draw of all: two numbers each, for both antennae; the others read the first."""
+        ranges = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: rng.uniform(low, high, 2) for name, (low, high) in ranges.items()}
 
 
 class EnvConfig(TrialConfig):
@@ -81,10 +80,11 @@ class EnvConfig(TrialConfig):
         return self
 
 
-def varied(robot: RobotSpec, draw: Mapping[str, np.ndarray]) -> RobotSpec:
+def varied(robot: RobotSpec, draw: Mapping[str, Floats]) -> RobotSpec:
     """The robot with the constants of a draw."""
     servos = robot.servos
-    torque, gain, noise = (float(draw[n]) for n in ("servo_torque", "servo_gain", "noise"))
+    names = ("servo_torque", "servo_gain", "noise", "leg_friction")
+    torque, gain, noise, friction = (float(draw[name][0]) for name in names)
     changed = {
         name: (servo := getattr(servos, name)).model_copy(
             update={"stall_torque": servo.stall_torque * torque, "p_gain": servo.p_gain * gain}
@@ -96,7 +96,7 @@ def varied(robot: RobotSpec, draw: Mapping[str, np.ndarray]) -> RobotSpec:
     noisy = sensor.model_copy(update={name: getattr(sensor, name) * noise for name in counts})
     return robot.model_copy(
         update={
-            "leg_friction": robot.leg_friction * float(draw["leg_friction"]),
+            "leg_friction": robot.leg_friction * friction,
             "servos": servos.model_copy(update=changed),
             "antenna": robot.antenna.model_copy(update={"sensor": noisy}),
         }

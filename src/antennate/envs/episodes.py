@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -351,9 +351,9 @@ def draw_episode(
 
 def replace_rows(truth: Truth, other: Truth, rows: Bools) -> Truth:
     """A truth with some rows, shape (B,), of another one."""
-    parts = {
+    parts: dict[str, Any] = {
         name: np.where(rows.reshape(-1, *[1] * (value.ndim - 1)), getattr(other, name), value)
         for name in (f.name for f in fields(Truth))
         if isinstance(value := getattr(truth, name), np.ndarray)
     }
-    return Truth(**parts)
+    return Truth(**parts, reason=dict(truth.reason))

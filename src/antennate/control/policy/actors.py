@@ -89,7 +89,7 @@ class _GaitRows:
 
     def decide(self, answers: Floats, rows: Bools) -> None:
         """As of an `Actor`."""
-        void = ~np.isfinite(answers).all(axis=1)
+        void: Bools = np.logical_not(np.isfinite(answers).all(axis=1))
         self._void = np.where(rows, void, self._void)
         taken = np.where(void[:, None], 0.0, answers)
         self._answers = np.where(rows[:, None], taken, self._answers)
@@ -181,7 +181,7 @@ class JointActor(_GaitRows):
         change = np.clip(change, -self._most, self._most)
         self._goals = self._goals + change * moves[:, None]
         gait = self._control.gait
-        self.pace = gait.frequency * moves
+        self.pace = gait.frequency * moves.astype(float)
         self.phase = self.phase + 2.0 * math.pi * self._control.period * self.pace
         self.offset = self._goals[:, : self._robot.yaw_count].mean(axis=1)
         self.maneuver = np.where(moves, int(Maneuver.FORWARD), _HOLD)

@@ -92,9 +92,10 @@ _FELT = {
 def channels(interface: PolicyInterface, robot: RobotSpec) -> tuple[Quantity, ...]:
     """What a policy is given the history and the mean of, newest first."""
     unit, scale, low, high, text = _FELT[interface.felt]
-    names = zip(SIDES, ("left", "right"), strict=True)
+    names = tuple(zip(SIDES, ("left", "right"), strict=True))
     felt = [
-        Quantity(f"{interface.felt}_{side}", unit, scale, low, high, text.format(word))
+        Quantity(f"{interface.felt}_{side}{end}", unit, scale, low, high, begin + text.format(word))
+        for end, begin in (("", ""), (" most", "at the strongest bend since the last decision, "))
         for side, word in names
     ]
     gait = [

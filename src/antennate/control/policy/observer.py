@@ -60,7 +60,9 @@ class Observer:
         quantities = observations(interface, control, robot)
         self.size = len(quantities)
         self._bounds = tuple(b.astype(np.float32) for b in bounds(quantities))
-        self._free = self._felt(np.full((1, 2), np.nan))[0]
+        self._bend = np.asarray(self._curves.polarity) * np.ones(2)
+        self._free = np.tile(self._felt(np.full((1, 2), np.nan))[0], 2) / self._scale[:4]
+        self._most: Floats = np.full((batch, 2), np.nan)
         self.unknown: Bools = np.zeros(batch, dtype=bool)
         self.mean: Floats = np.zeros((batch, 2))
 
@@ -68,9 +70,9 @@ class Observer:
         """Some rows have felt nothing yet, and stood still."""
         self._average.reset(rows)
         self._past[rows] = 0.0
-        self._past[rows, :2] = self._free[:, None]
-        self._memory[rows] = 0.0
-        self._memory[rows, :2] = self._free
+        self._past[rows, : len(self._free)] = self._free[:, None]
+        self._memory[rows] = self._past[rows, :, 0]
+        self._most[rows] = np.nan
         self.unknown[rows] = False
 
     def feel(self, counts: Floats, rows: Bools | None = None) -> None:
@@ -82,6 +84,8 @@ class Observer:
         """
         mean = self._average.step(counts) if rows is None else self._average.begin(counts, rows)
         self.mean = mean if rows is None else np.where(rows[:, None], mean, self.mean)
+        most = np.fmax(self._most, self.mean * self._bend)
+        self._most = most if rows is None else np.where(rows[:, None], most, self._most)
         self.unknown = np.isnan(self.mean[:, 0] + self.mean[:, 1])
 
     def look(self, state: GaitState, rows: Bools | None = None) -> Vector:
@@ -91,9 +95,11 @@ class Observer:
         past[:, :, 1:] = self._past[:, :, :-1]
         past[:, :, 0] = sample
         memory += self._pace * (sample - memory)
+        most = np.full_like(self._most, np.nan)
         if rows is not None:
             past[~rows], memory[~rows] = self._past[~rows], self._memory[~rows]
-        self._past, self._memory = past, memory
+            most[~rows] = self._most[~rows]
+        self._past, self._memory, self._most = past, memory, most
         phase = np.stack([np.sin(state.phase), np.cos(state.phase)], axis=1)
         parts = [past.reshape(len(past), -1), memory, phase]
         if (goals := state.goals()) is not None:
@@ -106,16 +112,18 @@ class Observer:
         gait = [state.pace, state.offset]
         if self._interface.action == "gait":
             gait.append(state.amplitude)
-        felt = np.where(self.unknown[:, None], self._free, self._felt(self.mean))
-        sample = np.concatenate([felt, np.stack(gait, axis=1)], axis=1) / self._scale
+        felt = [self._felt(self.mean), self._felt(self._most * self._bend)]
+        sample = np.concatenate([*felt, np.stack(gait, axis=1)], axis=1) / self._scale
         return np.clip(sample, self._low, self._high)
 
     def _felt(self, mean: Floats) -> Floats:
         """What is given of mean readings (B, 2); of NaN what a free antenna gives."""
         if self._interface.felt == "counts":
             return np.where(np.isnan(mean), self._straight(), mean)
-        level, flex = level_and_fraction(self._curves, mean)
-        return np.nan_to_num(flex if self._interface.felt == "flex" else level)
+        level, flex = level_and_fraction(
+            self._curves, np.where(np.isnan(mean), self._straight(), mean)
+        )
+        return flex if self._interface.felt == "flex" else level
 
     def _straight(self) -> Floats:
         """Readings of straight antennae by the curves of the control [counts], shape (2,)."""

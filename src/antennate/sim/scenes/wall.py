@@ -35,7 +35,8 @@ class Wall(Route):
     def build(self, spec: mujoco.MjSpec) -> None:
         """Add the floor and the wall."""
         super().build(spec)
-        add_wall(spec, "wall", *self._ends, self._side, _FRICTION)
+        start, end = self._ends
+        add_wall(spec, "wall", start, end, self._side, _FRICTION)
 
     def gap(self, head: Floats) -> float:
         """Gap between the robot's side and the wall, at a head there, shape (2,) [m]."""
