@@ -33,7 +33,7 @@ INTERFACE = {"action": "maneuver", "ticks": 50, "history": 16}
 """A decision every 0.5 s; what was felt in the last 8 s."""
 ROWS = 8
 """Robots of a worker."""
-DECISIONS = 64
+DECISIONS = 32
 """Decisions of each robot between two updates."""
 GAMMA, LAMBDA = 0.995, 0.95
 CLIP, EPOCHS, MINIBATCH, RATE, ENTROPY = 0.2, 8, 256, 5e-4, 0.01
@@ -184,18 +184,22 @@ def train(options: argparse.Namespace) -> None:
     folder: Path = options.out
     folder.mkdir(parents=True, exist_ok=True)
     readings = {"felt": "own", "none": "none"}[options.readings]
-    probe = make_envs(options.scene, readings, 1).unwrapped
+    probe = make_envs(options.scene[0], readings, 1).unwrapped
     contract = contract_of(probe.config.interface, probe.config.control, probe.config.robot)
     network = Network(probe.single_observation_space.shape[0], probe.single_action_space.n)
+    if options.begin is not None:
+        with np.load(options.begin / "weights.npz") as state:
+            network.load_state_dict({name: torch.from_numpy(state[name]) for name in state})
     optimiser = torch.optim.Adam(network.parameters(), RATE, eps=1e-5)
     context, pipes = multiprocessing.get_context("spawn"), []
     for i in range(options.workers):
         pipe, other = context.Pipe()
         seed = 10_000_000 + 1000 * options.seed + i
-        words = (other, options.scene, readings, seed)
+        scene = options.scene[i % len(options.scene)]
+        words = (other, scene, readings, seed)
         context.Process(target=work, args=words, daemon=True).start()
         pipes.append(pipe)
-    start, saved, decisions, recent = time.monotonic(), 0.0, 0, []
+    start, saved, decisions, recent = time.monotonic(), -1.0, 0, []
     with (folder / "progress.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(["minutes", "decisions", "episodes", "success", "mean_time_s", "reward"])
@@ -209,6 +213,7 @@ def train(options: argparse.Namespace) -> None:
             update(network, optimiser, list(rollouts))
             seen = [r["obs"].reshape(-1, r["obs"].shape[-1]) for r in rollouts]
             network.learn_scale(torch.from_numpy(np.concatenate(seen)))
+            minutes = (time.monotonic() - start) / 60.0
             decisions += sum(r["reward"].size for r in rollouts)
             recent = [*recent, *(end for part in ends for end in part)][-100:]
             success = np.mean([end[0] == "success" for end in recent]) if recent else np.nan
@@ -217,8 +222,8 @@ def train(options: argparse.Namespace) -> None:
             figures = [minutes, decisions, len(recent), success, times, reward]
             table.writerow([f"{figure:.5g}" for figure in figures])
             file.flush()
-            if minutes - saved > 1.0 or not saved:
-                saved = max(minutes, 1e-9)
+            if minutes - saved > 1.0:
+                saved = minutes
                 save(folder, network, contract)
                 print(
                     f"{minutes:.1f} min: {decisions} decisions, of the last {len(recent)} "
@@ -233,11 +238,18 @@ def train(options: argparse.Namespace) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
-    parser.add_argument("--scene", default="tunnel", choices=[*SCENES])
+    parser.add_argument(
+        "--scene",
+        nargs="+",
+        default=["tunnel"],
+        choices=[*SCENES],
+        help="scenes, one for each worker in turn",
+    )
     parser.add_argument("--readings", default="felt", choices=["felt", "none"])
     parser.add_argument("--workers", type=int, default=1, help="processes that step robots")
     parser.add_argument("--minutes", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--begin", type=Path, help="folder whose weights it begins with")
     parser.add_argument(
         "--export", action="store_true", help="write the ONNX file of saved weights"
     )
