@@ -186,7 +186,7 @@ class JointActor(_GaitRows):
         self.offset = self._goals[:, : self._robot.yaw_count].mean(axis=1)
         self.maneuver = np.where(moves, int(Maneuver.FORWARD), _HOLD)
         sizes = np.cumsum([math.prod(shape[1:]) for shape in self._parts.values()])[:-1]
-        parts = zip(self._parts.items(), np.split(self._goals, sizes, axis=1), strict=True)
+        parts = zip(self._parts.items(), np.split(self._goals.copy(), sizes, axis=1), strict=True)
         return JointCommand(**{name: part.reshape(shape) for (name, shape), part in parts})
 
     def goals(self) -> Floats | None:

@@ -13,12 +13,14 @@ from antennate.types import Floats
 GAP = 0.05
 """Gap to hold between the robot's side at its head and the wall [m] (assumed: an antenna reaches
 over it, the legs do not touch)."""
+START_GAP = 0.20
+"""Gap at the start [m] (assumed: no start, however it is turned, touches the wall)."""
 _FRICTION = 0.3
 """Friction of the wall (assumed: paper)."""
 
 
 class Wall(Route):
-    """One wall. The route runs along it, `GAP` from the side of a robot that walks there.
+    """One wall. The route runs along it, with `START_GAP` beside a robot that walks there.
 
     Args:
         length: Length of the route [m].
@@ -28,7 +30,7 @@ class Wall(Route):
 
     def __init__(self, length: float, width: float, side: float) -> None:
         self._side, self._half = side, width / 2
-        self._y = side * (self._half + GAP)
+        self._y = side * (self._half + START_GAP)
         self._ends = np.array([[-LEFT_BEHIND, self._y], [length + LEFT_BEHIND, self._y]])
         super().__init__(np.array([[0.0, 0.0], [length, 0.0]]))
 
