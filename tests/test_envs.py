@@ -206,7 +206,7 @@ def observed(scene: str, numbers: list[int]) -> list[str]:
     return texts
 
 
-@pytest.mark.parametrize(("scene", "resets"), [("Wall", 200), ("Broken", 40)])
+@pytest.mark.parametrize(("scene", "resets"), [("Wall", 200), ("Broken", 20)])
 def test_resets_are_those_of_a_fresh_process_in_another_order(scene: str, resets: int) -> None:
     """benchmarks/envs.py does it with 4,096."""
     numbers = [*range(resets)]

@@ -13,7 +13,7 @@ from antennate.types import Floats
 GAP = 0.05
 """Gap to hold between the robot's side at its head and the wall [m] (assumed: an antenna reaches
 over it, the legs do not touch)."""
-START_GAP = 0.20
+START_GAP = 0.30
 """Gap at the start [m] (assumed: no start, however it is turned, touches the wall)."""
 _FRICTION = 0.3
 """Friction of the wall (assumed: paper)."""
