@@ -30,7 +30,7 @@ from antennate.envs import episodes
 from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.physics import TunnelConfig
 
-SECONDS = 8.0
+SECONDS = 4.0
 """Time that each trial walks [s]; within it none gets out."""
 BATCHES = (8, 24)
 PROCESSES = 8
@@ -92,11 +92,11 @@ def ticks(batch: int, repetitions: int) -> dict[str, Any]:
 
 def first_observations(scene: str, numbers: list[int]) -> list[str]:
     """First observations of episodes as hexadecimal digits, by one environment in turn."""
-    env = gym.make(f"antennate/{scene}-v1").unwrapped
+    env = gym.make(f"antennate/{scene}-v1", interface={"ticks": 2}).unwrapped
     texts = []
     for number in numbers:
-        observation, info = env.reset(seed=7, options={"episode": number})
-        if info["episode"] < number:
+        observation, info = env.reset(seed=7, options={"episode_number": number})
+        if info["episode_number"] < number:
             raise SystemExit(f"expected episode {number}, found {info['episode']}")
         texts.append(observation.tobytes().hex() + np.array(info["head"]).tobytes().hex())
         for step in range(WALKED):

@@ -104,12 +104,16 @@ def test_an_episode_is_the_trial_of_tunnel_with_its_number() -> None:
     run_trials(TunnelConfig(seed=5, scene="flat"), "open", range(2), lambda r: rows.append(r[0]))
     for row in rows:
         env = single("Flat")
-        env.reset(seed=5, options={"episode": row.trial})
+        env.reset(seed=5, options={"episode_number": row.trial})
         info, over = {}, False
         while not over:
             _, _, ended, cut, info = env.step(0)
             over = ended or cut
-        assert (info["outcome"], info["seed"], info["episode"]) == (row.outcome, 5, row.trial)
+        assert (info["outcome"], info["seed"], info["episode_number"]) == (
+            row.outcome,
+            5,
+            row.trial,
+        )
         assert round(min(info["progress"], info["length"]), 6) == row.progress_m
         if row.outcome == "success":
             assert round(info["t"], 6) == row.time_s
@@ -197,9 +201,9 @@ def test_nothing_of_the_truth_is_observed_without_readings() -> None:
 
 def observed(scene: str, numbers: list[int]) -> list[str]:
     """First observations and heads, by one environment that walks a little in each episode."""
-    env, texts = single(scene), []
+    env, texts = single(scene, interface={"ticks": 2}), []
     for number in numbers:
-        observation, info = env.reset(seed=7, options={"episode": number})
+        observation, info = env.reset(seed=7, options={"episode_number": number})
         texts.append(observation.tobytes().hex() + info["head"].tobytes().hex())
         for step in range(2):
             env.step((number + step) % 4)
@@ -226,7 +230,7 @@ def walk(env: Any, actions: np.ndarray, seed: int) -> list[tuple[Any, ...]]:
     seen: list[tuple[Any, ...]] = []
     observation, info = env.reset(seed=seed)
     for action in actions:
-        seen.append((observation.tobytes(), info["seed"], info["episode"], info["t"]))
+        seen.append((observation.tobytes(), info["seed"], info["episode_number"], info["t"]))
         observation, reward, ended, cut, info = env.step(action)
         seen.append((observation.tobytes(), reward, ended, cut, info.get("outcome")))
         if ended or cut:
@@ -256,13 +260,13 @@ def test_rows_of_a_vector_are_the_episodes_of_one_robot() -> None:
             rows[i].append(observation[i].tobytes())
     for i in range(3):
         env, number, alone = single(**SHORT), i, []
-        observation, _ = env.reset(seed=6, options={"episode": number})
+        observation, _ = env.reset(seed=6, options={"episode_number": number})
         alone.append(observation.tobytes())
         for action in actions[:, i]:
             observation, _, ended, cut, _ = env.step(action)
             if ended or cut:
                 number += 3
-                observation, _ = env.reset(seed=6, options={"episode": number})
+                observation, _ = env.reset(seed=6, options={"episode_number": number})
             alone.append(observation.tobytes())
         assert rows[i] == alone
 
@@ -281,17 +285,17 @@ def episodes_of(mode: AutoresetMode, steps: int) -> list[tuple[Any, ...]]:
     env = vector(2, autoreset_mode=mode, **SHORT)
     assert env.metadata["autoreset_mode"] is mode
     _, info = env.reset(seed=3)
-    number, count, total = info["episode"].copy(), np.zeros(2, int), np.zeros(2)
+    number, count, total = info["episode_number"].copy(), np.zeros(2, int), np.zeros(2)
     over, ends = np.zeros(2, bool), list[tuple[Any, ...]]()
     for _ in range(steps):
         if mode is AutoresetMode.DISABLED and over.any():
             _, info = env.reset(options={"reset_mask": over})
-            assert info["_episode"].tolist() == over.tolist()
+            assert info["_episode_number"].tolist() == over.tolist()
         begins = over & (mode is not AutoresetMode.SAME_STEP)
-        number = np.where(begins & info["_episode"], info["episode"], number)
+        number = np.where(begins & info["_episode_number"], info["episode_number"], number)
         observation, reward, ended, cut, info = env.step(np.array([0, 3]))
         fresh = begins & (mode is AutoresetMode.NEXT_STEP)
-        number = np.where(fresh, info["episode"], number)
+        number = np.where(fresh, info["episode_number"], number)
         count, total = np.where(begins, 0, count), np.where(begins, 0.0, total)
         count, total = count + ~fresh, total + reward
         over = ended | cut
@@ -303,7 +307,7 @@ def episodes_of(mode: AutoresetMode, steps: int) -> list[tuple[Any, ...]]:
             entry = (number[row], count[row], total[row], last.tobytes())
             ends.append(entry)
             if mode is AutoresetMode.SAME_STEP:
-                number[row], count[row], total[row] = info["episode"][row], 0, 0.0
+                number[row], count[row], total[row] = info["episode_number"][row], 0, 0.0
     return ends
 
 
@@ -326,7 +330,7 @@ def test_a_masked_reset_leaves_the_other_rows_alone() -> None:
 def test_seeds_of_a_list_are_those_of_the_rows() -> None:
     _, info = vector(3, "Flat").reset(seed=[4, 9, 4])
     assert info["seed"].tolist() == [4, 9, 4]
-    assert info["episode"].tolist() == [0, 0, 0]
+    assert info["episode_number"].tolist() == [0, 0, 0]
 
 
 def test_constants_are_drawn_for_each_episode_within_their_ranges() -> None:
@@ -335,8 +339,10 @@ def test_constants_are_drawn_for_each_episode_within_their_ranges() -> None:
     other = single("Flat", interface={"felt": "counts"}, randomise=ranges)
     offsets, frictions = [], []
     for number in range(6):
-        there, here = (e.reset(seed=1, options={"episode": number})[0] for e in (other, plain))
-        again = other.reset(seed=1, options={"episode": number})[0]
+        there, here = (
+            e.reset(seed=1, options={"episode_number": number})[0] for e in (other, plain)
+        )
+        again = other.reset(seed=1, options={"episode_number": number})[0]
         assert np.array_equal(again, there)
         offsets.append(4095.0 * (there - here)[0])
         frictions.append(other._episodes._body.world(0).robot.leg_friction)

@@ -64,7 +64,7 @@ class Truth:
     """What only the simulation knows of B robots; each call makes arrays of its own.
 
     Attributes:
-        seed, episode: What the episodes follow from, shape (B,).
+        seed, episode_number: What the episodes follow from, shape (B,).
         t: Time since the start [s], shape (B,).
         head: Position and heading of the head [m, m, rad], shape (B, 3).
         progress: How far the head has come [m], shape (B,); `length` is that of the exit.
@@ -76,7 +76,7 @@ class Truth:
     """
 
     seed: Ints
-    episode: Ints
+    episode_number: Ints
     t: Floats
     head: Floats
     progress: Floats
@@ -308,7 +308,7 @@ class Episodes:
         for row in rows:
             episode, world = self._episodes[row], self._body.world(row)
             scene, head = episode.scene, world.head[:2].copy()
-            truth.seed[row], truth.episode[row] = episode.seed, episode.number
+            truth.seed[row], truth.episode_number[row] = episode.seed, episode.number
             truth.t[row], truth.length[row] = world.t, scene.length
             truth.head[row, :2], truth.head[row, 2] = head, world.heading
             truth.force[row] = world.obstacle_force()

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from antennate.sim.scenes.wall import GAP
 from antennate.types import Floats
 
@@ -38,8 +36,8 @@ HOLD = Term("hold", -0.2, "m", f"scene `wall` alone: how far the gap to the wall
 TERMS = (PROGRESS, TIME, EXIT, HOLD)
 
 
-def terms_of(scene: Any, gain: float, head: Floats, out: bool) -> Floats:
-    """The terms of one decision in the order of `TERMS`, shape (4,).
+def terms_of(scene: Any, gain: float, head: Floats, out: bool) -> tuple[float, ...]:
+    """The terms of one decision in the order of `TERMS`.
 
     Args:
         scene: The drawn scene.
@@ -48,5 +46,4 @@ def terms_of(scene: Any, gain: float, head: Floats, out: bool) -> Floats:
         out: Whether the head has gone out by the exit.
     """
     error = abs(scene.gap(head) - GAP) if hasattr(scene, "gap") else 0.0
-    weights = [term.weight for term in TERMS]
-    return np.array(weights) * [gain, 1.0, float(out), error]
+    return PROGRESS.weight * gain, TIME.weight, EXIT.weight * out, HOLD.weight * error

@@ -18,7 +18,7 @@ class AntennaEnv(Env[Any, Any]):
     """One robot in a scene.
 
     A seed s begins episode 0 of it, and each reset without a seed the next one;
-    `options["episode"]` chooses another.
+    `options["episode_number"]` chooses another.
 
     Args:
         scene: Name of the scene.
@@ -54,8 +54,8 @@ class AntennaEnv(Env[Any, Any]):
         if seed is not None:
             self._episodes.seed(0, int(seed), 0, 1)
         self._seeded = True
-        if (episode := (options or {}).get("episode")) is not None:
-            self._episodes.choose(0, whole("episode", episode))
+        if (episode := (options or {}).get("episode_number")) is not None:
+            self._episodes.choose(0, whole("episode_number", episode))
         observation, truth = self._episodes.begin(self._every)
         return observation[0], _info(truth)
 
@@ -80,7 +80,7 @@ def _info(truth: Truth) -> dict[str, Any]:
     """The truth about the first row, and how its episode ended if it did."""
     info: dict[str, Any] = {
         name: getattr(truth, name)[0].item()
-        for name in ("seed", "episode", "t", "progress", "length", "force", "maneuver")
+        for name in ("seed", "episode_number", "t", "progress", "length", "force", "maneuver")
     }
     info["head"] = truth.head[0].copy()
     info |= {f"reward_{term.name}": float(truth.terms[0, i]) for i, term in enumerate(TERMS)}

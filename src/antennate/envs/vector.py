@@ -43,7 +43,7 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
 
     Row i of an integer seed s plays the episodes i, i + B, i + 2 B ... of seed s; with a list of
     seeds it plays the episodes 0, 1, 2 ... of its own. Without a seed rows go on with their next
-    ones. `options["episode"]`, shape (B,), chooses others.
+    ones. `options["episode_number"]`, shape (B,), chooses others.
 
     Args:
         num_envs: Number of robots B.
@@ -91,7 +91,7 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         """
         options = options or {}
         rows = _mask(options.get("reset_mask"), self.num_envs)
-        self._seed(seed, options.get("episode"), rows)
+        self._seed(seed, options.get("episode_number"), rows)
         observation, truth = self._episodes.begin(rows)
         self._over &= ~rows
         self._observation = np.where(rows[:, None], observation, self._observation)
@@ -144,7 +144,7 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         if episode is not None:
             numbers = np.broadcast_to(np.asarray(episode), (count,))
             for row in np.flatnonzero(rows).tolist():
-                self._episodes.choose(row, whole("episode", numbers[row]))
+                self._episodes.choose(row, whole("episode_number", numbers[row]))
         self._seeded = True
 
 
@@ -202,7 +202,16 @@ def _infos(truth: Truth, rows: Bools, ended: Bools) -> dict[str, Any]:
     """The truth about some rows as infos of a vector: arrays, and masks of what they hold."""
     infos: dict[str, Any] = {
         name: getattr(truth, name).copy()
-        for name in ("seed", "episode", "t", "head", "progress", "length", "force", "maneuver")
+        for name in (
+            "seed",
+            "episode_number",
+            "t",
+            "head",
+            "progress",
+            "length",
+            "force",
+            "maneuver",
+        )
     }
     infos |= {f"reward_{term.name}": truth.terms[:, i].copy() for i, term in enumerate(TERMS)}
     infos |= {f"_{name}": rows.copy() for name in [*infos]}
