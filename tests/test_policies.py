@@ -10,6 +10,7 @@ import numpy as np
 import onnx
 import pytest
 from lockstep import BoardPort, LockstepClock
+from pages import blocks
 from policy_files import FORWARD, constant, contract, counting, drawn
 
 from antennate.cli import main
@@ -242,3 +243,15 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
         assert main(["tunnel", *argv]) == 2
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert words in line
+
+
+def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second block of Python puts a contract into a file that another exporter wrote."""
+    pytest.importorskip("gymnasium")
+    monkeypatch.chdir(tmp_path)
+    code = [block.text for block in blocks("envs.md") if block.kind == "python"]
+    known: dict[str, Any] = {}
+    exec(code[0], known)
+    constant(Path("mine.onnx"), (0.0,) * 4, contract(action="gait"))
+    exec(code[1], known)
+    assert Policy(Path("mine.onnx")).contract.about == "my PPO, seed 3"

@@ -19,7 +19,7 @@ Weights = NDArray[np.floating[Any]]
 
 
 def write_policy(
-    path: Path,
+    path: Path | str,
     contract: Contract,
     layers: Sequence[tuple[Weights, Weights]],
     mean: Weights,
@@ -66,10 +66,10 @@ def write_policy(
     graph = helper.make_graph(nodes, "policy", [given], [answer], tensors)
     imports = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(graph, opset_imports=imports, ir_version=8)
-    return _save(model, contract, path)
+    return _save(model, contract, Path(path))
 
 
-def add_contract(path: Path, contract: Contract) -> Path:
+def add_contract(path: Path | str, contract: Contract) -> Path:
     """Put a contract into an ONNX file that another exporter wrote; the path.
 
     Its inputs must be `observation` and those of the contract's states, its first output `action`.
@@ -77,7 +77,7 @@ def add_contract(path: Path, contract: Contract) -> Path:
     Raises:
         MissingPackageError: The package onnx is not installed.
     """
-    return _save(_onnx().load(str(path)), contract, path)
+    return _save(_onnx().load(str(path)), contract, Path(path))
 
 
 def _save(model: Any, contract: Contract, path: Path) -> Path:
