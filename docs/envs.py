@@ -194,7 +194,7 @@ def action_tables() -> str:
     }
     parts = []
     for mode, text in heads_of.items():
-        found = actions(PolicyInterface(action=mode), robot)
+        found = actions(PolicyInterface.model_validate({"action": mode}), robot)
         if mode == "joints":
             found = tuple(q for q in found if q.name in ("yaw1", "leg_l0", "antenna_l_base"))
         parts.append(text if mode == "maneuver" else f"{text}\n\n{quantities(found)}")
