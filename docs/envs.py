@@ -76,10 +76,10 @@ environment for your [own scene](scenes.md).
 
 Of each channel a policy is given the last `history` samples, one a decision, newest first, and a
 mean with the time constant `memory_time`; then sine and cosine of the gait phase; with joint
-targets the goal of each joint, too. A number is divided by its scale and clipped to its range.
-What came before the start counts as a free antenna and a robot that stood. A reading that cannot
-be used counts as that of a free antenna, and the robot holds. Measured positions of the servos are
-not observed: no controller is given them.
+targets the goal of each joint, too; and with `servos` how far each joint is from its goal, now and
+on average. A number is divided by its scale and clipped to its range. What came before the start
+counts as a free antenna and a robot that stood. A reading that cannot be used counts as that of a
+free antenna, and the robot holds. On a bus the servos tell their angles a tick late.
 
 ## Action
 

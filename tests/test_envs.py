@@ -387,3 +387,19 @@ def test_actions_seeds_and_masks_are_looked_at() -> None:
         env.reset(seed=-1)
     with pytest.raises(ConfigError, match="autoreset_mode: expected one of"):
         vector(2, "Flat", autoreset_mode="NEXTSTEP")
+
+
+def test_servos_tell_how_far_each_joint_is_from_its_goal() -> None:
+    """The angles of the engine, about the zeros of the servos, less what was told last."""
+    env = single("Flat", interface={"servos": True})
+    table = observations(PolicyInterface(servos=True), ControlParams(), RobotSpec())
+    names = [q.name for q in table]
+    first, _ = env.reset(seed=1)
+    now = slice(names.index("lag yaw1"), names.index("lag yaw1 mean"))
+    assert np.abs(first[now]).max() == 0.0
+    observation, *_ = env.step(0)
+    body = env._episodes._body
+    world = body.world(0)
+    lag = world.drives() - world.data.ctrl[world.places.drives]
+    assert observation[now] == pytest.approx(lag, abs=1e-5)
+    assert np.abs(lag).max() > 0.01

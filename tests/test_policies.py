@@ -87,7 +87,8 @@ def test_names_are_different_and_have_units(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", MODES)
 def test_it_keeps_the_protocol_of_controllers(tmp_path: Path, mode: str) -> None:
-    path, _ = drawn(tmp_path / "p.onnx", contract(action=mode))
+    made = contract(action=mode, servos=mode == "gait")
+    path, _ = drawn(tmp_path / "p.onnx", made)
     check_controller(lambda c, r, b: make_controller(str(path), c, r, b))
 
 
@@ -102,7 +103,7 @@ def test_it_walks_as_open_does_where_it_always_says_forward(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("mode", MODES)
 def test_rows_do_not_influence_one_another(tmp_path: Path, mode: str) -> None:
-    path, _ = drawn(tmp_path / "p.onnx", contract(action=mode, ticks=7))
+    path, _ = drawn(tmp_path / "p.onnx", contract(action=mode, ticks=7, servos=True))
     assert trials_of(path, batch=3) == trials_of(path, batch=1)
 
 

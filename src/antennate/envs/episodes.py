@@ -7,7 +7,7 @@ readings, the looks that end it and the physics are the same, so it is the same 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -182,7 +182,7 @@ class Episodes:
         """
         self._load(rows)
         some = rows if (~rows & self.running).any() else None
-        self._observer.feel(self._counts(self._body.read(some), some), some)
+        self._observer.feel(self._given(self._body.read(some), some), some)
         return self._observer.look(self._actor, rows), self._begun(rows)
 
     def step(self, answers: Floats, fresh: Bools, again: bool) -> Decision:
@@ -202,7 +202,9 @@ class Episodes:
             episode.decisions += 1
         for tick in range(1, self.config.interface.ticks + 1):
             whole = tick == self.config.interface.ticks
-            self._body.write(self._actor.step(self._observer.unknown))
+            command = self._actor.step(self._observer.unknown)
+            self._body.write(command)
+            self._observer.told(command)
             self._ticks += 1
             self._count += 1
             over = self._judge(truth, whole)
@@ -213,7 +215,7 @@ class Episodes:
                 begun = fresh | (ended & again)
                 self._load(begun)
             self._body.sleep_until(self._ticks * period)
-            self._observer.feel(self._counts(self._body.read()))
+            self._observer.feel(self._given(self._body.read()))
         observation = self._observer.look(self._actor)
         stays = ended & ~begun
         observation[stays] = last[stays]
@@ -221,14 +223,14 @@ class Episodes:
         start = replace_rows(truth, self._begun(begun), begun) if begun.any() else truth
         return Decision(observation, truth, ended, begun, last, start)
 
-    def _counts(self, frame: AntennaFrame, rows: Bools | None = None) -> Floats:
-        """Readings that the policy is given of a frame [counts], shape (B, 2)."""
+    def _given(self, frame: AntennaFrame, rows: Bools | None = None) -> AntennaFrame:
+        """What the policy is given of a frame."""
         self._t = frame.t if rows is None else np.where(rows, frame.t, self._t)
         if self._affine:
             change = self._gains * (frame.counts - self._straight) + self._offsets
             counts = np.clip(np.rint(self._straight + change), 0.0, sensor.FULL_SCALE)
-            frame = AntennaFrame(frame.t, counts)
-        return self._readings.change(frame).counts
+            frame = replace(frame, counts=counts)
+        return self._readings.change(frame)
 
     def _load(self, rows: Bools) -> None:
         """Put the next episode into some rows."""

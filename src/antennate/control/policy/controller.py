@@ -164,7 +164,7 @@ class PolicyController:
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period: the command for this frame, both with B rows."""
-        self._observer.feel(frame.counts)
+        self._observer.feel(frame)
         self.level, _ = level_and_fraction(self._curves, self._observer.mean)
         self.contact = self._contacts.step(self.level)
         due = self._count % self._ticks == 0
@@ -172,6 +172,7 @@ class PolicyController:
             self._decide(due)
         self._count += 1
         command = self._actor.step(self._observer.unknown)
+        self._observer.told(command)
         self.maneuver = self._actor.maneuver.astype(np.int64)
         return command
 

@@ -43,6 +43,8 @@ class PolicyInterface(Params):
         8.0, "s", "assumed: longer than an escape of `closed` takes", gt=0, le=300
     )
     """Time constant of the mean of each channel."""
+    servos: bool = number(False, "1", "assumed: by touch alone")
+    """Whether it is given how far each joint is from its goal."""
     turn_offset: float = number(0.52, "rad", "assumed: as escape.turn_offset", gt=0, le=1.0)
     """Yaw offset of a turn; the largest one where the gait is decided."""
     frequency: tuple[float, float] = number(
@@ -110,7 +112,7 @@ def channels(interface: PolicyInterface, robot: RobotSpec) -> tuple[Quantity, ..
 def observations(
     interface: PolicyInterface, control: ControlParams, robot: RobotSpec
 ) -> tuple[Quantity, ...]:
-    """Every number of an observation, in order: histories, means, phase, goals of joints."""
+    """Every number of an observation, in order: histories, means, phase, goals, servos."""
     period = interface.ticks * control.period
     each = channels(interface, robot)
     past = [
@@ -127,7 +129,18 @@ def observations(
         for f, word in (("sin", "sine"), ("cos", "cosine"))
     ]
     goals = goal_quantities(robot) if interface.action == "joints" else ()
-    return *past, *means, *phase, *goals
+    servos = servo_quantities(robot) if interface.servos else ()
+    return *past, *means, *phase, *goals, *servos
+
+
+def servo_quantities(robot: RobotSpec) -> tuple[Quantity, ...]:
+    """How far all joints are from their goals, now and on average."""
+    text = "reported angle less the goal of the tick before, within half a turn; 0 if there is none"
+    return tuple(
+        Quantity(f"lag {name}{end}", "rad", 1.0, -math.pi, math.pi, begin + text)
+        for end, begin in (("", ""), (" mean", "mean of "))
+        for name in robot.joint_names
+    )
 
 
 def goal_quantities(robot: RobotSpec) -> tuple[Quantity, ...]:

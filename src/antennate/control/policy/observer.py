@@ -12,7 +12,7 @@ from antennate.control.conditioning import RunningMean, curves, level_and_fracti
 from antennate.control.policy.interface import PolicyInterface, bounds, channels, observations
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import Bools, Floats, Ints
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, joint_angles
 
 Vector = NDArray[np.float32]
 
@@ -28,6 +28,11 @@ class GaitState(Protocol):
     def goals(self) -> Floats | None:
         """Goals of all joints as a policy is given them, shape (B, n); None if it is not."""
         ...
+
+
+def wrapped(angle: Floats) -> Floats:
+    """An angle [rad] within half a turn either way, same shape."""
+    return np.remainder(angle + math.pi, 2.0 * math.pi) - math.pi
 
 
 class Observer:
@@ -63,6 +68,10 @@ class Observer:
         self._bend = np.asarray(self._curves.polarity) * np.ones(2)
         self._free = np.tile(self._felt(np.full((1, 2), np.nan))[0], 2) / self._scale[:4]
         self._most: Floats = np.full((batch, 2), np.nan)
+        self._joints, self._parts = len(robot.joint_names), tuple(robot.command_shapes())
+        self._goals: Floats = np.full((batch, self._joints), np.nan)
+        self._angles: Floats = np.full((batch, self._joints), np.nan)
+        self._lag: Floats = np.zeros((batch, self._joints))
         self.unknown: Bools = np.zeros(batch, dtype=bool)
         self.mean: Floats = np.zeros((batch, 2))
 
@@ -73,15 +82,25 @@ class Observer:
         self._past[rows, : len(self._free)] = self._free[:, None]
         self._memory[rows] = self._past[rows, :, 0]
         self._most[rows] = np.nan
+        self._goals[rows], self._lag[rows] = np.nan, 0.0
         self.unknown[rows] = False
 
-    def feel(self, counts: Floats, rows: Bools | None = None) -> None:
-        """Take the readings of one tick [counts], shape (B, 2).
+    def told(self, command: JointCommand) -> None:
+        """Take the command of a tick, before the frame that shows what came of it."""
+        if self._interface.servos:
+            self._goals = joint_angles(command, self._parts, len(self.mean))
+
+    def feel(self, frame: AntennaFrame, rows: Bools | None = None) -> None:
+        """Take the frame of one tick.
 
         Args:
-            counts: What was read.
-            rows: Rows that begin with this reading, where the others had theirs, shape (B,).
+            frame: What was read.
+            rows: Rows that begin with this frame, where the others had theirs, shape (B,).
         """
+        counts = frame.counts
+        if self._interface.servos and frame.positions.shape == self._angles.shape:
+            angles = frame.positions
+            self._angles = angles if rows is None else np.where(rows[:, None], angles, self._angles)
         mean = self._average.step(counts) if rows is None else self._average.begin(counts, rows)
         self.mean = mean if rows is None else np.where(rows[:, None], mean, self.mean)
         most = np.fmax(self._most, self.mean * self._bend)
@@ -91,19 +110,25 @@ class Observer:
     def look(self, state: GaitState, rows: Bools | None = None) -> Vector:
         """Sample all channels; the observations, shape (B, n). Rows not meant do not go on."""
         sample = self._sample(state)
-        past, memory = self._past.copy(), self._memory.copy()
+        past, memory, lag = self._past.copy(), self._memory.copy(), self._lag.copy()
         past[:, :, 1:] = self._past[:, :, :-1]
         past[:, :, 0] = sample
         memory += self._pace * (sample - memory)
+        behind = np.zeros_like(lag)
+        if self._interface.servos:
+            behind = np.nan_to_num(wrapped(self._angles - self._goals))
+            lag += self._pace * (behind - lag)
         most = np.full_like(self._most, np.nan)
         if rows is not None:
             past[~rows], memory[~rows] = self._past[~rows], self._memory[~rows]
-            most[~rows] = self._most[~rows]
-        self._past, self._memory, self._most = past, memory, most
+            most[~rows], lag[~rows] = self._most[~rows], self._lag[~rows]
+        self._past, self._memory, self._most, self._lag = past, memory, most, lag
         phase = np.stack([np.sin(state.phase), np.cos(state.phase)], axis=1)
         parts = [past.reshape(len(past), -1), memory, phase]
         if (goals := state.goals()) is not None:
             parts.append(goals)
+        if self._interface.servos:
+            parts += [behind, lag]
         vector = np.concatenate(parts, axis=1).astype(np.float32)
         return np.clip(vector, *self._bounds)
 
