@@ -1,7 +1,7 @@
 """Environments beside trials of `tunnel`, and their resets beside those of fresh processes.
 
-    uv run python benchmarks/envs.py                  # control ticks per processor second, 3 min
-    uv run python benchmarks/envs.py --resets 4096    # first observations, bit for bit, 10 min
+    uv run python benchmarks/envs.py                  # control ticks per processor second, 2 min
+    uv run python benchmarks/envs.py --resets 4096    # first observations, bit for bit, 4 min
 
 Ticks: B rows of the vector environment that walk FORWARD, over B trials of `tunnel` in lockstep
 under `open` and under `closed`, from the same starts, taken in turn in this process. Drawing and

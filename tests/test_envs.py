@@ -403,3 +403,21 @@ def test_servos_tell_how_far_each_joint_is_from_its_goal() -> None:
     lag = world.drives() - world.data.ctrl[world.places.drives]
     assert observation[now] == pytest.approx(lag, abs=1e-5)
     assert np.abs(lag).max() > 0.01
+
+
+def test_wrappers_of_vectors_take_it() -> None:
+    env = gym.wrappers.vector.RecordEpisodeStatistics(vector(2, **SHORT))
+    env = gym.wrappers.vector.NormalizeObservation(env)
+    env.reset(seed=1)
+    returns: list[float] = []
+    for _ in range(24):
+        *_, infos = env.step(np.zeros(2, np.int64))
+        returns += infos["episode"]["r"][infos["_episode"]].tolist() if "episode" in infos else []
+    assert len(returns) == 4
+
+
+def test_without_a_seed_episodes_are_of_a_seed_of_chance() -> None:
+    seeds = [vector(2, "Flat").reset()[1]["seed"].tolist() for _ in range(2)]
+    seeds.append([single("Flat").reset()[1]["seed"]] * 2)
+    assert all(a == b and a >= 2**32 for a, b in seeds)
+    assert len({a for a, _ in seeds}) == 3

@@ -144,7 +144,7 @@ def test_a_recurrent_state_is_kept_and_forgotten_at_a_reset(tmp_path: Path) -> N
 
 
 def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:
-    path = constant(tmp_path / "p.onnx", (0.0, 0.0, 5.0, 0.0))
+    path = constant(tmp_path / "p.onnx", (0.0, 0.0, 5.0, 0.0), contract(servos=True))
     robot = watched(TwinConfig())[0]
     clock = LockstepClock(robot)
     config = DriveConfig(controller=str(path), dry_run=0.5, duration=3.0, touch_check=False)
@@ -163,7 +163,7 @@ def test_its_log_replays_bit_for_bit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    drawn(Path("p.onnx"), contract(action="gait"))
+    drawn(Path("p.onnx"), contract(action="gait", servos=True))
     words = ["--trials", "1", "--time-limit", "2", "--workers", "1", "--log", "--out", "run"]
     assert main(["tunnel", "--controllers", "p.onnx", *words]) == 0
     capsys.readouterr()
