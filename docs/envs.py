@@ -70,6 +70,9 @@ environment for your [own scene](scenes.md).
   `length` [m], `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`, the terms of the reward,
   and at the end `outcome` and `reason`. None of it is in an observation.
 
+Stable-Baselines3 takes the single environment, `PPO("MlpPolicy", env)`; skrl takes the vector,
+`wrap_env(many)`, with `headless` set in its trainer. `tests/test_training.py` trains with both.
+
 ## Observation
 
 {observation}
@@ -103,6 +106,10 @@ Further arguments: `control`, `robot`, `variation`, `tunnel`, `corridors` and `p
 Version {version}. It is the sum of these terms; each is in `info` as `reward_NAME`.
 
 {reward}
+
+Time costs by the decision, so with the default of 0.1 s a decision it is 0.1 a second, and with
+`ticks` 50 it is 0.02. A robot that sees no way out is then better off behind the entrance than
+inside until the limit: look at the outcomes, not at the sum.
 
 ## Randomisation
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -256,3 +257,14 @@ def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     constant(Path("mine.onnx"), (0.0,) * 4, contract(action="gait"))
     exec(code[1], known)
     assert Policy(Path("mine.onnx")).contract.about == "my PPO, seed 3"
+
+
+def test_without_onnxruntime_the_way_to_get_it_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    assert main(["tunnel", "--controllers", str(path), "--out", str(tmp_path / "run")]) != 0
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "expected the package onnxruntime" in line
+    assert "--extra onnx" in line

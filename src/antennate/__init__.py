@@ -4,6 +4,7 @@ Every name of `__all__` is imported when it is first used, so that `import anten
 """
 
 import sys
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -53,4 +54,5 @@ def __dir__() -> list[str]:
 
 
 if "gymnasium" in sys.modules:  # `gymnasium.make("antennate:Tunnel-v1")` imports this package
-    import_module("antennate.envs")
+    with suppress(ImportError):  # an older one
+        import_module("antennate.envs")
