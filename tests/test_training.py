@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -39,11 +41,7 @@ def test_the_exported_network_answers_as_torch_does(tmp_path: Path) -> None:
     """Round trip with a normaliser of drawn numbers: at most 1e-5 apart."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("onnxruntime")
-    sys.path.insert(0, str(EXAMPLE.parent))
-    try:
-        import train_ppo
-    finally:
-        sys.path.remove(str(EXAMPLE.parent))
+    train_ppo = example("train_ppo")
     from antennate.control.policy.contract import contract_of
     from antennate.control.policy.controller import Policy
 
@@ -132,3 +130,41 @@ def test_skrl_trains() -> None:
     while time.monotonic() - start < MINUTE:
         trainer.train()
     assert not torch.equal(before, models["policy"].net.weight)
+
+
+def test_rsl_rl_trains() -> None:
+    pytest.importorskip("rsl_rl")
+    from rsl_rl.runners import OnPolicyRunner
+
+    env = example("rsl_rl_env").RslRlEnv("antennate/Flat-v1", num_envs=4, time_limit=5.0)
+    assert env.max_episode_length == 50
+    network = {"class_name": "MLPModel", "hidden_dims": [32]}
+    config = {
+        "algorithm": {"class_name": "PPO"},
+        "actor": {**network, "distribution_cfg": {"class_name": "GaussianDistribution"}},
+        "critic": network,
+        "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
+        "num_steps_per_env": 24,
+        "save_interval": 1000,
+    }
+    runner = OnPolicyRunner(env, config)
+    before = [parameter.clone() for parameter in runner.alg.actor.parameters()]
+    start = time.monotonic()
+    while time.monotonic() - start < MINUTE:
+        runner.learn(2)
+    after = [*runner.alg.actor.parameters()]
+    assert not all(map(torch_equal, before, after))
+
+
+def torch_equal(one: Any, other: Any) -> bool:
+    """Whether two tensors are the same."""
+    return bool((one == other).all())
+
+
+def example(name: str) -> Any:
+    """A module among the examples."""
+    sys.path.insert(0, str(EXAMPLE.parent))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(EXAMPLE.parent))
