@@ -71,7 +71,8 @@ environment for your [own scene](scenes.md).
   and at the end `outcome` and `reason`. None of it is in an observation.
 
 Stable-Baselines3 takes the single environment, `PPO("MlpPolicy", env)`; skrl takes the vector,
-`wrap_env(many)`, with `headless` set in its trainer. `tests/test_training.py` trains with both.
+`wrap_env(many)`, with `headless` set in its trainer. rsl_rl and LeRobot have interfaces of their
+own: `examples/rsl_rl_env.py`, `examples/lerobot_env.py`. `tests/test_training.py` tries all four.
 
 ## Observation
 

@@ -168,3 +168,17 @@ def example(name: str) -> Any:
         return importlib.import_module(name)
     finally:
         sys.path.remove(str(EXAMPLE.parent))
+
+
+def test_lerobot_takes_it_as_of_its_hub() -> None:
+    pytest.importorskip("lerobot")
+    from lerobot.envs.utils import _call_make_env, _normalize_hub_result, preprocess_observation
+
+    made = _normalize_hub_result(_call_make_env(example("lerobot_env"), 2, False, None))
+    ((tasks,),) = (made.values(),)
+    observation, _ = tasks[0].reset(seed=[1, 2])
+    (state,) = preprocess_observation(observation).values()
+    assert tuple(state.shape) == tasks[0].observation_space["agent_pos"].shape
+    assert tasks[0].call("_max_episode_steps") == (1000, 1000)
+    *_, info = tasks[0].step(tasks[0].action_space.sample())
+    assert info["is_success"].tolist() == [False, False]
