@@ -37,7 +37,7 @@ from antennate.studies.identity import code_named, differences, environment, ide
 from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOGS, RESULT, SHARD, files_of
+from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -247,11 +247,10 @@ def _folder(
     identity: dict[str, Any],
     shards: Shards | None,
 ) -> contextlib.AbstractContextManager[RunDirectory]:
-    """The run directory; shards are put together in a new one, apart from theirs."""
+    """The run directory; shards are put together in a new one."""
     how: dict[str, Any] = {}
     if shards:
-        reads = [file for folder in shards.folders for file in files_of(folder)]
-        how = {"command": "merge", "reads": reads}
+        how = {"command": "merge"}
     elif experiment.on_workers:
         resume = options.resume or options.retry or experiment.continued
         tasks = experiment.grows if options.shard is None else None

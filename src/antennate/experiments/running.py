@@ -22,7 +22,7 @@ from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import FILMS, require_apart
+from antennate.studies.run_files import FILMS
 
 _PARTS = 100
 """Parts of the making of a film that are told."""
@@ -157,7 +157,6 @@ def run(
     pool = Workers(workers, make_engine(engine), shared=environment(experiment.name, config))
     if out is None:
         return Result(experiment, config, experiment.run(config, pool, on_step, lambda row: None))
-    require_apart(out, overwrite, config.model_dump())
     place = (
         experiment.name,
         out,
