@@ -228,22 +228,6 @@ def is_folder(folder: Path) -> bool:
     return folder.is_dir() and not folder.is_symlink()
 
 
-def remove_described(place: Path) -> None:
-    """Remove what is known before a run, and its logs, from a directory without a result.
-
-    Raises:
-        OSError: Something cannot be removed.
-    """
-    for file in files_of(place):
-        if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == place / LOGS:
-            file.unlink()
-    if files_of(place) == [place / FILES]:
-        (place / FILES).unlink()
-    if is_folder(place / LOGS):
-        with contextlib.suppress(OSError):  # it holds files of somebody else
-            (place / LOGS).rmdir()
-
-
 def place_of(command: str, path: str | Path | None) -> Path:
     """The folder for a run of a command: the one of a path, or the next that nobody has named.
 

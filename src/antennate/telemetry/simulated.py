@@ -8,7 +8,6 @@ threads run.
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -77,7 +76,6 @@ class RowLog:
         self._held: list[Any] = []
         self._since = math.inf
         self._writing: Future[None] | None = None
-        self._process = os.getpid()
 
     def add(self, tick: Any) -> None:
         """Keep one tick.
@@ -99,7 +97,7 @@ class RowLog:
             LogError: The disk is full or gone.
         """
         self.flush()
-        if ticks and not self._forked:
+        if ticks:
             self._write(ticks)
 
     def settle(self) -> None:
@@ -111,8 +109,7 @@ class RowLog:
         if time.monotonic() - self._since >= _PATIENCE:
             self.flush()
         self._wait()
-        if not self._forked:
-            self._out.settle()
+        self._out.settle()
 
     def event(self, text: str, t: float = 0.0) -> None:
         """Keep what happened after the last tick, at a time of the loop [s].
@@ -135,8 +132,7 @@ class RowLog:
             self.flush()  # the thread works on: the file is closed behind it
             raise
         finally:
-            if not self._forked:
-                self._out.close()
+            self._out.close()
 
     def __enter__(self) -> Self:
         return self
@@ -157,17 +153,12 @@ class RowLog:
         """Let the thread write what is held, once it has written what was held before."""
         self._wait()
         ticks, self._held, self._since = self._held, [], math.inf
-        if ticks and not self._forked:
+        if ticks:
             self._writing = _encoder().submit(self._write, ticks)
-
-    @property
-    def _forked(self) -> bool:
-        """Whether this is a copy in another process: the file is not its own, and has no thread."""
-        return os.getpid() != self._process
 
     def _wait(self) -> None:
         """Wait until the thread has written."""
-        if self._writing is not None and not self._forked:
+        if self._writing is not None:
             try:
                 self._writing.result()
             except Exception:
@@ -216,9 +207,6 @@ class RowLog:
 def _encoder() -> ThreadPoolExecutor:
     """The thread of all logs of this process."""
     return ThreadPoolExecutor(1, "logs")
-
-
-os.register_at_fork(after_in_child=_encoder.cache_clear)
 
 
 def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
