@@ -111,8 +111,6 @@ BAD_PATHS: list[Case] = [
     for function, name in (
         (Calibration.load, "path"),
         (FITTED.save, "path"),
-        (TimeSeries.load, "path"),
-        (series().save, "path"),
         (RunDirectory.open, "path"),
         (trial, "log"),
         (tunnel, "out"),

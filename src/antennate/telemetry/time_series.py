@@ -1,31 +1,22 @@
 """The time series of one trial: what was read, decided and commanded at each control tick.
 
-A file is `.npz`, NumPy's zip of arrays (never pickled objects), and gives back every bit of every
-number; `to_dataframe` makes a table for other programs.
+`columns` and `to_dataframe` make a table for other programs.
 """
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from antennate import checks
 from antennate.errors import BadInputError
-from antennate.files import read_limited, write_whole
 from antennate.messages import shortened, shown
 from antennate.notebook import from_columns, html
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
-FORMAT = "antennate time series 1"
-_LARGEST_FILE = 1 << 30
 _ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
     "t": ((), np.float64),
     "counts": ((2,), np.float64),
@@ -44,11 +35,6 @@ _ENDS: dict[str, tuple[str, ...]] = {
     "head": ("x", "y"),
 }
 """What the columns of the last axis are called; those of others are numbered, head first."""
-_UNUSABLE = (
-    *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
-    *(zlib.error, zipfile.BadZipFile),
-)
-"""What damaged files make the standard library and NumPy raise."""
 _SHOWN_COLUMNS = (
     *("ticks [%]", "level left", "level right", "contact left [%]", "contact right [%]"),
 )
@@ -170,38 +156,6 @@ class TimeSeries:
         """
         return from_columns(self.columns())
 
-    def save(self, path: str | Path, overwrite: bool = False) -> None:
-        """Write the series to a file that ends in `.npz`.
-
-        Raises:
-            BadInputError: The path is none, or the file has another ending.
-            OutputError: There is such a file and it may not be replaced, or it cannot be written.
-        """
-        path = checks.path("path", path)
-        _require_npz(path)
-        file = io.BytesIO()
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        head = json.dumps({"format": FORMAT, "meta": dict(self.meta)})
-        np.savez_compressed(file, allow_pickle=False, header=np.array(head), **arrays)
-        write_whole(path, file.getvalue(), overwrite)
-
-    @classmethod
-    def load(cls, path: str | Path) -> TimeSeries:
-        """Read a file that `save` wrote.
-
-        Raises:
-            BadInputError: The path is none, or the file cannot be read or is not a whole time
-                series.
-        """
-        path = checks.path("path", path)
-        _require_npz(path)
-        data = read_limited(path, _LARGEST_FILE)
-        try:
-            return _from_npz(data)
-        except _UNUSABLE as error:
-            why = " ".join(str(error).split())
-            raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
-
 
 class TimeSeriesRecorder:
     """Collects one row of a batch, tick by tick.
@@ -241,32 +195,3 @@ class TimeSeriesRecorder:
             name: np.array(values, dtype=_ARRAYS[name][1]) for name, values in self._ticks.items()
         }
         return TimeSeries(**arrays, meta=dict(meta))
-
-
-def _require_npz(path: Path) -> None:
-    if path.suffix != ".npz":
-        raise BadInputError(f"{path}: expected a name that ends in .npz")
-
-
-def _meta(text: str) -> dict[str, Any]:
-    head = json.loads(text)
-    if not isinstance(head, dict) or head.get("format") != FORMAT:
-        raise ValueError("another format")
-    meta = head.get("meta")
-    if not isinstance(meta, dict):
-        raise ValueError("no meta data")
-    return meta
-
-
-def _from_npz(data: bytes) -> TimeSeries:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(member.file_size for member in archive.infolist())
-        if size > _LARGEST_FILE:
-            raise ValueError(f"{size} bytes unpacked, more than {_LARGEST_FILE}")
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name: file[name] for name in _ARRAYS}
-        meta = _meta(str(file["header"]))
-    for name, values in arrays.items():
-        if values.dtype != (wanted := np.dtype(_ARRAYS[name][1])):
-            raise ValueError(f"{name} of type {values.dtype} in place of {wanted}")
-    return TimeSeries(**arrays, meta=meta)
