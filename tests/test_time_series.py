@@ -7,10 +7,9 @@ import dataclasses
 import re
 
 import numpy as np
-import pytest
 
 import antennate
-from antennate import BadInputError, TimeSeries
+from antennate import TimeSeries
 
 SIDES = ("left", "right")
 ODD = [np.nan, np.inf, -np.inf, -0.0, 5e-324, 0.1, 1 / 3, 1.7976931348623157e308]
@@ -34,13 +33,6 @@ def made(ticks: int = 8, links: int = 6, pitch: int = 0) -> TimeSeries:
         head=rng.normal(size=(ticks, 2)),
         meta={"controller": "closed", "seed": 3, "length_m": 0.1, "scene": None, "note": "ä\n,"},
     )
-
-
-def test_arrays_of_unequal_length_are_refused() -> None:
-    with pytest.raises(
-        BadInputError, match=r"yaw: expected numbers of shape \(8, Y\), found shape \(3, 5"
-    ):
-        dataclasses.replace(made(), yaw=np.zeros((3, 5)))
 
 
 def test_a_robot_without_antennae_is_taken() -> None:
