@@ -48,6 +48,12 @@ def offered(script: Path, *words: str) -> list[str]:
         (["tunnel", "--tunnel.mirror", ""], ["random", "never", "always"]),
         (["bench", "wall", "--wall.gravity", "o"], ["off"]),
         (["tunnel", "--controllers", "open", "cl"], ["closed"]),
+        (["tunnel", "--controllers", "m"], ["map"]),
+        (["drive", "--controller", "m"], []),  # a robot has none
+        (["tunnel", "--engine", ""], ["local", "dask", "slurm", "slurm-local", "warp"]),
+        (["drive", "--robot", ""], ["scuttle", "hexapod"]),
+        (["gait", "--gait", "b"], ["b11bl0"]),
+        (["tunnel", "--control.gait", "b"], ["b11bl0"]),
         (["drive", "--control", "pa"], []),
         (["drive", "--controller", "pa"], ["paper"]),
         (["drive", "--bu"], ["--bus"]),
