@@ -81,17 +81,6 @@ def test_each_is_refused_alone(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "words", [["--video", "--no-video"], ["--engine", "dask"], ["--engine=local"]]
-)
-def test_what_is_needed_is_given_only_where_it_holds(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    option = ["--video-trial", "0"] if "--video" in words else ["--slurm", "timeout_min=1"]
-    assert main(["tunnel", *option, *words]) == 2
-    assert "beside it, found none" in capsys.readouterr().err
-
-
 def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:
     with pytest.raises(ConfigError, match="overwrite: expected out beside it, found none"):
         antennate.run("springs", overwrite=True)

@@ -337,12 +337,6 @@ def test_a_run_that_has_ended_without_its_result_is_one_line(
     assert "run/result.json: expected a readable file" in refusal(capsys, "run")
 
 
-def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
-    assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")
-    assert "expected no other run beside it" in refusal(capsys, "run", "--compare", "a", "b")
-
-
 @pytest.mark.parametrize("ends", [(None, None), (1.0, math.nan), (-math.inf, 1.0)])
 def test_an_interval_that_is_not_known_is_a_dash(ends: tuple[float | None, float | None]) -> None:
     assert shown(ends) == "-"

@@ -12,7 +12,7 @@ import pytest
 
 from antennate import simulate
 from antennate.cli import main
-from antennate.errors import AntennateError, ConfigError, SceneError
+from antennate.errors import AntennateError, SceneError
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
@@ -371,15 +371,6 @@ def test_X2_a_named_file_is_compiled_by_another_process_first(tmp_path, monkeypa
 def test_a_good_model_and_a_bad_one_leave_the_word_to_the_reader(tmp_path):
     require_compiles(mjcf(tmp_path, SITES + WALL))
     require_compiles(mjcf(tmp_path, "<gem/>"))
-
-
-def test_names_of_scenes_are_checked():
-    with pytest.raises(ValueError, match="tunnel, flat"):
-        TrialConfig(scene="tunnle")
-    with pytest.raises(ValueError, match="tunnel belongs to the scene"):
-        TrialConfig.model_validate({"scene": "flat", "tunnel": {"strewn": 2}})
-    with pytest.raises(ConfigError, match="no_such_module"):
-        check_start(TrialConfig(scene="no_such_module:Scene"))
 
 
 @pytest.mark.parametrize(("line", "method"), [(5, "__init__"), (7, "draw"), (11, "build")])

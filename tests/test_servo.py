@@ -328,20 +328,3 @@ def test_a_file_that_is_no_recording_is_refused_in_one_line(
     err = capsys.readouterr().err
     assert says in err
     assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ([], "--recording: expected one file or more"),
-        (["--recording", "none.json"], "none.json: expected a readable file"),
-        (["--servos.xc430-w240.armature", "0.1"], "expected the default, as the servo is xl330"),
-    ],
-)
-def test_words_that_mean_nothing_are_refused(
-    words: list[str], says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["servo", *words]) == 2
-    err = capsys.readouterr().err
-    assert says in err
-    assert err.count("\n") == 1

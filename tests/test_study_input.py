@@ -9,7 +9,6 @@ from design_plans import refusal
 
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
-from antennate.messages import command_words
 from antennate.params.base import read_file
 
 CHOICES = "expected a list of values, or a table with low and high (names with dots need quotes)"
@@ -235,12 +234,3 @@ def test_a_sensor_of_another_kind_without_its_curve_is_refused_at_any_point(
     kinds = '"robot.antenna.sensor.kind" = ["flex", "fsr"]\n'
     Path("kinds.toml").write_text(f"[vary]\n{kinds}")
     assert "polarity must be 1 for a fsr sensor" in refusal(capsys, "study", "kinds.toml")
-
-
-@pytest.mark.parametrize("command", ["study", "design"])
-def test_without_a_file_one_is_asked_for(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    for words in ([], ["--out", "run"]):
-        assert "expected a FILE that says what varies" in refusal(
-            capsys, *command_words(command).split(), *words
-        )
-    assert not Path("run").exists()
