@@ -20,9 +20,7 @@ HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
 
 
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def walls(*outcomes: str, flex: tuple[float | None, ...]) -> list[dict[str, Any]]:

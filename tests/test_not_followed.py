@@ -17,9 +17,7 @@ SOON = 5.0
 PORTS = ["--esp32", "left", "--bus", "right"]
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 @pytest.mark.parametrize("device", ["pipe", "/dev/zero", "."])

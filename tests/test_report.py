@@ -62,9 +62,7 @@ class Rows(HTMLParser):
             self.found[-1][-1] += data
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
