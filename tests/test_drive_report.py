@@ -254,11 +254,10 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
-    assert main(["drive", *ports, "--controller", "clsoed"]) == 2
-    said = capsys.readouterr().err
+    said = refused("drive", *ports, "--controller", "clsoed")
     assert "controller: expected one of open, timed, paper, closed, closed-1, " in said
     assert "map" not in said  # which no robot can have
     assert "/no/board" not in said

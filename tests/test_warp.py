@@ -210,12 +210,13 @@ def test_lost_contacts_are_said_and_make_trials_invalid(warp: Any) -> None:
 
 
 def test_a_study_of_another_experiment_has_no_batches(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     study = tmp_path / "springs.toml"
     study.write_text('experiment = "springs"\n[vary]\nwire_mm = [0.4, 0.5]\n')
-    assert main(["study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")]) == 2
-    assert "study of it; springs has none" in capsys.readouterr().err
+    assert "study of it; springs has none" in refused(
+        "study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")
+    )
 
 
 @pytest.mark.slow
