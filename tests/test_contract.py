@@ -14,17 +14,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import TICKS, WORLDS, World, plain_tick, recorded, replayed, session, simulated, twin
+from worlds import (
+    ARMED_AT,
+    LAYOUT,
+    TICKS,
+    WORLDS,
+    World,
+    plain_tick,
+    recorded,
+    replayed,
+    session,
+    simulated,
+    twin,
+)
 
+import antennate
 from antennate.control.loop import run_loop
-from antennate.control.registry import BUILT_IN
+from antennate.control.registry import BUILT_IN, make_controller
 from antennate.hardware.esp32.board import BoardReader
 from antennate.hardware.esp32.clock import DeviceClock, Timed
 from antennate.hardware.esp32.wire import Sample
 from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.replay import recorded_controller, replay
+from antennate.telemetry.replay import ReplayRobot, recorded_controller, replay
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
@@ -53,6 +67,7 @@ def test_M7_frames_have_one_shape_and_type(world: World) -> None:
         assert frame.counts.shape == (1, 2)
         assert frame.t.dtype == frame.counts.dtype == np.float64
         assert np.isfinite(frame.t).all()
+        assert frame.positions.size == 0 or frame.positions.shape == (1, len(LAYOUT.ids))
         counts = frame.counts[~np.isnan(frame.counts)]
         assert ((counts >= 0) & (counts <= 4095)).all()
 
@@ -191,6 +206,55 @@ def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path)
     assert ticks[-1].sent > ticks[200].sent > 50
     assert math.isnan(ticks[60].counts[0])  # withheld before torque
     assert not math.isnan(ticks[60].reading[0])
+
+
+def test_G7_joint_angles_of_a_session_are_those_that_servos_told_and_come_back(
+    tmp_path: Path,
+) -> None:
+    """The first frame has none; after torque they follow the goals of the tick before."""
+    live = session(tmp_path, "closed", 1)
+    again = replayed(recorded(live, tmp_path / "log", TICKS))
+    given = np.array([seen.frame.positions[0] for seen in live.seen])
+    back = np.array([seen.frame.positions[0] for seen in again.run()])
+    assert back.tobytes() == given.tobytes()
+    assert np.isnan(given[0]).all()
+    assert np.isfinite(given[1:]).all()
+    goals = np.array([seen.command.yaw[0] for seen in live.seen])
+    assert abs(given[-1, :5] - goals[-2]).max() < 0.2  # a servo lags behind its goal
+    assert np.ptp(given[ARMED_AT:, :5], axis=0).min() > 0.1
+
+
+def test_G7_joint_angles_of_a_simulation_come_back_with_the_errors_of_their_zeros(
+    tmp_path: Path,
+) -> None:
+    frames: list[AntennaFrame] = []
+
+    class Feeling:
+        def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+            self._own = make_controller("closed", control, robot, batch)
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self._own, name)
+
+        def step(self, frame: AntennaFrame) -> JointCommand:
+            frames.append(frame)
+            return self._own.step(frame)
+
+    path = tmp_path / "walk.mcap"
+    antennate.simulate(Feeling, time_limit=2.0, seed=5, log=path)
+    with LogReader(path) as log:
+        bias = log.header.joint_bias
+        body = ReplayRobot(list(log), log.header)
+        measured = []
+        for frame in frames:
+            again = body.read()
+            assert again.positions.tobytes() == frame.positions.tobytes()
+            measured.append(body.tick.positions if body.tick else ())
+            body.sleep_until(body.now() + 1.0)
+    assert len(bias) == 5
+    assert min(map(abs, bias)) > 0.0
+    off = np.array(measured)[:, :5] - np.array([frame.positions[0, :5] for frame in frames])
+    assert off == pytest.approx(np.tile(bias, (len(frames), 1)))
 
 
 class Wandering:

@@ -259,7 +259,7 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(
 
 
 def test_a_replay_without_ticks_has_nothing_to_read() -> None:
-    body = ReplayRobot([])
+    body = ReplayRobot([], Header(controller="open", params=ControlParams()))
     with pytest.raises(LogError, match="found the end of the log"):
         body.read()
 

@@ -172,7 +172,7 @@ def recorded(world: World, path: Path, ticks: float = math.inf) -> Path:
 def replayed(path: Path) -> World:
     """The world that a log is."""
     with LogReader(path) as log:
-        body, control = ReplayRobot(list(log)), recorded_controller(log.header)
+        body, control = ReplayRobot(list(log), log.header), recorded_controller(log.header)
     return World(body, control, log.header, control, lambda frame, command: body.more)
 
 

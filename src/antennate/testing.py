@@ -130,7 +130,7 @@ class _Runs:
                 if tick == _RESET_AT and reset is not None:
                     checked.reset(np.array([reset]), offsets[[reset]])
                 t = offsets + period * tick
-                commands.append(_step(checked, t, reading))
+                commands.append(_step(checked, AntennaFrame(t, reading, self._positions(t))))
                 copies_of.append([getattr(commands[-1], part).copy() for part in self._parts])
                 for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
@@ -152,11 +152,18 @@ class _Runs:
         _check_values(trace)
         return trace
 
+    def _positions(self, t: Floats) -> Floats:
+        """Joint angles at the time of each row [rad], shape (rows, n): slow waves."""
+        lags = np.arange(len(self._robot.joint_names))
+        return 0.3 * np.sin(2.0 * math.pi * self._control.gait.frequency * t[:, None] - lags)
 
-def _step(checked: CheckedController, t: Floats, reading: Floats) -> JointCommand:
-    frame = AntennaFrame(t=t.copy(), counts=reading.copy())
+
+def _step(checked: CheckedController, given: AntennaFrame) -> JointCommand:
+    parts = (given.t, given.counts, given.positions)
+    frame = AntennaFrame(*(part.copy() for part in parts))
     command = checked.step(frame)
-    same = np.array_equal(frame.t, t) and np.array_equal(frame.counts, reading, equal_nan=True)
+    after = (frame.t, frame.counts, frame.positions)
+    same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(parts, after, strict=True))
     _expect(same, "a frame that is left as it is", "other values in it after a step")
     for row, fault in checked.faults.items():
         raise AssertionError(f"{fault} in row {row}")

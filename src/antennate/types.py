@@ -50,15 +50,20 @@ class Maneuver(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class AntennaFrame:
-    """One reading of both antennae.
+    """What a robot feels: one reading of both antennae, and where its joints are.
 
     Attributes:
         t: Time at which the sensors were sampled [s], shape (B,).
         counts: 12-bit ADC readings, shape (B, 2), left before right; NaN where a sample is missing.
+        positions: Joint angles as the servos report them [rad], shape (B, n), in the order of the
+            robot's joints, legs unwrapped; NaN where one did not answer. Shape (B, 0) or (0, 0)
+            where a robot cannot tell any. A bus tells them after its goals: they are those of the
+            tick before.
     """
 
     t: Floats
     counts: Floats
+    positions: Floats = field(default_factory=lambda: _EMPTY)
 
 
 @dataclass(frozen=True, slots=True)

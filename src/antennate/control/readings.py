@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -159,7 +160,7 @@ class Untouched(Own):
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:
         """Straight counts, whatever was read."""
-        return AntennaFrame(frame.t, np.broadcast_to(self._straight, frame.counts.shape).copy())
+        return replace(frame, counts=np.broadcast_to(self._straight, frame.counts.shape).copy())
 
 
 def _straight(curve: CurveParams) -> float:
@@ -172,7 +173,7 @@ class Swapped(Own):
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:
         """Right before left."""
-        return AntennaFrame(frame.t, np.ascontiguousarray(frame.counts[:, ::-1]))
+        return replace(frame, counts=np.ascontiguousarray(frame.counts[:, ::-1]))
 
 
 class Delayed:
@@ -195,7 +196,7 @@ class Delayed:
         counts = self._past[self._next].copy()
         self._past[self._next] = frame.counts
         self._next = (self._next + 1) % len(self._past)
-        return AntennaFrame(frame.t, counts)
+        return replace(frame, counts=counts)
 
 
 class Yoked:
@@ -222,7 +223,7 @@ class Yoked:
         ticks = zip(self._donors, self._tick.tolist(), strict=True)
         counts = np.array([donor[tick % len(donor)] for donor, tick in ticks])
         self._tick += 1
-        return AntennaFrame(frame.t, counts)
+        return replace(frame, counts=counts)
 
 
 def make_readings(

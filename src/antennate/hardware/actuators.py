@@ -64,8 +64,8 @@ class ActuatorState:
         joints: What joints do wrong.
         margins: How near they have come to that.
         supply: Voltage [V], NaN if it is not known.
-        angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that has
-            not answered yet; empty if they are not read.
+        angles: Measured joint angles [rad] in the order of the robot's joints, NaN for one that did
+            not answer in the last `look`; empty if they are not read.
         bus_error: What is wrong with the bus as a whole, empty if nothing is.
         tracebacks: Of errors that nobody expected while torque was taken off.
     """

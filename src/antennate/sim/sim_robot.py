@@ -45,14 +45,16 @@ class States:
     Args:
         batch: Number of rows B.
         hinges: Number n of hinges under each flex sensor.
+        joints: Number of driven joints.
     """
 
-    def __init__(self, batch: int, hinges: int) -> None:
+    def __init__(self, batch: int, hinges: int, joints: int) -> None:
         self._rows: dict[int, _State] = {}
         self._all: Floats = np.zeros((batch, 1))
         self._scale: Floats = np.zeros((batch, 1))
         self._heights: Ints = np.zeros(batch, np.int64)
         self._hinges: Ints = np.zeros((batch, 2, hinges), np.int64)
+        self._joints: Ints = np.zeros((batch, joints), np.int64)
 
     def put(self, row: int, world: World) -> None:
         """Put a world into a row."""
@@ -80,6 +82,7 @@ class States:
         first = row * self._all.shape[1] + 1
         self._heights[row] = first + places.root + 2
         self._hinges[row] = first + places.hinges
+        self._joints[row] = first + places.driven
         warnings, copy = world.data.warning.number, self._all[row, :size]
         self._rows[row] = _State(world, model, world.data, copy, warnings, bytes(warnings.nbytes))
 
@@ -87,7 +90,8 @@ class States:
         """Empty a row."""
         self._rows.pop(row, None)
         self._all[row] = self._scale[row] = 0.0
-        self._heights[row] = self._hinges[row] = (row + 1) * self._all.shape[1] - 1
+        last = (row + 1) * self._all.shape[1] - 1
+        self._heights[row] = self._hinges[row] = self._joints[row] = last
 
     def look(self) -> list[int]:
         """Copy all states; rows that may be unsound, or whose time has not gone on since."""
@@ -112,6 +116,11 @@ class States:
     def hinges(self) -> Floats:
         """Angles of the hinges under the flex sensors [rad], shape (B, 2, n)."""
         return self._all.take(self._hinges)
+
+    @property
+    def joints(self) -> Floats:
+        """Angles of all driven joints, 0 in an empty row [rad], shape (B, joints)."""
+        return self._all.take(self._joints)
 
 
 NOISE_BLOCK = 1024
@@ -209,7 +218,7 @@ class SimRobot:
             )
         self._ticks = 0
         sensed = robot.antenna.sensed_hinges if robot.antenna_count else 0
-        self._states = States(batch, sensed)
+        self._states = States(batch, sensed, len(robot.joint_names))
         self._bias: Floats = np.zeros((batch, robot.yaw_count))
         self._bends: Floats = np.ones((batch, 2))
         self._noise: Floats = np.zeros((batch, NOISE_BLOCK, 2))
@@ -252,6 +261,10 @@ class SimRobot:
             raise IndexError(f"row {row} holds no world")
         return self._rows[row].world
 
+    def joint_bias(self, row: int) -> Floats:
+        """Errors of the zeros of the yaw joints in a row [rad], shape (Y,)."""
+        return self._bias[row].copy()
+
     @property
     def failures(self) -> Mapping[int, SimulationError]:
         """What ended simulations, by row."""
@@ -274,7 +287,10 @@ class SimRobot:
         noise = self._noise[self._every, at]
         counts = self._sensors.step(self._states.hinges.sum(axis=2) * self._bends, noise)
         counts[self._missing] = np.nan
-        return AntennaFrame(t=np.where(self._empty, np.nan, self._states.times), counts=counts)
+        joints = self._states.joints
+        joints[:, : self._yaws] -= self._bias  # a servo reports angles about its own zero
+        joints[self._empty] = np.nan
+        return AntennaFrame(np.where(self._empty, np.nan, self._states.times), counts, joints)
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""

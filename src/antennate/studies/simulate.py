@@ -98,6 +98,7 @@ def simulate(
                 seed=config.seed,
                 trial=trial,
                 phase=start.phase,
+                joint_bias=tuple(start.chance.joint_bias.tolist()),
             )
             logged = SimulatedLog(log, header, start.world, walk.decisions)
             walk.log = stack.enter_context(logged)

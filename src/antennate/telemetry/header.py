@@ -75,6 +75,8 @@ class Header(Strict):
         seed: Seed of the world, None on a robot.
         trial: Trial of that seed.
         phase: Gait phase at the first tick [rad].
+        joint_bias: Errors of the zeros of the yaw joints in a simulation [rad]; what its servos
+            report is that much less than the angles in the log. Empty on a robot.
         start: Unix time at which the loop's time was 0 [ns]; 0 where time is simulated.
         arena: Settings of the trial that tell its scene, as `TrialConfig` has them without the
             robot; empty where its run tells, or where it was no simulation.
@@ -90,6 +92,7 @@ class Header(Strict):
     seed: int | None = None
     trial: int | None = None
     phase: float = 0.0
+    joint_bias: tuple[float, ...] = ()
     start: int = Field(default=0, ge=0, lt=1 << 62)
     arena: Mapping[str, Any] = Field(default_factory=dict)
     knows: tuple[str, ...] = ()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ from antennate.params.base import Params, number
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import TWIN, Header
 from antennate.telemetry.ticks import Tick, angles_of
-from antennate.types import AntennaFrame, Controller, JointCommand
+from antennate.types import AntennaFrame, Controller, Floats, JointCommand
 
 
 class ReplayConfig(Params):
@@ -57,19 +58,25 @@ class ReplayRobot:
     """Recorded readings in place of a robot's; also their clock.
 
     Each sleep goes on to the next tick, however long it is, so that none is left out. The clock
-    shows the time slept to; frames carry the recorded time.
+    shows the time slept to; frames carry the recorded time, and the joint angles that servos had
+    reported: in simulation those of the tick, less their errors of zero, else of the tick before.
 
     Args:
         ticks: The log, in order.
+        header: Its header.
 
     Attributes:
         tick: The present tick, None after the last.
         command: What was written last, None before.
     """
 
-    def __init__(self, ticks: Iterable[Tick]) -> None:
+    def __init__(self, ticks: Iterable[Tick], header: Header) -> None:
         self._ticks = iter(ticks)
         self._now = 0.0
+        joints = len(header.robot.joint_names)
+        self._unknown: Floats = np.full(joints, math.nan)
+        self._bias = np.array([*header.joint_bias, *[0.0] * joints])[:joints]
+        self._simulated, self._before = header.seed is not None, self._unknown
         self.command: JointCommand | None = None
         self.tick: Tick | None = next(self._ticks, None)
         self._next: Tick | None = next(self._ticks, None)
@@ -92,6 +99,10 @@ class ReplayRobot:
         """Go on to the next tick, unless time t [s] has passed."""
         if t > self._now:
             self._now = t
+            now, after = self.tick, self._next
+            self._before = self._unknown
+            if now is not None and after is not None and after.number == now.number + 1:
+                self._before = self._measured(now)
             self.tick, self._next = self._next, next(self._ticks, None)
 
     def read(self) -> AntennaFrame:
@@ -102,7 +113,12 @@ class ReplayRobot:
         """
         if self.tick is None:
             raise LogError("expected a tick to replay, found the end of the log")
-        return self.tick.frame()
+        positions = self._measured(self.tick) - self._bias if self._simulated else self._before
+        return replace(self.tick.frame(), positions=positions[None].copy())
+
+    def _measured(self, tick: Tick) -> Floats:
+        """Joint angles of a tick [rad], NaN where they are not known, shape (n,)."""
+        return np.array(tick.positions) if tick.positions else self._unknown
 
     def write(self, command: JointCommand) -> None:
         """Keep a command; nothing moves."""
@@ -235,7 +251,7 @@ def replay(
         on_tick: Called with each tick and what was decided now.
         readings: Change what the controller is given; None for what was recorded.
     """
-    log, result = ReplayRobot(ticks), Replayed()
+    log, result = ReplayRobot(ticks, header), Replayed()
     control = _Guarded(controller, log, header.robot, readings or Own())
 
     def go_on(frame: AntennaFrame, command: JointCommand) -> bool:

@@ -301,6 +301,7 @@ class _Rows:
             seed=config.seed,
             trial=monitor.trial,
             phase=phase,
+            joint_bias=tuple(self._robot.joint_bias(row).tolist()),
             knows=self._known,
         )
         path = self.log_of(monitor.trial)

@@ -51,6 +51,7 @@ class ServoMonitor(ActuatorState):
 
     Attributes:
         positions: Newest position by id [ticks].
+        answered: Ids that told theirs in the last `step`.
         read_at: When positions were last read [s].
         drive: Id, Present PWM [counts] and position [ticks] of a servo that was asked for its drive
             in this tick, None if none was.
@@ -83,6 +84,7 @@ class ServoMonitor(ActuatorState):
         self.read_at = -math.inf
         self.drive: tuple[int, int, int] | None = None
         self.positions: dict[int, int] = {}
+        self.answered: set[int] = set()
         self.armed = False
         self.loose: int | None = None
         self._measured = -math.inf
@@ -102,6 +104,7 @@ class ServoMonitor(ActuatorState):
         One of `suspects`, ids of joints that are behind, tells its drive in every second tick.
         """
         self.drive = None
+        self.answered = set()
         try:
             self._look(suspects)
             self.bus_error = ""
@@ -191,6 +194,7 @@ class ServoMonitor(ActuatorState):
             self.missed[servo] = self.missed[servo] + 1 if dead else max(self.missed[servo], asked)
             return
         self.missed[servo] = 0
+        self.answered.add(servo)
         self.positions[servo] = _POSITION.decode(reply.data)
         if reply.alert:
             bits = self._one(servo, _ERRORS)
@@ -356,7 +360,8 @@ class DynamixelActuators:
         state.loose = self.turns.loose
         state.step(tuple(ids[at] for at in self.following.suspects))
         ticks = np.array([state.positions.get(servo, math.nan) for servo in ids])
-        state.angles = tuple(self.joints.angles(ticks).tolist())
+        silent = np.array([servo not in state.answered for servo in ids])
+        state.angles = tuple(np.where(silent, math.nan, self.joints.angles(ticks)).tolist())
         if self._goals is not None:
             idle = {*state.watchdogs, *state.disarmed, *state.modes}  # why they do not follow
             unknown = np.array([state.missed[servo] > 0 or servo in idle for servo in ids])

@@ -94,7 +94,8 @@ class Session:
         self.orders, self.tally = Orders(), Tally()
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
-        self.frame = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))
+        self._angles = (math.nan,) * len(actuators.robot.ids)
+        self.frame = AntennaFrame(np.zeros(1), np.full((1, 2), math.nan), np.array([self._angles]))
         self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
         self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
@@ -116,7 +117,9 @@ class Session:
         empty = out is not None and any(a.cause is Cause.SUPPLY_WARN for a in out.causes)
         control.standing = self.actuators.resting or self.approaching
         control.rate = self._limits.slow_rate if empty else 1.0
-        self.frame = AntennaFrame(t=np.array([control.time(t)]), counts=np.array([counts]))
+        self.frame = AntennaFrame(
+            np.array([control.time(t)]), np.array([counts]), np.array([self._angles])
+        )
         return self.frame
 
     def _feel(self) -> float:
@@ -130,6 +133,7 @@ class Session:
         self._mark("decide")
         self.tally.ticks += 1
         self._decide(command)
+        self._angles = self.actuators.state.angles
         self._mark("bus")
         if self.timing is not None:
             self.timing.finish(self.clock.now())

@@ -205,7 +205,8 @@ class WarpRobot:
         self.period = period
         self._substeps = round(period / timestep)
         self._batch, self._limits, self._device = batch, limits, device
-        self._yaws, self._parts = robot.yaw_count, list(robot.command_shapes())
+        self._yaws, self._joints = robot.yaw_count, len(robot.joint_names)
+        self._parts = list(robot.command_shapes())
         self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._rows = dict[int, WarpRow]()
         self._failures = dict[int, SimulationError]()
@@ -257,6 +258,10 @@ class WarpRobot:
             raise IndexError(f"row {row} holds no world")
         return self._rows[row]
 
+    def joint_bias(self, row: int) -> Floats:
+        """Errors of the zeros of the yaw joints in a row [rad], shape (Y,)."""
+        return self._rows[row].chance.joint_bias.copy()
+
     @property
     def failures(self) -> Mapping[int, SimulationError]:
         """What ended simulations, by row."""
@@ -280,12 +285,17 @@ class WarpRobot:
         for i, row in self._rows.items():
             t[i] = row.t
             self._noise[i], bends[i] = row.chance.noise(row.ticks), row.chance.bends
+        joints = np.full((self._batch, self._joints), np.nan)
         for row in list(self._rows.values())[:1]:
             hinges = self.positions[:, row.world.places.hinges]
             flex = np.where(self._missing[:, None], 0.0, hinges.sum(axis=2) * bends)
+            driven = self.positions[:, row.world.places.driven]
+            for i, held in self._rows.items():
+                joints[i] = driven[i]
+                joints[i, : self._yaws] -= held.chance.joint_bias
         counts = self._sensors.step(flex, self._noise)
         counts[self._missing] = np.nan
-        return AntennaFrame(t=t, counts=counts)
+        return AntennaFrame(t, counts, joints)
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
