@@ -19,8 +19,8 @@ What breaks, what must happen then, what happened, and which test shows it. Noth
 measured on a real servo or board: faults are injected into the bytes of the [twin](twin.md), or
 into invented time. A row without a test is not shown yet. `tests/test_guards.py` lists every guard
 between bytes and motion, switches each off alone, and sees a test fail. The last column counts the
-tests that have the row in their name: `grep -rnE 'test_(\\w+_)?L1_' tests` finds those of L1. The column
-`measured` is written by hand from their runs and those of `benchmarks/`.
+tests that have the row in their name; `grep -rnE 'test_(\\w+_)?L1_' tests` finds those of L1. The
+column `measured` is written by hand from their runs and those of `benchmarks/`.
 
 {count}
 
