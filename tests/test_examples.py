@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
@@ -53,3 +54,14 @@ def test_virtual_servos_are_moved_over_tcp(tmp_path: Path) -> None:
     assert out[0].endswith("[1, 2, 3]")
     assert out[1].endswith("{1: 2048, 2: 2048, 3: 2048}")
     assert out[3].endswith("{1: 2148, 2: None, 3: 2348}")
+
+
+def test_a_swimmer_goes_as_far_as_published(tmp_path: Path) -> None:
+    out = ran("swimmer", tmp_path)
+    by_curvature, _ = map(float, re.findall(r"by curvature: (\S+), exact: (\S+)", out)[0])
+    assert by_curvature == pytest.approx(math.pi * 0.5**2 * 5 / 243, abs=1e-4)
+    exact, estimate = map(
+        float, re.findall(r"farthest: (\S+), in minimum perturbation (\S+)", out)[0]
+    )
+    assert exact == pytest.approx(0.1035, abs=1e-4)
+    assert estimate == pytest.approx(0.1035, rel=0.01)
