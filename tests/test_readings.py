@@ -148,28 +148,6 @@ def test_with_more_trials_only_the_yoked_trial_that_was_last_runs_anew(
         assert Path("run", name).read_bytes() == Path("once", name).read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--readings", "yoked", "--trials", "1"], "expected trials of at least 2"),
-        (["--readings", "delayed:-1"], "expected delayed:S with seconds above 0"),
-        (["--readings", "delayed:x"], "expected delayed:S with seconds above 0"),
-        (["--readings", "delayed:1e-9"], "of whole control periods of 0.01 s"),
-        (["--readings", "delayed:0.012"], "of whole control periods of 0.01 s"),
-        (["--readings", "delayed"], "expected delayed:S with seconds above 0"),
-        (["--readings", "yokde"], "did you mean yoked?"),
-        (["--readings", "own", "own"], "readings must differ"),
-    ],
-)
-def test_bad_readings_are_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["tunnel", *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-
-
 def test_a_replay_needs_another_log_for_yoked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -62,9 +62,7 @@ class Rows(HTMLParser):
             self.found[-1][-1] += data
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -331,12 +329,6 @@ def test_a_run_that_has_ended_without_its_result_is_one_line(
     Path("run/config.toml").touch()
     Path("run/trials.csv").write_text("seed,trial\n0,0\n")
     assert "run/result.json: expected a readable file" in refusal(capsys, "run")
-
-
-def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
-    assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")
-    assert "expected no other run beside it" in refusal(capsys, "run", "--compare", "a", "b")
 
 
 @pytest.mark.parametrize("ends", [(None, None), (1.0, math.nan), (-math.inf, 1.0)])

@@ -38,9 +38,7 @@ HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'study_trials.py'}:trial"
 
 
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def plan(name: str = "plan.toml", **more: Any) -> str:

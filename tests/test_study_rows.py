@@ -63,9 +63,7 @@ REASONS = [
 PLAN = 'experiment = "own.py:trial"\ntrials = {}\n[vary]\n"deep.x" = [1]\n'
 
 
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def study(own: str, trials: int, *more: str) -> tuple[int, list[dict[str, str]]]:

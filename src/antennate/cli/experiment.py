@@ -30,7 +30,7 @@ from antennate.errors import (
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.messages import shortened, typed
 from antennate.params.base import Params
-from antennate.studies.engines import BATCHED, EVERYWHERE, LOCAL, WARP, make_engine
+from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
@@ -58,6 +58,7 @@ class RunOptions(ResultOptions):
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel and studies of it "
         f"also {', '.join(BATCHED)}",
         "ENGINE",
+        examples=[form for form in FORMS if ":" not in form],
     )
     shard: str | None = option(None, "run one of N parts, for `antennate study merge`", "I/N")
     slurm: tuple[str, ...] = option(
