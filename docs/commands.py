@@ -1,11 +1,12 @@
 """Write the list of docs/commands.md from the commands themselves; with --check only compare it.
 
 What stands before the mark is written by hand. An option that is the same in several commands and
-explained there is named alone where a command takes it.
+explained there is named alone where a command takes it, or with others as a set. What a command
+has in common with an earlier one is named alone, too.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from generated import finish, heads, row
@@ -18,7 +19,17 @@ from antennate.messages import command_words
 
 MARK = "<!-- commands: python docs/commands.py -->"
 SHARED = "[Options of a run](#options-of-a-run): "
-GROUPS = "Groups of further options, each described in [Parameters](parameters.md): "
+SETS = {
+    "results": "--out --overwrite --json",
+    "trials": "--workers --resume --retry --engine --slurm --shard --trial-timeout",
+    "page": "--view --view-port --foxglove --foxglove-port",
+    "pace": "--view-paused --view-speed",
+    "board": "--esp32 --key --insecure-udp",
+    "curves": "--calibration --calibration-right --sensor-id --sensor-id-right --reach "
+    "--reach-right",
+}
+"""Shared options that go together, by what the page calls them."""
+GROUPS = "Groups ([Parameters](parameters.md)): "
 _SHOWN = 40
 """Longest default that is shown whole."""
 _MANY = 3
@@ -32,22 +43,54 @@ def options(page: Command) -> dict[str, str]:
     return {option.free or option.offered: line(option) for option in [*others, *top]}
 
 
-def section(page: Command, shared: set[str]) -> Iterator[str]:
+def section(page: Command, shared: set[str], before: Sequence[Command]) -> Iterator[str]:
     """The lines of one command; rows that are shared are named alone."""
     free = "".join(f" {option.free}" for option in page.others if option.free)
     name = command_words(page.name)
     yield f"## `antennate {name}`"
     yield page.description
-    yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
+    if free:
+        yield f"```sh\nuv run antennate {name}{free} [OPTIONS]\n```"
     rows = options(page)
-    if own := [text for text in rows.values() if text not in shared]:
-        yield "\n".join([heads("option", "default", "meaning"), *own])
-    if common := [f"`{flag}`" for flag, text in rows.items() if text in shared]:
+    own = {flag: text for flag, text in rows.items() if text not in shared}
+    other, same = likest(own, before)
+    if left := [text for flag, text in own.items() if flag not in same]:
+        yield "\n".join([heads("option", "default", "meaning"), *left])
+    if same:
+        words = command_words(other)
+        yield f"Of [`{words}`](#{anchor(words)}): {', '.join(f'`{flag}`' for flag in same)}."
+    if common := named_alone([flag for flag, text in rows.items() if text in shared]):
         yield SHARED + ", ".join(common) + "."
     counts = Counter(option.path[0] for option in page.parameters if len(option.path) > 1)
     if counts:
         named = (f"`--{group.replace('_', '-')}.*` ({n})" for group, n in counts.items())
         yield GROUPS + ", ".join(named) + "."
+
+
+def likest(rows: dict[str, str], before: Sequence[Command]) -> tuple[str, list[str]]:
+    """The earlier command with the most of these rows, at least `_MANY`, and their flags."""
+    best: tuple[str, list[str]] = "", []
+    for page in before:
+        known = options(page)
+        same = [flag for flag, text in rows.items() if known.get(flag) == text]
+        if len(same) > max(len(best[1]), _MANY - 1):
+            best = page.name, same
+    return best
+
+
+def named_alone(flags: list[str]) -> list[str]:
+    """Shared options, those that go together by the name of their set."""
+    names = list[str]()
+    for name, words in SETS.items():
+        if set(words.split()) <= set(flags):
+            names.append(f"*{name}*")
+            flags = [flag for flag in flags if flag not in words.split()]
+    return names + [f"`{flag}`" for flag in flags]
+
+
+def anchor(words: str) -> str:
+    """Where a command stands on the page."""
+    return f"antennate-{words.replace(' ', '-')}"
 
 
 def line(option: Option) -> str:
@@ -72,7 +115,7 @@ def is_own(name: str) -> bool:
 
 def index(title: str, named: dict[str, str]) -> str:
     """A table of commands."""
-    rows = (row(f"[`{n}`](#antennate-{n.replace(' ', '-')})", what) for n, what in named.items())
+    rows = (row(f"[`{n}`](#{anchor(n)})", what) for n, what in named.items())
     return "\n".join([f"**{title}**\n", heads("command", "what it does"), *rows])
 
 
@@ -86,7 +129,8 @@ def main() -> None:
     begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)
     shared = {text for name, text in rows if counts[text] >= _MANY and f"`{name}" in begin}
     lists = [index("Simulation and study", studies), index("Robot, twin, logs", others)]
-    parts = [begin, MARK, *lists, *(part for page in pages for part in section(page, shared))]
+    sections = (section(page, shared, pages[:i]) for i, page in enumerate(pages))
+    parts = [begin, MARK, *lists, *(part for parts in sections for part in parts)]
     finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
 
 

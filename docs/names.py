@@ -16,7 +16,7 @@ HEAD = """\
 # Python names
 
 All that `import antennate` gives, with units in brackets. [Use it from Python](api.md) shows how
-the names go together.
+the names go together. `help(antennate.run)` also says when each error is raised.
 """
 PAGE = re.compile(r"docs/([\w-]+)\.md")
 _WIDEST = 88
@@ -28,6 +28,8 @@ _ENTRY = re.compile(r"^    (\S[^:]*): (.*(?:\n     .*)*)", re.MULTILINE)
 def entries(name: str, body: str) -> str:
     """A section of a docstring as Markdown: a list where it has entries."""
     found = _ENTRY.findall(body)
+    if name == "Raises":
+        return f"**Raises** {', '.join(f'`{entry}`' for entry, _ in found)}."
     name = "Arguments" if name == "Args" else name
     if not found or name in ("Returns", "Yields"):
         return f"**{name}**: {' '.join(body.split())}"

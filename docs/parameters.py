@@ -16,9 +16,9 @@ from antennate.params.base import Params, meaning
 HEAD = """\
 # Parameters
 
-Every physical number of the project: its default, its unit, what it means and where it comes from.
-A source begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the
-paper does not say).
+Every physical number: its default with its unit, what it means and where it comes from. A source
+begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the paper
+does not say).
 """
 ROBOTS = ("spec", "joints", "servos", "antenna")
 """Modules of `antennate.robots` that describe robots."""
@@ -71,13 +71,14 @@ def nested(config: type[Params]) -> list[type[Params]]:
 
 
 def cells(group: type[Params], name: str) -> tuple[object, ...]:
-    """Default, unit, meaning and source of a number."""
+    """Default with its unit, meaning and source of a number."""
     field = group.model_fields[name]
     extra = field.json_schema_extra
     assert isinstance(extra, dict), f"{group.__name__}.{name} has no unit and no source"
     default = field.get_default(call_default_factory=True)
     value = f"{default:.6g}" if isinstance(default, float) else default
-    return f"`{value}`", extra["unit"], meaning(group, name, unit=False), extra["source"]
+    unit = "" if extra["unit"] == "1" else f" {extra['unit']}"
+    return f"`{value}`{unit}", meaning(group, name, unit=False), extra["source"]
 
 
 def table(group: type[Params], known: Collection[type[Params]], command: str = "") -> str:
@@ -106,9 +107,7 @@ def table(group: type[Params], known: Collection[type[Params]], command: str = "
     if base:
         parts.append(f"All else as in [{base.__name__}](#{base.__name__.lower()}).")
     if rows:
-        columns = (
-            ("name", "source") if command else ("name", "default", "unit", "meaning", "source")
-        )
+        columns = ("name", "source") if command else ("name", "default", "meaning", "source")
         parts.append("\n".join([heads(*columns), *rows]))
     if groups:
         parts.append(f"Groups: {', '.join(groups)}.")

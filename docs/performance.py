@@ -192,11 +192,16 @@ KINDS = {
 
 def growth(figures: Figures) -> str:
     rows = [
-        (KINDS[kind], n, told(one["ratio"]), told(one["ms_per_s"]))
+        (
+            KINDS[kind],
+            *(
+                "; ".join(f"{n}: {told(one[name])}" for n, one in figures[kind].items())
+                for name in ("ratio", "ms_per_s")
+            ),
+        )
         for kind in KINDS
-        for n, one in figures[kind].items()
     ]
-    columns = ("what grows", "number", "cost", "CPU time a simulated second [ms]")
+    columns = ("what grows", "its number: cost", "its number: CPU time a simulated second [ms]")
     note = (
         "The cost is the median of ratios within a repetition, the CPU time a median over all. "
         "Where the machine\nchanged between repetitions the two need not agree.\n\n"

@@ -132,7 +132,7 @@ def counts(found: Mapping[str, Any]) -> str:
 
 
 def verdicts(found: Mapping[str, Any]) -> str:
-    """The table of all claims with our numbers, then the criterion and the reason of each."""
+    """The table of all claims with our numbers, then rival and reason of each, by command."""
     lines = [
         "## Verdicts",
         "",
@@ -144,16 +144,16 @@ def verdicts(found: Mapping[str, Any]) -> str:
         words = VERDICTS[claim["verdict"]]
         cells = (claim[name] for name in ("claim", "criterion", "paper", "ours"))
         lines.append(row(*cells, f"**{words}**"))
-    lines += ["", "## Criteria and reasons", ""]
+    lines += ["", "## Rivals and reasons"]
+    last = ""
     for claim, rule in zip(found["claims"], CLAIMS, strict=True):
-        lines += [
-            f"**{claim['claim']}**",
-            "",
-            f"- Criterion: {rule.rule}",
-            f"- Verdict: {VERDICTS[claim['verdict']]}. {claim['reason']}",
-            f"- Run: `{claim['command']}`",
-            "",
-        ]
+        if claim["command"] != last:
+            last = claim["command"]
+            lines += ["", f"By `{last}`:", ""]
+        rival = rule.rule.removeprefix(f"{rule.criterion}. ")
+        lines += [f"- **{claim['claim']}.** {rival} *{VERDICTS[claim['verdict']].capitalize()}*: "]
+        lines[-1] += f"{claim['reason']}"
+    lines += [""]
     return "\n".join(lines) + "\n"
 
 

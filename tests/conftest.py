@@ -7,12 +7,14 @@ import os
 import shutil
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from antennate.cli import main
 from antennate.lookup import ADDED
 from antennate.sim.engine_setup import dropped
 
@@ -58,6 +60,29 @@ def _signals_stay_as_they_are() -> Iterator[None]:
         signal.signal(number, handler)
 
 
+@pytest.fixture
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, which is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that is refused: nothing on stdout, one line on stderr, which is returned."""
+
+    def run(*words: str) -> str:
+        capsys.readouterr()
+        assert main(list(words)) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert err.endswith("\n")
+        assert err.count("\n") == 1, err
+        return err
+
+    return run
+
+
 @pytest.fixture(autouse=True)
 def _registries_stay_as_they_are() -> Iterator[None]:
     """What a test adds to a registry is known in its process from then on."""
@@ -80,8 +105,11 @@ OPTIONAL = {
     "test_design.py": "optuna",
     "test_design_measures.py": "optuna",
     "test_design_resume.py": "optuna",
+    "test_envs.py": "gymnasium",
     "test_foxglove.py": "foxglove",
     "test_pages.py": "websockets",
+    "test_policies.py": "onnx",
+    "test_training.py": "gymnasium",
     "test_view.py": "viser",
     "test_view_charts.py": "viser",
     "test_view_end.py": "viser",

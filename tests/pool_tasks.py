@@ -33,7 +33,7 @@ def trouble(number: int, folder: str) -> int:
     if number == 6:
         raise ValueError("six")
     if number == 8:
-        raise KeyboardInterrupt
+        raise RuntimeError("eight")
     return number * number
 
 

@@ -13,11 +13,6 @@ def trial(config: dict[str, Any], seed: int) -> dict[str, Any]:
     mode = config.get("mode", "")
     if mode == "raise" and seed == 1:
         raise ValueError("seed one")
-    if mode == "fork" and seed == 1:
-        child = os.fork()
-        if child == 0:
-            return {"value": -1.0, "outcome": "success"}
-        os.waitpid(child, 0)
     if mode == "die" and seed == 1:
         os._exit(7)
     if mode == "hang" and seed == 1:

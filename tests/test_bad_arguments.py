@@ -19,18 +19,6 @@ NAN, INF = math.nan, math.inf
 SPRING = {"modulus": 193e9, "wire": 0.5e-3, "coil": 3.77e-3, "coils": 3}
 LEVEL = np.tile(np.linspace(0.02, 0.98, 50), 6)
 COUNTS = np.rint(1650 - 60 * np.log(LEVEL / (1 - LEVEL)))
-TICKS: dict[str, Any] = {
-    "t": np.arange(3.0),
-    "counts": np.zeros((3, 2)),
-    "level": np.zeros((3, 2)),
-    "contact": np.zeros((3, 2), int),
-    "maneuver": np.zeros(3, int),
-    "yaw": np.zeros((3, 5)),
-    "leg": np.zeros((3, 6, 2)),
-    "antenna": np.zeros((3, 2)),
-    "pitch": np.zeros((3, 0)),
-    "head": np.zeros((3, 2)),
-}
 NO_PATHS: tuple[Any, ...] = (3, b"name", ["name"], "", "a\0b")
 Case = tuple[Callable[..., Any], dict[str, Any], str]
 
@@ -57,10 +45,6 @@ FITTED = fitted(trial=np.repeat(np.arange(6), 50))
 
 def calibration(**changed: Any) -> Calibration:
     return Calibration(**{**FITTED.model_dump(), **changed})
-
-
-def series(**changed: Any) -> TimeSeries:
-    return TimeSeries(**{**TICKS, **changed})
 
 
 def own_robot() -> mujoco.MjSpec:
@@ -111,8 +95,6 @@ BAD_PATHS: list[Case] = [
     for function, name in (
         (Calibration.load, "path"),
         (FITTED.save, "path"),
-        (TimeSeries.load, "path"),
-        (series().save, "path"),
         (RunDirectory.open, "path"),
         (trial, "log"),
         (tunnel, "out"),
@@ -231,15 +213,6 @@ CASES: list[Case] = [
     (RunDirectory.create, {"command": "../up"}, "command: expected a name without a slash"),
     (RunDirectory.create, {"command": b"mine"}, "command: expected text"),
     (RunDirectory.create, {"command": "mine", "path": 3}, "path: expected a path, found 3"),
-    (series, {"t": 3}, r"t: expected numbers \[s\] of shape \(n,\), found shape \(\)"),
-    (series, {"t": ["a", "b", "c"]}, "t: expected numbers"),
-    (series, {"counts": np.zeros((3, 3))}, r"counts: .* of shape \(3, 2\), found shape \(3, 3\)"),
-    (series, {"contact": np.full((3, 2), 0.5)}, "contact: expected whole numbers"),
-    (series, {"contact": np.full((3, 2), 1e300)}, "contact: expected whole numbers"),
-    (series, {"maneuver": np.full(3, 2.0**63)}, "maneuver: expected whole numbers"),
-    (series, {"contact": np.full((3, 2), NAN)}, "contact: expected finite numbers"),
-    (series, {"meta": 3}, "meta: expected a dictionary, found 3"),
-    (series, {"meta": {"robot": {}}}, "meta: robot: expected text, a number or None"),
 ]
 
 
@@ -310,5 +283,3 @@ def test_lists_are_as_good_as_arrays() -> None:
     rest = antennate.equilibrium(chain, [0.1], [[0.0, 0.05]])  # pyright: ignore[reportArgumentType]
     q = float(rest.angles[0, 0])
     assert 0.01 * q == pytest.approx(0.05 * 0.1 * math.cos(q), rel=1e-9)
-    listed = {name: values.tolist() for name, values in TICKS.items() if name != "pitch"}
-    assert series(**listed).columns().keys() == series().columns().keys()

@@ -206,72 +206,6 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         assert not {*_HEAVY, *unneeded} & set(loaded), said
 
 
-@pytest.mark.parametrize(
-    ("argv", "parts"),
-    [
-        (["tunel"], ["antennate: error:", "did you mean tunnel?", "found tunel"]),
-        (["study", "desgin"], ["did you mean design?", "found desgin"]),
-        (["setup", "zreo"], ["did you mean zero?", "found zreo"]),
-        (["log", "veiw", "a.mcap"], ["did you mean view?", "found veiw"]),
-        (["tunnel", "--trails", "3"], ["did you mean --trials?", "found '--trails'"]),
-        (["tunnel", "--tunnel.free_widht=1"], ["did you mean --tunnel.free-width?"]),
-        (
-            ["tunnel", "--free-width", "1"],
-            ["did you mean --tunnel.free-width or --corridors.free-width?"],
-        ),
-        (["tunnel", "--arms", "open"], ["did you mean --controllers?", "found '--arms'"]),
-        (["bench", "wall", "--arms", "stiff"], ["did you mean --profiles?", "found '--arms'"]),
-        (["tunnel", "--bogus"], ["expected a known flag, found '--bogus'"]),
-        (["tunnel", "--json", "yes"], ["expected flags only, found 'yes'"]),
-        (["tunnel", "--out", ""], ["--out: expected a path, found nothing"]),
-        (["tunnel", "--tunnel.mirror", "often"], ["expected one of random, never or always"]),
-        (["tunnel", "stray"], ["expected flags only", "'stray'"]),
-        (["tunnel", "--trials", "many"], ["--trials: expected a whole number, found many"]),
-        (["tunnel", "--seed", ""], ["--seed: expected a whole number, found ''"]),
-        (["tunnel", "--robot", ""], ["--robot: expected ", "found nothing"]),
-        ([""], ["expected a command", "found ''"]),
-        (["wall", "--trials", "5"], ["antennate: error: wall is `", "antennate bench wall` now"]),
-        (["zero"], ["antennate: error: zero is `", "antennate setup zero` now"]),
-        (
-            ["bench", "wal"],
-            ["antennate bench: error: expected a command (did you mean wall?), one"],
-        ),
-        (["tunnel", "--trials"], ["--trials: expected 1 value, INT, found none"]),
-        (["tunnel", "--trials", "0"], ["--trials: expected a number of at least 1, found 0"]),
-        (
-            ["tunnel", "--controllers", "dance"],
-            ["controllers: expected one of open, timed, paper, closed, "],
-        ),
-        (["tunnel", "--controllers", "open", "open"], ["controllers must differ"]),
-        (["tunnel", "--workers", "0"], ["--workers: expected a number of at least 1, found 0"]),
-        (
-            ["tunnel", "--tunnel.free-width", "-0.4"],
-            ["antennate tunnel: error: --tunnel.free-width: expected a number above 0, found -0.4"],
-        ),
-        (["tunnel", "--tunnel.free-width", "nan"], ["expected a finite number, found nan"]),
-        (
-            ["tunnel", "--tunnel.turns-deg", "200"],
-            ["error: tunnel: turns_deg must lie within -120 "],
-        ),
-        (["tunnel", "--tunnel.free-width", "0.1"], ["at least robot.width, 0.2 m, found 0.1 m"]),
-        (["tunnel", "--tunnel.strewn", "40"], ["tunnel.strewn asks for 40"]),
-        (["tunnel", "--control.rate", "333"], ["whole fraction of the physics rate"]),
-        (["tunnel", "--config", "missing.toml"], ["missing.toml: expected a readable file: No"]),
-        (["tunnel", "--config", "."], [".: expected a readable file"]),
-        (
-            ["gait", "--cycles", "x"],
-            ["antennate gait: error: --cycles: expected a whole number, found x"],
-        ),
-        (["gait", "--tunnel.free-width", "1"], ["expected a known flag"]),
-    ],
-)
-def test_bad_words(capsys, tmp_path, argv, parts):
-    line = refusal(capsys, *argv)
-    for part in parts:
-        assert part in line
-    assert list(tmp_path.iterdir()) == []  # a refused command leaves nothing behind
-
-
 @pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])
 def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
     line = refusal(capsys, "antenna", "springs", flag)
@@ -337,14 +271,6 @@ def test_a_list_may_be_given_at_once_or_piece_by_piece():
     assert config.fault == ("esp32=reset", "bus=loss:0.1@2s", "servo:7=silent")
     assert config.touch == ("left@1s", "right@2s")
     assert config.trial == 3
-
-
-@pytest.mark.parametrize("bad", [0, 1])
-def test_each_of_two_faults_is_looked_at(capsys, bad):
-    faults = ["servo:7=silent", "esp32=reset"]
-    faults[bad] = "esp32=loose"
-    words = [word for fault in faults for word in ("--fault", fault)]
-    assert "found loose" in refusal(capsys, "twin", "--duration", "0.01", *words)
 
 
 def test_negative_numbers_and_none_are_values():

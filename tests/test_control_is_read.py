@@ -56,62 +56,6 @@ def test_all_controllers_of_ours_are_told_of() -> None:
     assert set(UNREAD) == {*ACTS, BY_CONTACT}
 
 
-SHORT = {
-    "tunnel": "--trials 1 --time-limit 0.1 --no-figures",
-    "gait": "--cycles 2 --no-figures",
-    "twin": "--duration 0.1",
-}
-"""In case that it runs."""
-NO_JOINT = ", but no joint of the robot has this servo"
-ROLL = ", but legs that roll do not read it"
-REFUSED = [
-    ("tunnel --controllers closed --control.rule.hold-time 3", ", but closed does not read it"),
-    ("tunnel --controllers closed --control.rule.similar 0.2", ", but closed does not read it"),
-    ("tunnel --controllers open closed --control.rule.strong 0.8", ", but open and closed do"),
-    ("tunnel --controllers closed open --control.gait.turn-offset 0.2", ", but closed and open do"),
-    ("tunnel --controllers open paper --control.escape.retry-time 5", ", but open and paper do"),
-    ("tunnel --controllers paper --control.repetition.pressure 0.3", ", but paper does not"),
-    ("tunnel --control.gait.lift.stance 1", ROLL),
-    ("gait --gait.lift.lifted 0.2", ROLL),
-    ("tunnel --robot.servos.xl430-w250.friction 0.05", NO_JOINT),
-    ("gait --robot.servos.xl430-w250.p-gain 5", NO_JOINT),
-    ("twin --robot.servos.xl430-w250.p-gain 5", NO_JOINT),
-    ("drive --control.rule.hold-time 3", ", but closed does not read it"),
-    ("drive --controller open --control.escape.turn-time 3", ", but open does not read it"),
-    ("drive --control.gait in_phase", ROLL),
-    ("drive teleop --control.gait.lift.share 0.4", ROLL),
-    ("tunnel --robot.legs.reach 0.05", "only legs of the kind lifting have it"),
-    ("drive --robot.legs.limit 1.2", "but only legs of the kind lifting have it"),
-    (
-        "twin --robot.pitch.kind actuated --robot.pitch.stiffness 20",
-        ", but only pitch joints of the kind locked have it",
-    ),
-    (
-        "tunnel --controllers open --robot.antennae.kind none --robot.antenna.length 0.2",
-        "but the robot has no antennae",
-    ),
-    ("drive --robot.antennae.kind none --robot.antennae.limit 1.0", "the robot has no antennae"),
-]
-
-
-@pytest.mark.parametrize(("words", "expected"), REFUSED)
-def test_a_flag_that_nothing_reads_is_refused(
-    words: str,
-    expected: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    command, *_, flag, value = words.split()
-    assert main([*words.split(), *SHORT.get(command, "").split()]) == 2
-    err = capsys.readouterr().err
-    assert flag.strip("-").replace("-", "_") in err.replace("-", "_")
-    assert expected in err
-    assert (f"found {value}" in err) or value == "in_phase"
-    assert err.count("\n") == 1
-
-
 TURN = "expected a parameter that is read, such as {}control.escape.turn{}offset, found 0.2, but"
 WHERE = [
     ("tunnel --controllers closed --control.gait.turn-offset 0.2", "--control.gait.turn-offset: "),
@@ -195,14 +139,14 @@ def test_an_unknown_number_of_a_servo_that_is_not_there_is_refused() -> None:
 
 
 def test_the_file_of_a_robot_may_hold_what_another_controller_reads(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     file = tmp_path / "robot.toml"
     file.write_text("[control.rule]\nhold_time = 3.0\n[robot.servos.xl430_w250]\nfriction = 0.05\n")
-    assert main(["drive", "--config", str(file), "--control.gait.frequency", "0.5"]) == 2
-    assert "--esp32: expected a serial port" in capsys.readouterr().err
-    assert main(["drive", "--config", str(file), "--control.rule.hold-time", "4"]) == 2
-    err = capsys.readouterr().err
+    assert "--esp32: expected a serial port" in refused(
+        "drive", "--config", str(file), "--control.gait.frequency", "0.5"
+    )
+    err = refused("drive", "--config", str(file), "--control.rule.hold-time", "4")
     assert "--control.rule.hold-time: expected a parameter that is read" in err
     assert "found 4.0, but closed does not read it" in err
 

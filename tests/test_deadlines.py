@@ -6,7 +6,6 @@ import pytest
 from test_release import GOAL, ticked, writes
 from twin_rig import rig
 
-from antennate.cli import main
 from antennate.errors import ConfigError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import deadlines
@@ -15,7 +14,6 @@ from antennate.params.safety import SupervisorParams
 from antennate.twin.config import TwinConfig
 
 PERIOD = 0.01
-PORTS = ["--esp32", "/dev/null", "--bus", "/dev/null"]
 
 
 def test_an_answer_comes_before_the_watchdogs_and_they_act_before_a_pause() -> None:
@@ -24,27 +22,6 @@ def test_an_answer_comes_before_the_watchdogs_and_they_act_before_a_pause() -> N
     assert pytest.approx(5 * 0.020) == deadlines.WATCHDOG
     assert PERIOD < deadlines.ANSWER < deadlines.WATCHDOG < limits.longest_pause
     deadlines.require_order(limits, PERIOD)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ["--limits.longest-pause", "0.1"],
-            "the servos at 0.1 s, limits.longest_pause at 0.1 s",
-        ),
-        (["--control.rate", "12"], "control.rate at 0.0833333 s, the latest answer at 0.07 s"),
-        (["--stand", "2.1"], "--stand: expected a number of at most 2"),
-        (["--stand", "60"], "--stand: expected a number of at most 2"),
-    ],
-)
-def test_deadlines_out_of_order_are_refused(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["drive", *PORTS, *words]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 1
-    assert said in lines[0]
 
 
 def test_a_session_refuses_them_too() -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 import antennate
-from antennate.cli import commands, described, main
+from antennate.cli import commands, described
 from antennate.cli.options import Option
 from antennate.errors import ConfigError
 
@@ -63,33 +63,20 @@ def test_what_is_needed_is_there_and_a_longer_name_needs_the_shorter(name: str) 
 def test_each_is_refused_alone(
     name: str,
     option: Option,
-    capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    refused: Callable[..., str],
 ) -> None:
     """With its own default, too: it was said, and nothing would come of it."""
     monkeypatch.chdir(tmp_path)
     value = {"TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(option.metavar, option.default)
     words = [option.offered, *([value] if option.metavar else [])]
-    assert main([*name.split(), *words]) == 2
-    out, err = capsys.readouterr()
+    err = refused(*name.split(), *words)
     needed = " or ".join(option.needs)
-    assert out == ""
     assert err == (
         f"antennate {name}: error: {option.offered}: expected {needed} beside it, found none\n"
     )
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    "words", [["--video", "--no-video"], ["--engine", "dask"], ["--engine=local"]]
-)
-def test_what_is_needed_is_given_only_where_it_holds(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    option = ["--video-trial", "0"] if "--video" in words else ["--slurm", "timeout_min=1"]
-    assert main(["tunnel", *option, *words]) == 2
-    assert "beside it, found none" in capsys.readouterr().err
 
 
 def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:

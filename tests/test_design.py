@@ -15,10 +15,7 @@ from antennate import experiments
 from antennate.cli import main
 from antennate.experiments.design.designs import front, spread
 
-
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def dominates(a: tuple[float, ...], b: tuple[float, ...]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,7 @@ HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
 
 
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def walls(*outcomes: str, flex: tuple[float | None, ...]) -> list[dict[str, Any]]:
@@ -161,13 +160,12 @@ def test_unknown_measures_are_one_line(
 
 
 def test_successes_of_an_experiment_without_outcomes_are_refused(
-    capsys: pytest.CaptureFixture[str],
+    refused: Callable[..., str],
 ) -> None:
     Path("plan.toml").write_text(
         '[search]\ncoil_mm = [3.0, 4.0]\n[evaluate.springs]\nminimize = ["spring_index@success"]\n'
     )
-    assert main(["study", "design", "plan.toml", "--workers", "1"]) == 2
-    assert "found spring_index@success" in capsys.readouterr().err
+    assert "found spring_index@success" in refused("study", "design", "plan.toml", "--workers", "1")
 
 
 def test_objectives_have_names_and_units() -> None:

@@ -18,10 +18,7 @@ from antennate.cli import main
 from antennate.studies.run_files import add_to_list
 from antennate.studies.store import STORE
 
-
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def test_workers_do_not_change_a_byte() -> None:

@@ -195,6 +195,27 @@ def test_why_is_of_a_fault_rather_than_of_a_key_that_was_let_go() -> None:
     assert "RELEASED" not in report.why
 
 
+@pytest.fixture
+def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """Run the command before a twin in invented time, with a fault; its exit code."""
+
+    def run(*words: str, fault: str = "", change: Callable[[Session], object] = bool) -> int:
+        @contextlib.contextmanager
+        def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
+            robot = watched(TwinConfig(), 5)[0]
+            faults = Faults([read(fault)] if fault else [], config.robot.ids)
+            clock = LockstepClock(robot, faults)
+            session = prepare(config, BoardPort(robot, clock), clock, clock)
+            change(session)
+            yield session
+
+        monkeypatch.setattr("antennate.cli.drive.connect", in_process)
+        ports = ["--esp32", "board", "--bus", "bus"]
+        return main(["drive", *ports, *words, "--out", str(tmp_path), "--overwrite"])
+
+    return run
+
+
 SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna board"
 
 
@@ -214,26 +235,11 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
+    shipped: Callable[..., int],
 ) -> None:
-    @contextlib.contextmanager
-    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        robot = watched(TwinConfig(), 5)[0]
-        clock = LockstepClock(robot, Faults([read(f"esp32=silent@{when}")], config.robot.ids))
-        yield prepare(config, BoardPort(robot, clock), clock, clock)
-
-    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
     monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
-    argv = [
-        "drive",
-        "--esp32",
-        "board",
-        "--bus",
-        "bus",
-        "--arm",
-        f"--{'' if check else 'no-'}touch-check",
-    ]
-    argv += ["--dry-run", "0.5", "--duration", "1", "--touch.patience", "0.5"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    words = f"--arm --{'' if check else 'no-'}touch-check --dry-run 0.5 --duration 1"
+    assert shipped(*words.split(), "--touch.patience", "0.5", fault=f"esp32=silent@{when}") == 2
     text = " ".join(capsys.readouterr().out.split())
     assert said in text
     assert text.count("STALE") == 1
@@ -248,11 +254,10 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
 
 
 def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     ports = ["--esp32", "/no/board", "--bus", "/no/bus", "--out", str(tmp_path / "run")]
-    assert main(["drive", *ports, "--controller", "clsoed"]) == 2
-    said = capsys.readouterr().err
+    said = refused("drive", *ports, "--controller", "clsoed")
     assert "controller: expected one of open, timed, paper, closed, closed-1, " in said
     assert "map" not in said  # which no robot can have
     assert "/no/board" not in said
@@ -273,18 +278,10 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
     skip: list[str],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    shipped: Callable[..., int],
 ) -> None:
-    @contextlib.contextmanager
-    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        robot = watched(TwinConfig(), 5)[0]
-        clock = LockstepClock(robot, Faults([read(f"esp32={fault}@0.3s")], config.robot.ids))
-        yield prepare(config, BoardPort(robot, clock), clock, clock)
-
-    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
-    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", *skip]
-    argv += ["--dry-run", "1", "--duration", "1", "--touch.patience", "1"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    words = "--arm --dry-run 1 --duration 1 --touch.patience 1"
+    assert shipped(*words.split(), *skip, fault=f"esp32={fault}@0.3s") == 2
     said = capfd.readouterr()
     out = " ".join(said.out.split())
     last = [line for line in said.err.splitlines() if " maneuver=" in line][-1]
@@ -298,21 +295,12 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
 
 
 def test_a_drive_that_ends_before_its_first_tick_has_a_result(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], shipped: Callable[..., int]
 ) -> None:
-    @contextlib.contextmanager
-    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        clock = LockstepClock(robot := watched(TwinConfig(), 5)[0])
-        session = prepare(config, BoardPort(robot, clock), clock, clock)
-        monkeypatch.setattr(session, "read", interrupted)
-        yield session
-
     def interrupted() -> AntennaFrame:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
-    argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 0
+    assert shipped("--dry-run", "0.5", change=lambda s: setattr(s, "read", interrupted)) == 0
     assert "A dry run: nothing was written to the servos" in capsys.readouterr().out
     result = json.loads((tmp_path / "result.json").read_text())
     assert (result["pace"], result["ended"]) == (None, "its controller")
@@ -320,17 +308,13 @@ def test_a_drive_that_ends_before_its_first_tick_has_a_result(
 
 
 def test_a_drive_without_a_log_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    shipped: Callable[..., int],
 ) -> None:
-    @contextlib.contextmanager
-    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        clock = LockstepClock(robot := watched(TwinConfig(), 5)[0])
-        yield prepare(config, BoardPort(robot, clock), clock, clock)
-
-    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
     monkeypatch.setattr("antennate.cli.viewer.MODULE", "this")  # `python -m this` keeps nothing
-    argv = ["drive", "--esp32", "board", "--bus", "bus", "--dry-run", "0.5"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    assert shipped("--dry-run", "0.5") == 2
     out = " ".join(capsys.readouterr().out.split())
     assert "No log was kept" in out
     assert "antennate log replay" not in out
@@ -386,19 +370,14 @@ def test_where_one_tick_in_a_hundred_is_missed_missed_answers_tell_a_late_comput
 
 
 def test_a_servo_that_falls_silent_ends_a_drive_with_what_to_do_and_no_word_of_the_computer(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    shipped: Callable[..., int],
 ) -> None:
-    @contextlib.contextmanager
-    def in_process(config: DriveConfig, *addresses: object) -> Iterator[Session]:
-        robot = watched(TwinConfig(), 5)[0]
-        clock = LockstepClock(robot, Faults([read("servo:7=silent@2s")], config.robot.ids))
-        yield prepare(config, BoardPort(robot, clock), clock, clock)
-
-    monkeypatch.setattr("antennate.cli.drive.connect", in_process)
     monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
-    argv = ["drive", "--esp32", "board", "--bus", "bus", "--arm", "--no-touch-check"]
-    argv += ["--dry-run", "0.5", "--duration", "3", "--fault-time", "1"]
-    assert main([*argv, "--out", str(tmp_path), "--overwrite"]) == 2
+    words = "--arm --no-touch-check --dry-run 0.5 --duration 3 --fault-time 1"
+    assert shipped(*words.split(), fault="servo:7=silent@2s") == 2
     out = " ".join(capsys.readouterr().out.split())
     assert "SILENT_SERVO: servos do not answer (servo 7)" in out
     (cures,) = re.findall(r"What to do: (.*?) See docs/causes\.md\.", out)

@@ -42,10 +42,14 @@ def test_trials_become_a_data_frame(tmp_path: Path) -> None:
     assert "level_left" in out
 
 
+LONGER = {"train_ppo": 300}
+"""A whole algorithm in one file, to be read and changed."""
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
 def test_examples_are_short_and_say_what_they_are(path: Path) -> None:
     text = path.read_text()
-    assert len(text.splitlines()) <= 60
+    assert len(text.splitlines()) <= LONGER.get(path.stem, 60)
     assert text.startswith('"""')
 
 

@@ -70,6 +70,40 @@ def test_the_headline_compares_with_the_rival_alone() -> None:
     assert found == pytest.approx(sorted([1.8 + high, low - 1.8]), abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        (("open", "closed"), ["closed minus open"]),
+        (("timed", "closed", "open"), ["closed minus timed", "open minus timed"]),
+        (
+            ("open", "timed", "paper", "closed"),
+            ["open minus timed", "paper minus timed", "closed minus timed"],
+        ),
+    ],
+)
+def test_pairs_are_told_in_one_direction(names: tuple[str, ...], columns: list[str]) -> None:
+    """The later less the earlier, or less the rival; trial 5 is won by the last one alone."""
+    times = {name: 10.0 * (k + 1) for k, name in enumerate(names)}
+    found = result(
+        **{name: [t] * 5 + [t if name == names[-1] else None] for name, t in times.items()}
+    )
+    _, pairs = TUNNEL.tables(found)
+    assert set(columns) <= set(pairs.columns)
+    cells = dict(pairs.rows)
+    for k, column in enumerate(pairs.columns):
+        first, second = column.split(" minus ")
+        assert second == RIVAL or names.index(second) < names.index(first)
+        ends = [
+            (5 * times[n] + (times[n] if n == names[-1] else 100.0)) / 6 for n in (first, second)
+        ]
+        assert float(cells["difference [s]"][k]) == pytest.approx(ends[0] - ends[1], abs=0.051)
+        low, high = map(float, cells["  95 % [s]"][k].split(" to "))
+        assert low < ends[0] - ends[1] < high
+        assert cells["  time of each [s]"][k] == f"{times[first]:.1f}, {times[second]:.1f}"
+        won = [str(int(n == names[-1])) for n in (first, second)]
+        assert [cells["only the first"][k], cells["only the second"][k]] == won
+
+
 def test_the_rival_is_one_named_controller() -> None:
     assert RIVAL in BUILT_IN
     assert compared(["paper", RIVAL, "closed", "mine.py:Mine"]) == ("mine.py:Mine", RIVAL)

@@ -13,7 +13,7 @@ from beams import uniform_beam
 from antennate.antenna import sensor
 from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.cli import main
-from antennate.errors import ConfigError, SimulationError
+from antennate.errors import SimulationError
 from antennate.experiments import bench
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
@@ -145,22 +145,6 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
     found = outcome.result()["profiles"]["stiff"]["traverses"]
     assert found["invalid"] == 4
     assert found["unknown"]["flex"]["n"] == 0
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"nearest": 0.8}, "nearest must not exceed from_place, 0.5, found 0.8"),
-        ({"profiles": ("stiff", "stiff")}, "profiles must differ"),
-        ({"speeds": (0.1, 0.0)}, "speeds must be above 0"),
-        ({"traverses": 7, "speeds": (0.1, 0.2, 0.3, 0.4)}, "traverses: .* least 8, .* found 7"),
-        ({"traverses": 5}, "traverses: .* least 6, .* found 5"),
-        ({"antenna": {"sensor": {"rate": 300.0}}}, "whole fraction of the physics rate 2000 Hz"),
-    ],
-)
-def test_what_cannot_be_run_is_refused(values, message):
-    with pytest.raises(ConfigError, match=message):
-        loads.ForceConfig(**values)
 
 
 @pytest.mark.parametrize("speeds", [(0.5,), (0.4, 0.8), (0.3, 0.6, 0.9), (0.2, 0.4, 0.6, 0.8)])

@@ -29,7 +29,7 @@ from antennate.telemetry.simulated import RowLog
 from antennate.telemetry.twin_log import LogQueue
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
-from antennate.types import Floats, JointCommand
+from antennate.types import JointCommand
 
 ROOM = 70_000
 """Largest file [byte]: as a disk that is full once the log is as long; the result is shorter."""
@@ -205,7 +205,7 @@ def test_a_log_behind_a_queue_says_once_why_it_has_failed(tmp_path: Path) -> Non
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
-        log = LogQueue(RowLog[Floats](path, HEADER, in_rows), told.append)
+        log = LogQueue(RowLog(path, HEADER, in_rows), told.append)
         end = time.monotonic() + 60.0
         for row in rows(6000):
             log.add(row)

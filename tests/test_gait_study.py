@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from antennate.errors import ConfigError
 from antennate.experiments.gait import experiment as study
 from antennate.experiments.gait.physics import Walk, measure, rolling_speed
 from antennate.params.control import GaitParams
@@ -82,11 +81,6 @@ def test_the_work_of_a_walk_is_that_of_finer_physics():
 def test_rolling_speed_is_that_of_the_rim():
     gait, robot = GaitParams(frequency=0.5), RobotSpec()
     assert rolling_speed(gait, robot) == pytest.approx(math.pi * 0.033)
-
-
-def test_rate_must_be_whole_steps():
-    with pytest.raises(ConfigError, match="whole fraction of the physics rate 500 Hz"):
-        study.GaitStudyConfig(rate=300)
 
 
 def test_walks_come_out_the_same_twice():

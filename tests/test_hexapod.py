@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.cli import BAD_INPUT, OK, main
+from antennate.cli import OK, main
 from antennate.control.gait import targets
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import ConfigError
@@ -197,43 +197,6 @@ def test_a_gait_that_is_named_replaces_that_of_the_file(tmp_path: Path) -> None:
     assert one["chosen_body_phase_rad"] == pytest.approx(5 * math.pi / 8)
     assert two["chosen_body_phase_rad"] == pytest.approx(math.pi / 4)
     assert two["measured_body_lengths_per_cycle"] is None
-
-
-BAD = [
-    (["tunnel"], "expected a robot with antennae for this controller, found one without"),
-    (["drive", "--esp32", "/dev/null", "--bus", "/dev/zero"], "antennae for drive, found one"),
-    (
-        ["drive", "teleop", "--esp32", "/dev/null", "--bus", "/dev/zero"],
-        "antennae for teleop, found one",
-    ),
-    (["twin"], "expected a robot with antennae for the twin, found one without"),
-    (["gait", "--gait", "b12bl0"], "(did you mean b11bl0?), found 'b12bl0'"),
-    (["gait", "--gait", ""], "expected serpenoid, swift, thrifty, b11bl0, in_phase or a TOML file"),
-    (["gait", "--draws", "3"], "draws: expected the default, as all is known"),
-    (["gait", "--unknown", "robot.mass"], "such as robot.leg_friction=0.18:0.25, found"),
-    (["gait", "--unknown", "robot.mass=2:1"], "such as robot.leg_friction=0.18:0.25, found"),
-    (["gait", "--unknown", "robot.mas=1:2"], "(did you mean robot.mass?), found 'robot.mas'"),
-    (["gait", "--unknown", "robot.links=2:4"], "need not be whole, found 'robot.links'"),
-    (["gait", "--unknown", "robot.mass=0.1:2"], "unknown: robot.mass: expected a number above"),
-    (["gait", "--unknown", "robot.mass=1:2", "robot.mass=1:3"], "unknown must differ"),
-    (["gait", "--robot.legs.reach", "0.1"], "legs.reach: expected at most 0.053 m"),
-]
-
-
-@pytest.mark.parametrize(("words", "said"), BAD)
-def test_what_cannot_be_done_is_refused_in_one_line(
-    words: list[str],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main([*words, "--robot", "hexapod"]) == BAD_INPUT
-    shown = capsys.readouterr()
-    assert (shown.out, shown.err.count("\n")) == ("", 1)
-    assert said in shown.err
-    assert not list(tmp_path.iterdir())
 
 
 def test_draws_that_make_no_robot_together_are_refused_before_the_run() -> None:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.cli import main
 from antennate.control.knowledge import Knowledge
 from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
@@ -327,29 +326,6 @@ def test_a_route_that_is_no_line_is_refused(route: Any) -> None:
             check(TunnelConfig(scene="crooked", controllers=("map",)))
     finally:
         SCENES.added.clear()
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        "drive --knows side",
-        "drive --controller map",
-        "drive teleop --knows map",
-        "twin --knows jam",
-        "log replay --knows side log.mcap",
-        "log replay --controller map log.mcap",
-        "tunnel --knows sight",
-        "tunnel --knows side side --controllers closed",
-        "tunnel --knows side --controllers open closed",
-        "tunnel --knows side map --controllers timed",
-        "tunnel --knows map --controllers timed closed",
-    ],
-)
-def test_no_robot_has_it(words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(words.split()) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "error:" in said
 
 
 def test_a_log_says_what_was_known_and_is_not_replayed(tmp_path: Path) -> None:

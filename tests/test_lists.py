@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -46,42 +46,10 @@ def test_no_list_is_one_word_with_commas() -> None:
                 read_words(words, [each])
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ["tunnel", "--controllers", "open,closed"],
-            "--controllers: expected values separated by spaces, as --controllers open closed, "
-            "found 'open,closed'",
-        ),
-        (
-            ["tunnel", "--controllers", "open,", "closed"],
-            "--controllers: expected values separated by spaces, as --controllers open closed, "
-            "found 'open, closed'",
-        ),
-        (
-            ["twin", "--servos", "1:xl330-m288,2:xl430-w250"],
-            "--servos: expected values separated by spaces, as --servos 1:xl330-m288 "
-            "2:xl430-w250, found '1:xl330-m288,2:xl430-w250'",
-        ),
-        (
-            ["record", "--marks", "0,5", "1,0"],
-            "--marks: expected numbers separated by spaces, with decimal points, found '0,5 1,0'",
-        ),
-    ],
-)
-def test_a_list_with_commas_names_the_way_that_works(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(words) == 2
-    assert capsys.readouterr().err == f"antennate {words[0]}: error: {said}\n"
-
-
 def test_a_name_of_code_may_have_a_comma_in_its_path(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
-    assert main(["tunnel", "--controllers", f"{tmp_path}/a,b.py:C", "--trials=1"]) == 2
-    assert "a,b.py" in capsys.readouterr().err
+    assert "a,b.py" in refused("tunnel", "--controllers", f"{tmp_path}/a,b.py:C", "--trials=1")
 
 
 @pytest.mark.parametrize("how", ["--help", "--help-all"])

@@ -265,9 +265,6 @@ def test_G2_a_damaged_header_is_refused_and_what_follows_counted(tmp_path: Path)
     assert refused > 30
 
 
-OLD = b"\0\x0b\3\1" + json.dumps({"controller": "open", "version": "0.1.0"}).encode() + b"1234\0"
-
-
 @pytest.mark.parametrize(
     ("data", "said"),
     [
@@ -276,7 +273,6 @@ OLD = b"\0\x0b\3\1" + json.dumps({"controller": "open", "version": "0.1.0"}).enc
         (b"t,left,right\n0.0,1800,1801\n", "no intact header, 0 intact ticks; damaged places: 1"),
         (b"\x7fELF" + bytes(range(256)) * 4000, "no intact header"),
         (MAGIC, "no intact header, 0 intact ticks; damaged places: 0"),
-        (OLD, "found a log of antennate 0.1.0 from before logs were MCAP"),
     ],
 )
 def test_G2_what_is_no_log_is_refused_in_one_line(tmp_path: Path, data: bytes, said: str) -> None:

@@ -293,16 +293,6 @@ def test_bad_headers_and_rates_are_one_line(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    "words", [["--rate", "50"], ["--rate", "50", "--recording", "x", "--columns.time-unit", "ms"]]
-)
-def test_a_rate_that_would_not_be_read_is_refused(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["calibrate", *words]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 def test_the_rig_that_withdraws_shows_the_hysteresis_of_its_sensor(tmp_path: Path) -> None:
     """A sensor that remembers gives a wider loop than one that does not."""
     from antennate.experiments.calibrate.run import CalibrateConfig, run

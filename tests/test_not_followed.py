@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,7 @@ SOON = 5.0
 PORTS = ["--esp32", "left", "--bus", "right"]
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 @pytest.mark.parametrize("device", ["pipe", "/dev/zero", "."])
@@ -71,15 +70,14 @@ def test_a_run_is_not_written_through_a_link(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["controller", "controllers", "scene"])
 def test_code_that_a_file_names_runs_only_if_a_flag_names_it_too(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
 ) -> None:
     command = ["drive", *PORTS] if name == "controller" else ["tunnel", "--trials", "1"]
     code, file = tmp_path / "theirs.py", tmp_path / "theirs.toml"
     code.write_text("open('it_ran', 'w').close()\n")
     value = ["theirs.py:It"] if name == "controllers" else "theirs.py:It"
     file.write_text(f"{name} = {value!r}\n")
-    assert main([*command, "--config", "theirs.toml"]) == 2
-    error = capsys.readouterr().err
+    error = refused(*command, "--config", "theirs.toml")
     assert f"if you trust that code, add --{name} theirs.py:It\n" in error
     assert not Path("it_ran").exists()
     assert main([*command, "--config", "theirs.toml", f"--{name}", "theirs.py:It"]) == 2

@@ -152,7 +152,7 @@ def test_an_own_class_runs_and_may_be_defined_again() -> None:
         assert mine.controller == "Cell"
         assert mine.progress_m == ours.progress_m
     again = type("Cell", (Cell,), {})
-    with pytest.raises(antennate.BadInputError, match="expected what worker processes can import"):
+    with pytest.raises(antennate.AntennateError, match="or run with one worker"):
         antennate.run("tunnel", controllers=(again,), workers=2, trials=4)
 
 

@@ -16,12 +16,10 @@ from recorded import act, leaves, recorded
 from servo_recordings import of_twin
 
 from antennate import experiments
-from antennate.cli import main
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
 from antennate.experiments.reproduce import experiment as reproduce
-from antennate.messages import command_words
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"
@@ -267,27 +265,6 @@ def test_the_walk_sees_what_is_not_read() -> None:
         config.model_copy(update={"coil_mm": 3.0}).coil_mm  # noqa: B018
         config.model_dump()
     assert read == {"wire_mm", "coil_mm"}
-
-
-@pytest.mark.parametrize(
-    ("name", "flag", "value"),
-    [
-        ("wall", "--antenna.base-angle", "0.5"),
-        ("wall", "--antenna.base-spacing=0.05", ""),
-        ("wall", "--antenna.sensor.hysteresis", "0.1"),
-        ("touch", "--rule.hold_time", "1"),
-        ("sweep", "--conditioning.slope", "10"),
-        ("calibrate", "--variation.overlap", "0.001"),
-        ("tunnel", "--robot.yaw.ids", "1"),
-    ],
-)
-def test_a_flag_that_is_not_read_is_refused(
-    name: str, flag: str, value: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*command_words(name).split(), flag, *([value] if value else [])]) == 2
-    err = capsys.readouterr().err
-    assert f"expected a parameter that {command_words(name)} reads, found this one" in err
-    assert err.count("\n") == 1
 
 
 def test_a_value_that_is_not_read_is_refused_in_a_file_too() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -76,7 +75,7 @@ def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
     assert "ended with code 9" in found[3][1]
     assert "2 s" in found[5][1]
     assert "ValueError: six" in found[6][1]
-    assert re.search(r"KeyboardInterrupt .*pool_tasks\.py:\d+", found[8][1])
+    assert "RuntimeError: eight" in found[8][1]
     assert "Traceback" not in capfd.readouterr().err
     tries = {number: len((tmp_path / str(number)).read_text()) for number in range(8)}
     assert tries[3] == 3

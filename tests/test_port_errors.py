@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import json
 import os
 import socket
@@ -101,59 +100,6 @@ def test_every_command_says_it_and_ends_with_2(
     assert said in told.out + told.err
     assert "[Enter" not in told.out + told.err
     assert "Traceback" not in told.err
-
-
-def test_L14_one_port_for_both_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["drive", "--esp32", "/dev/null", "--bus", "/dev/null"]) == BAD_INPUT
-    assert "expected two ports, found /dev/null twice" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ([], "--esp32 PORT, --bus PORT or both"),
-        (["--bus", "/dev/null", "--esp32", "/dev/null"], "expected two ports"),
-        (["--esp32", "/dev/null", "--fix"], "--fix: expected --bus PORT"),
-        (["--bus", "/dev/null", "--yes"], "--yes: expected --fix"),
-        (["--bus", "/dev/null", "--fix"], "--fix: expected a terminal"),
-        (["--bus", "/dev/null", "--robot.baud", "7"], "--robot.baud: expected one of"),
-    ],
-)
-def test_orders_that_cannot_be_are_refused_in_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str], monkeypatch
-) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO())
-    assert main(["doctor", *words]) == BAD_INPUT
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert said in told.err
-    assert told.err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["twin", "--servos", ""],
-        ["twin", "--tcp", ""],
-        ["twin", "--udp", ""],
-        ["twin", "--orders", ""],
-        ["twin", "--key", "k"],
-        ["drive", "--key", "k", "--esp32", "/dev/nowhere", "--bus", "/dev/null"],
-        ["doctor", "--insecure-udp", "--esp32", "/dev/nowhere"],
-    ],
-    ids=" ".join,
-)
-def test_a_flag_that_has_nothing_to_say_is_refused(
-    words: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(words) == BAD_INPUT
-    told = capsys.readouterr()
-    assert told.err.count("\n") == 1
-    assert f"{words[1]}: expected " in told.err
 
 
 @pytest.mark.parametrize(

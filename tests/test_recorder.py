@@ -11,7 +11,6 @@ from doctor_rig import Patient
 from esp32_streams import encoded, hello, made
 from port_pieces import Pieces
 
-from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, OutputError
 from antennate.experiments.calibrate.recording import RecordingParams
 from antennate.experiments.calibrate.run import CalibrateConfig, run
@@ -123,27 +122,6 @@ def test_a_silent_board_is_an_error_of_one_line() -> None:
     with pytest.raises(BadInputError, match=r"--esp32: expected readings .* doctor"):
         bench.record(duration=1.0)
     assert bench.lines == []
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--out", "x.csv"], "--esp32: expected a serial port"),
-        (["--esp32", "/dev/null"], "--out: expected a CSV file"),
-        (["--esp32", "/dev/null", "--out", "x.csv"], "/dev/null: not a serial port"),
-        (["--marks", "1", "1"], "marks must be two different values"),
-        (["--marks", "1", "2", "--speed", "0.1"], "expected marks or speed"),
-    ],
-)
-def test_what_cannot_be_recorded_is_refused(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path, monkeypatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["record", *words]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_E8_readings_of_a_board_with_old_firmware_are_not_recorded(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import os
 import shutil
@@ -126,14 +125,16 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("name", ["run", "run/", "./run", "sub/../run"])
 def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(name: str, tmp_path: Path) -> None:
     Path("sub").mkdir()
+    replaced = ["run.old", "run.old2", "run.old3"]
     for words in (["antenna", "springs", "--no-figures"], ["robot"], WALL):
         before = contents("run")
         assert main([*words, "--out", name, "--overwrite"]) == 0
-        assert contents("run.old") == before
+        assert contents(replaced.pop(0)) == before
         fresh = tmp_path / "fresh" / words[0]
         assert main([*words, "--out", str(fresh)]) == 0
         assert contents("run").keys() == contents(fresh).keys()
-    assert sorted(path.name for path in Path().iterdir()) == ["fresh", "run", "run.old", "sub"]
+    folders = ["fresh", "run", "run.old", "run.old2", "run.old3", "sub"]
+    assert sorted(path.name for path in Path().iterdir()) == folders
 
 
 def test_a_run_without_a_result_takes_the_place_of_none() -> None:
@@ -212,21 +213,21 @@ sys.exit(main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrit
 @pytest.mark.parametrize("first", [1, 2, 3])
 def test_killed_at_any_change_of_a_file_the_old_run_is_whole(first: int) -> None:
     """Under one of both names; and the same command ends, whatever the killed one left."""
-    assert main(["antenna", "springs", "--out", "older"]) == 0
     shutil.copytree("run", "old")
     before, seen = contents("old"), set[str]()
-    for kill in range(first, 75, 9):
-        shutil.rmtree("run")
-        shutil.rmtree("run.old", ignore_errors=True)
+    for kill in range(first, 40, 6):
+        for place in Path().glob("run*"):
+            shutil.rmtree(place)
         shutil.copytree("old", "run")
-        shutil.copytree("older", "run.old")
         done = subprocess.run([sys.executable, "-c", KILLED, str(kill)], capture_output=True)
         assert done.returncode in (0, -signal.SIGKILL), done.stderr
-        (whole,) = (name for name in ("run", "run.old") if contents(name) == before)
+        whole = "run.old" if Path("run.old").exists() else "run"
+        assert contents(whole) == before
         seen.add(whole)
         assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
         assert RunDirectory.open("run").result()
         assert not [path for path in Path("run").iterdir() if path.name.startswith(".")]
+        assert contents("run.old") == before
     assert seen == {"run", "run.old"}
 
 
@@ -280,38 +281,6 @@ def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
         Path("run", name).write_text("half of a file")
     assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
     assert [name for name in [*ours, *theirs] if Path("run.old", name).exists()] == theirs
-
-
-def test_the_file_that_configures_a_run_is_refused_in_its_folder(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    before = files()
-    for more in (["--overwrite"], ["--resume"]):
-        assert main([*WALL, "--config", "run/config.toml", "--out", "run", *more]) == 2
-        (line,) = capsys.readouterr().err.splitlines()
-        assert "expected another folder than that of run/config.toml, found run" in line
-        assert files() == before
-
-
-@pytest.mark.parametrize("place", ["run", "run/sub", "run.old", "run.old/figures"])
-def test_what_is_read_is_not_renamed_or_removed(
-    place: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A file of the user in the folder, or any in what an earlier overwrite left."""
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    Path(place).mkdir(exist_ok=True, parents=True)
-    Path(place, "mine.toml").write_text("coil_mm = 3.0\n")
-    Path(place, "code.py").write_text(SLOW)
-    Path("plan.toml").write_text(
-        f'experiment = "{place}/code.py:trial"\nplan = "grid"\n[vary]\nx = [0.5]\n'
-    )
-    before = files(".")
-    for words in (["antenna", "springs", "--config", f"{place}/mine.toml"], ["study", "plan.toml"]):
-        more = ["--trust-code"] if words[0] == "study" else []
-        assert main([*words, *more, "--out", "run", "--overwrite"]) == 2
-        (line,) = capsys.readouterr().err.splitlines()
-        assert f"expected another folder than that of {place}/" in line
-        assert files(".") == before
 
 
 def test_a_run_directory_reads_and_writes_only_its_own(tmp_path: Path) -> None:
@@ -380,7 +349,7 @@ def test_what_somebody_laid_into_a_run_stays_where_it_goes_on() -> None:
 
 @pytest.mark.parametrize("name", [*THEIRS, "sub", "link"])
 def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
-    name: str, capsys: pytest.CaptureFixture[str]
+    name: str,
 ) -> None:
     if name == "link":
         Path("run/link").symlink_to("result.json")
@@ -394,64 +363,8 @@ def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
     assert main(words) == 0
     assert contents("run.old") == before
     assert Path("run.old", name).exists()
-    capsys.readouterr()
-    everything = files(".")
-    assert main(words) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "run.old: expected an old run alone" in line
-    assert line.endswith("which no run wrote; move run.old away")
-    assert files(".") == everything
-    Path("run.old").rename("saved")
     assert main(words) == 0
-
-
-@pytest.mark.parametrize("kind", ["file", "link", "their folder", "live run"])
-def test_a_name_old_that_is_no_old_run_is_refused(
-    kind: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    old, words = (
-        Path("run.old"),
-        ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"],
-    )
-    with contextlib.ExitStack() as live:
-        if kind == "file":
-            old.write_text("mine")
-        elif kind == "link":
-            shutil.copytree("run", "elsewhere")
-            old.symlink_to("elsewhere")
-        elif kind == "their folder":
-            old.mkdir()
-            (old / "result.json").write_text("{}")
-        else:
-            live.enter_context(RunDirectory.create("springs", old)).keep()
-        before = files(".")
-        assert main(words) == 2
-        (line,) = capsys.readouterr().err.splitlines()
-        assert ("found another process" if kind == "live run" else "move run.old away") in line
-        assert files(".") == before
-
-
-@pytest.mark.parametrize("there", ["mine.jpg", "files.txt"])
-def test_beside_a_run_only_begun_a_name_old_is_looked_at_too(there: str) -> None:
-    shutil.rmtree("run")
-    killed_once(Path("begun"), slow_study(free=0))
-    Path("run.old").mkdir()
-    Path("run.old", there).write_text("mine")
-    before = files("run.old")
-    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
-    assert files("run.old") == before
-
-
-def test_what_a_killed_run_has_measured_is_not_lost() -> None:
-    """Its logs count, too."""
-    shutil.copytree("run", "run.old")
-    for path in Path("run").iterdir():
-        if path.name in ("result.json", "trials.csv", "trials.store.jsonl", "report.html"):
-            path.unlink()
-    before = files("run")
-    assert any(path.suffix == ".mcap" for path in before)
-    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
-    assert contents("run.old") == {path.relative_to("run"): data for path, data in before.items()}
+    assert contents("run.old") == before
 
 
 def test_a_rename_that_fails_costs_neither_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -479,15 +392,13 @@ def test_a_run_writes_over_no_file_of_somebody() -> None:
 
 
 def test_a_list_leads_to_no_file_outside_its_folder() -> None:
+    """A run that goes on removes what the list names, but nothing elsewhere."""
     Path("secret.txt").write_text("of somebody")
     Path("elsewhere").mkdir()
     Path("elsewhere/secret.txt").write_text("of somebody")
     Path("run/behind").symlink_to(Path("elsewhere").absolute())
+    Path("run/result.json").unlink()
     listed(Path("run"), "../secret.txt", str(Path("secret.txt").absolute()), "behind/secret.txt")
-    words = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
-    assert main(words) == 0
-    assert main(words) == 2  # the link is in the old run
-    Path("run.old/behind").unlink()
-    assert main(words) == 0
+    assert main([*WALL, "--out", "run", "--resume"]) == 0
     assert Path("secret.txt").exists()
     assert Path("elsewhere/secret.txt").exists()

@@ -62,9 +62,7 @@ class Rows(HTMLParser):
             self.found[-1][-1] += data
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -259,22 +257,18 @@ def test_a_run_that_was_stopped_has_a_page() -> None:
     assert main(["report", "run"]) == 0
     page = Page(Path("run/report.html"))
     assert "was stopped: 2 trials were kept" in page.text
-    assert "Beside this page" not in page.text
 
 
-def test_films_stand_in_the_order_of_the_run_and_logs_are_named() -> None:
-    for folder in ("films", "logs"):
-        Path("run", folder).mkdir(parents=True)
+def test_films_stand_in_the_order_of_the_run() -> None:
+    Path("run/films").mkdir(parents=True)
     Path("run/command.txt").write_text("antennate tunnel\n")
     Path("run/config.toml").write_text('controllers = ["paper", "open", "closed"]\n')
     for name in ("closed", "open", "other", "paper"):
         Path(f"run/films/{name}.mp4").write_bytes(name.encode())
-        Path(f"run/logs/{name}-0.mcap").write_bytes(b"")
     assert main(["report", "run"]) == 0
     page = Page(Path("run/report.html"))
     films = [base64.b64decode(ref.split(",")[1]).decode() for ref in page.references]
     assert films == ["paper", "open", "closed", "other"]
-    assert "logs logs/closed-0.mcap, logs/open-0.mcap, logs/other-0.mcap" in page.text
 
 
 def test_invalid_trials_and_their_reasons_are_shown() -> None:
@@ -335,12 +329,6 @@ def test_a_run_that_has_ended_without_its_result_is_one_line(
     Path("run/config.toml").touch()
     Path("run/trials.csv").write_text("seed,trial\n0,0\n")
     assert "run/result.json: expected a readable file" in refusal(capsys, "run")
-
-
-def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "expected the folder of a run, or --compare RUN RUN" in refusal(capsys)
-    assert "expected 2 runs, found 1" in refusal(capsys, "--compare", "a")
-    assert "expected no other run beside it" in refusal(capsys, "run", "--compare", "a", "b")
 
 
 @pytest.mark.parametrize("ends", [(None, None), (1.0, math.nan), (-math.inf, 1.0)])

@@ -139,19 +139,3 @@ def test_the_quick_antenna_stands_beside_the_default_one(
     drawn = (tmp_path / "out" / "figures" / "ringdown.svg").read_text()
     assert result["engine"]["natural_hz"] < 3.0
     assert all(name in drawn for name in ("this antenna", "quick antenna"))
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["--beside", "missing.toml"],
-        ["--antenna.base-angle", "0.5"],
-        ["--antenna.sensor.hysteresis", "0.1"],
-        ["--deflection", "-1"],
-        ["--cone-hinges", "1"],
-        ["--config", "missing.toml"],
-    ],
-)
-def test_bad_input_is_one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "ringdown", *words]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

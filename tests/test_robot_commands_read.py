@@ -364,31 +364,6 @@ def test_every_parameter_of_a_command_of_the_robot_is_read_or_refused(
     assert set(model.unread) <= every
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["doctor", "--robot.mass", "5"],
-        ["drive", "--robot.leg-friction=0.5"],
-        ["drive", "teleop", "--robot.servos.xc430-w240.stall-torque", "1"],
-        ["drive", "teleop", "--controller", "open"],
-        ["doctor", "--control.gait.frequency", "0.4"],
-        ["setup", "--setup.horn-teeth", "20"],
-        ["setup", "zero", "--setup.scan", "1"],
-        ["setup", "jog", "--robot.antenna.length", "0.1"],
-        ["twin", "--control.gait.frequency", "0.4"],
-    ],
-)
-def test_a_flag_that_is_not_read_is_refused(
-    words: list[str], tmp_path: Path, monkeypatch: Patch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(words) == 2
-    err = capsys.readouterr().err
-    command = " ".join(word for word in words[:2] if word.isalpha())
-    assert f"expected a parameter that {command} reads, found this one" in err
-    assert err.count("\n") == 1
-
-
 def test_the_file_of_a_robot_may_hold_what_a_command_does_not_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,7 +12,6 @@ from driven_rig import driven, simulated_alike
 from twin_rig import on_twin, simulated
 
 from antennate.cli import BAD_INPUT, main
-from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.joints import Joints
 from antennate.params.base import read_file
@@ -137,13 +136,6 @@ def test_a_bad_robot_file_is_refused_in_one_line(
     told = capsys.readouterr().err
     assert f"{file}: {said}" in told
     assert told.count("\n") == 1
-
-
-def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(
-        ConfigError, match=r"expected scuttle, hexapod or a TOML file .*did you mean scuttle"
-    ):
-        RobotSpec.named("scutle")
 
 
 def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:

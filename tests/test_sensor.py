@@ -15,7 +15,6 @@ from antennate.cli import main
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
-from antennate.messages import command_words
 from antennate.params.base import read_file
 from antennate.params.control import ControlParams, CurveParams
 from antennate.robots.antenna import SensorParams
@@ -94,23 +93,6 @@ def test_a_pressure_film_reads_more_when_bent() -> None:
 
 
 FSR = {"sensor": {"kind": "fsr"}}
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [("tunnel", "robot.antenna"), ("touch", "antenna"), ("force", "antenna")],
-)
-def test_a_curve_that_falls_as_the_antenna_bends_is_refused(
-    command: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "run"
-    told = [*command_words(command).split(), f"--{words}.sensor.kind", "fsr", "--out", str(out)]
-    assert main(told) == 2
-    found = capsys.readouterr().err
-    assert "conditioning.polarity must be 1 for a fsr sensor" in found
-    assert "found -1" in found
-    assert "antennate calibrate --antenna.sensor.kind fsr" in found
-    assert not out.exists()
 
 
 def test_the_curve_that_calibrate_finds_for_it_is_taken(

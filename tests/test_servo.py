@@ -14,7 +14,6 @@ from servo_recordings import RATE, of_twin, written
 
 import antennate
 from antennate import experiments
-from antennate.cli import main
 from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, ServosParams, XL330Params, replay
 from antennate.types import Floats
 
@@ -251,13 +250,11 @@ def broken(change: str) -> list[dict[str, Any]]:
     ],
 )
 def test_a_recording_that_cannot_be_used_is_refused_in_one_line(
-    change: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: str, says: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     path = written(tmp_path / "log.json", broken(change), 400)
-    assert main(["servo", "--recording", str(path)]) == 2
-    err = capsys.readouterr().err
+    err = refused("servo", "--recording", str(path))
     assert says in err
-    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -269,18 +266,11 @@ def test_a_recording_that_cannot_be_used_is_refused_in_one_line(
     ],
 )
 def test_a_gain_or_a_weight_that_cannot_be_is_refused_in_one_line(
-    kp: float,
-    mass: float,
-    length: float,
-    says: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    kp: float, mass: float, length: float, says: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     path = written(tmp_path / "log.json", entries(), kp, mass=mass, length=length)
-    assert main(["servo", "--recording", str(path)]) == 2
-    err = capsys.readouterr().err
+    err = refused("servo", "--recording", str(path))
     assert says in err
-    assert err.count("\n") == 1
 
 
 def test_positions_that_are_finer_than_ticks_are_taken(tmp_path: Path) -> None:
@@ -321,27 +311,8 @@ def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path
     ],
 )
 def test_a_file_that_is_no_recording_is_refused_in_one_line(
-    text: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, says: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     (tmp_path / "log.json").write_text(text)
-    assert main(["servo", "--recording", str(tmp_path / "log.json")]) == 2
-    err = capsys.readouterr().err
+    err = refused("servo", "--recording", str(tmp_path / "log.json"))
     assert says in err
-    assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ([], "--recording: expected one file or more"),
-        (["--recording", "none.json"], "none.json: expected a readable file"),
-        (["--servos.xc430-w240.armature", "0.1"], "expected the default, as the servo is xl330"),
-    ],
-)
-def test_words_that_mean_nothing_are_refused(
-    words: list[str], says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["servo", *words]) == 2
-    err = capsys.readouterr().err
-    assert says in err
-    assert err.count("\n") == 1

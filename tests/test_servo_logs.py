@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,6 @@ import pytest
 from servo_recordings import of_twin, written
 
 import antennate
-from antennate.cli import main
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
@@ -87,21 +87,18 @@ def test_a_log_says_what_the_same_numbers_say_as_json(tmp_path: Path) -> None:
     ],
 )
 def test_a_log_that_cannot_serve_is_refused_in_one_line(
-    words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    words: list[str], says: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     log = as_log(of_twin(tmp_path / "a.json", 1200, 400, 0.8, 1.2), tmp_path / "drive.mcap")
-    assert main(["servo", "--recording", str(log), *words]) == 2
-    err = capsys.readouterr().err
+    err = refused("servo", "--recording", str(log), *words)
     assert says in err
-    assert err.count("\n") == 1
 
 
-def test_a_joint_without_a_log_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_joint_without_a_log_is_refused(tmp_path: Path, refused: Callable[..., str]) -> None:
     file = of_twin(tmp_path / "a.json", 1200, 400, 0.8, 1.2)
-    assert main(["servo", "--recording", str(file), "--joint", JOINT]) == 2
-    assert "--joint: expected a log among the recordings" in capsys.readouterr().err
+    assert "--joint: expected a log among the recordings" in refused(
+        "servo", "--recording", str(file), "--joint", JOINT
+    )
 
 
 def as_drive(path: Path, ticks: list[Tick]) -> Path:
@@ -129,12 +126,11 @@ def torque_share(ticks: list[Tick], tmp_path: Path) -> float:
     return row["torque_share"]
 
 
-def test_a_joint_that_never_follows_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_joint_that_never_follows_is_refused(tmp_path: Path, refused: Callable[..., str]) -> None:
     log = as_drive(tmp_path / "drive.mcap", following(200, away=0.5))
-    assert main(["servo", "--recording", str(log), "--joint", JOINT]) == 2
-    assert "expected a joint that follows its goals" in capsys.readouterr().err
+    assert "expected a joint that follows its goals" in refused(
+        "servo", "--recording", str(log), "--joint", JOINT
+    )
 
 
 def test_torque_stays_on_in_a_fault(tmp_path: Path) -> None:
@@ -193,17 +189,12 @@ def test_an_approach_does_not_count_in_a_fit(tmp_path: Path) -> None:
         assert found[1][name] == pytest.approx(found[0][name], rel=0.01)
 
 
-def test_a_fit_of_a_log_needs_the_supply(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fit_of_a_log_needs_the_supply(tmp_path: Path, refused: Callable[..., str]) -> None:
     log = as_drive(tmp_path / "drive.mcap", following(300))
     words = ["servo", "--recording", str(log), "--joint", JOINT]
-    assert main([*words, "--fit"]) == 2
-    err = capsys.readouterr().err
+    err = refused(*words, "--fit")
     assert "a fit needs the supply" in err
-    assert err.count("\n") == 1
-    assert main([*words, "--supply", "50"]) == 2
-    assert "--supply: expected 2.5 to 10 V, found 50" in capsys.readouterr().err
+    assert "--supply: expected 2.5 to 10 V, found 50" in refused(*words, "--supply", "50")
 
 
 def test_a_supply_that_is_given_says_what_a_supply_that_is_told_says(tmp_path: Path) -> None:
@@ -222,8 +213,9 @@ def test_a_supply_that_is_given_says_what_a_supply_that_is_told_says(tmp_path: P
 
 
 def test_a_supply_that_nothing_needs_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     file = of_twin(tmp_path / "a.json", 1200, 400, 0.8, 1.2)
-    assert main(["servo", "--recording", str(file), "--supply", "5"]) == 2
-    assert "--supply: expected a recording that tells none" in capsys.readouterr().err
+    assert "--supply: expected a recording that tells none" in refused(
+        "servo", "--recording", str(file), "--supply", "5"
+    )

@@ -91,20 +91,6 @@ def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
     assert row["coil_mm"] - row["mandrel_mm"] == pytest.approx(row["wire_mm"])
 
 
-@pytest.mark.parametrize(
-    ("bad", "word"),
-    [
-        ({"coil_mm": 1.0}, "coil_mm: expected 4 to 12 wire diameters"),
-        ({"coil_mm": 10.0}, "coil_mm: expected"),
-        ({"index_limits": (12.0, 4.0)}, "index_limits: expected the smaller first"),
-        ({"coil_limits": (9.0, 9.0)}, "coil_limits: expected the smaller first"),
-    ],
-)
-def test_what_cannot_be_wound_is_refused(bad: dict[str, object], word: str) -> None:
-    with pytest.raises(ConfigError, match=word):
-        run(SpringParams.model_validate(bad))
-
-
 def test_the_fatigue_of_shigleys_stock_spring() -> None:
     """Example 10-8: music wire of 0.072 in, coil of 0.521 in, 1 to 5 lbf·in; n_f is 1.13."""
     inch, lbf_in = 25.4, 0.1129848

@@ -38,9 +38,7 @@ HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'study_trials.py'}:trial"
 
 
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("there")
 
 
 def plan(name: str = "plan.toml", **more: Any) -> str:
@@ -142,15 +140,6 @@ def test_odd_letters_and_long_text_are_kept_and_read_again() -> None:
     kept_text = Path("run/config.toml").read_text(encoding="utf-8")
     assert tomllib.loads(kept_text)["settings"]["mode"] == mode
     assert [len(row["said"]) for row in antennate.RunDirectory.open("run").rows()] == [150_000] * 6
-
-
-def test_a_child_that_a_trial_forks_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
-    plan(mode="fork")
-    assert study("--no-figures") == 0
-    found = [(row["status"], float(row["value"])) for row in table()]
-    expected = [(x + 0.1) * (seed + 1) / 3 for x in (0.5, 0.5, 1.5, 1.5) for seed in range(3)]
-    assert found == [("ok", pytest.approx(value)) for value in expected]
-    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_W4_a_trial_that_never_ends_is_given_up() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antennate.antenna import springs
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import BadInputError
 from antennate.experiments.taper.experiment import TaperConfig, run
 from antennate.params.spring import TaperParams
 
@@ -89,10 +89,3 @@ def test_bad_files_name_the_row(tmp_path: Path, text: str, word: str) -> None:
     file.write_text(text)
     with pytest.raises(BadInputError, match=word):
         run(TaperConfig(diameters=str(file)))
-
-
-def test_a_missing_file_and_swapped_limits_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="expected a readable file"):
-        run(TaperConfig(diameters=str(tmp_path / "none.csv")))
-    with pytest.raises(ConfigError, match="the smaller first"):
-        run(TaperConfig(coil_limits=(9, 3)))

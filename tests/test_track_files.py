@@ -353,29 +353,3 @@ def test_without_h5py_the_extra_is_named(
     monkeypatch.setitem(sys.modules, "h5py", None)
     err = message(capsys, "--files", path, "--rate", 100, *FLAGS)
     assert "pip install './antennate[tracks]'" in err
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["--wall.kind", "line"], "wall: expected the default, as it is not read without files"),
-        (["--files", "a.npz", "--synthetic.trials", "2"], "synthetic: expected the default"),
-        (["--files", "a.npz", "--columns.x", "{}_cm"], "columns: expected the default"),
-        (["--files", "a.csv", "--columns.x", "x"], "columns.x"),
-        (["--files", "a.csv", "--wall.circle", "1", "2", "3"], "kind: expected circle"),
-        (["--files", "a.csv", "--criteria.gap", "0.2"], "criteria.gap: expected the default"),
-        (["--files", "a.csv", "--points.left", "a"], "points: right: expected as many points"),
-        (
-            [
-                "--files",
-                "a.csv",
-                *["--points.left", "a", "b", "--points.right", "none", "--criteria.flex", "1"],
-            ],
-            "criteria.flex: expected the default, as it is not read with two points",
-        ),
-    ],
-)
-def test_what_would_be_ignored_is_refused(
-    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert expected in message(capsys, *words)

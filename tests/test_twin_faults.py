@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from twin_rig import Rig, rig
 
-from antennate.cli import main
 from antennate.dxl import packets
 from antennate.dxl.faults import Noise
 from antennate.dxl.packets import Instruction
@@ -199,33 +198,6 @@ def test_every_code_is_one_of_the_converter(counts: float, others: tuple[str, ..
     assert min(codes) >= 0
     assert max(codes) <= largest
     assert max(codes) - min(codes) <= 2
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("plateau:-5", "a code of 0 to 4095, as plateau:SIZE"),
-        ("plateau:4096", "a code of 0 to 4095"),
-        ("plateau", "a code of 0 to 4095"),
-        ("hum", "0 to 65535 counts, as hum:SIZE"),
-        ("hum:-3", "0 to 65535 counts"),
-        ("radio_noise", "0 to 65535 counts"),
-        ("radio_noise:-3", "0 to 65535 counts"),
-        ("drift", "at most 65535 counts a second"),
-        ("drift:1e9", "at most 65535 counts a second"),
-        ("drift:1e999", "finite numbers"),
-        ("left", "a reading of 0 to 65535"),
-        ("right:-1", "a reading of 0 to 65535"),
-        ("ber", "a share of 0 to 1"),
-    ],
-)
-def test_a_fault_without_its_size_or_out_of_range_is_one_line(
-    text: str, said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["twin", "--fault", f"esp32={text}", "--duration", "0.1"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"--fault: expected {said}" in line
-    assert line.endswith(f"found 'esp32={text}'")
 
 
 @pytest.mark.parametrize("text", ["servo:7=late", "bus=latency", "bus=latency:-1", "bus=discharge"])

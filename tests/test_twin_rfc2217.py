@@ -9,12 +9,11 @@ import socket
 import struct
 import subprocess
 import sys
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from antennate.cli import main
 from antennate.dxl import packets
 from antennate.hardware.esp32 import frame
 from antennate.twin.config import TwinConfig, watched
@@ -183,10 +182,10 @@ def _speed(address: str) -> None:
         assert line.read(14) == b""
 
 
-def test_only_one_kind_of_tcp_end_is_served(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["twin", "--tcp", "0", "--rfc2217", "0"]) == 2
-    assert "--rfc2217: expected none beside --tcp, found both" in capsys.readouterr().err
-    assert main(["twin", "--servos", "1:xl330-m288", "--rfc2217", "x"]) == 2
-    assert "--rfc2217: expected [HOST:]PORT" in capsys.readouterr().err
+def test_only_one_kind_of_tcp_end_is_served(refused: Callable[..., str]) -> None:
+    assert "--rfc2217: expected none beside --tcp, found both" in refused(
+        "twin", "--tcp", "0", "--rfc2217", "0"
+    )
+    assert "--rfc2217: expected [HOST:]PORT" in refused(
+        "twin", "--servos", "1:xl330-m288", "--rfc2217", "x"
+    )

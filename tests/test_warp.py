@@ -209,28 +209,14 @@ def test_lost_contacts_are_said_and_make_trials_invalid(warp: Any) -> None:
     assert all("dropped contacts (NEFC): limits of 20 rows" in row.reason for row in rows)
 
 
-def test_other_experiments_have_no_batches(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    out = str(tmp_path / "run")
-    assert main(["bench", "touch", "--engine", "warp", "--trials", "1", "--out", out]) == 2
-    assert "expected tunnel or a study of it" in capsys.readouterr().err
-
-
 def test_a_study_of_another_experiment_has_no_batches(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     study = tmp_path / "springs.toml"
     study.write_text('experiment = "springs"\n[vary]\nwire_mm = [0.4, 0.5]\n')
-    assert main(["study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")]) == 2
-    assert "study of it; springs has none" in capsys.readouterr().err
-
-
-def test_batches_keep_no_logs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    out = str(tmp_path / "run")
-    told = ["--engine", "warp:cpu", "--log", "--trials", "1", "--out", out]
-    assert main(["tunnel", *told]) == 2
-    assert "warp, which keeps no logs" in capsys.readouterr().err
+    assert "study of it; springs has none" in refused(
+        "study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")
+    )
 
 
 @pytest.mark.slow

@@ -208,25 +208,37 @@ def worth(folder: Path) -> None:
     result = {"seed": SEED, "time_limit_s": LIMIT, "scenes": scenes, "pooled": pooled}
     (HERE / "knowledge.json").write_text(json.dumps(result, indent=1) + "\n")
     (HERE / "knowledge.png").write_bytes(render(_figure(scenes))["png"])
+    tell_worth(result)
+
+
+def tell_worth(result: dict[str, Any]) -> None:
+    """Write the table of what the knowledge saves, a column for each scene."""
+    scenes, pooled = result["scenes"], result["pooled"]
+    trials = {cell["trials"] for cells in scenes.values() for cell in cells.values()}
     lines = [
-        f"Seed {SEED}, trials of at most {LIMIT:g} s; a failure counts as {LIMIT:g} s. Time is "
-        "saved against `timed` that knows nothing, on the same trials, with 95 % intervals."
+        f"Seed {SEED}, {' to '.join(map(str, sorted(trials)))} trials a cell of at most "
+        f"{LIMIT:g} s; a failure counts as {LIMIT:g} s. Each cell: mean time, how many crossed, "
+        "and the time saved against `timed` that knows nothing, on the same trials, with its 95 % "
+        "interval.",
+        "",
+        row("[s]", *(f"`{scene}`" for scene in scenes), "all scenes alike"),
+        row(*["---"] * (len(scenes) + 2)),
     ]
-    lines += ["", row("scene", "knows", "trials", "crossed", "mean time [s]", "saved [s]")]
-    lines += [row(*["---"] * 6)]
-    for scene, cells in scenes.items():
-        for name, cell in cells.items():
-            saved = "" if name == "nothing" else _span(cell["saved_s"], cell["saved_95_s"])
-            crossed = f"{cell['successes']} of {cell['trials']}"
-            others = {"map": "`map`", "closed-1": "`closed-1`, nothing"}
-            label = others.get(name, f"`timed`, {name}")
-            lines += [row(scene, label, cell["trials"], crossed, f"{cell['mean_s']:.1f}", saved)]
-    lines += ["", row("all scenes alike", "saved [s]", "share of the time")]
-    lines += [row(*["---"] * 3)]
-    for name, cell in pooled.items():
-        span = _span(cell["saved_s"], cell["saved_95_s"])
-        lines += [row(f"{name} ({cell['scenes']} scenes)", span, f"{100 * cell['share']:.0f} %")]
+    others = {"map": "`map`", "closed-1": "`closed-1`, nothing"}
+    for name in CONDITIONS:
+        cells = [_told(cells[name], name) if name in cells else "" for cells in scenes.values()]
+        if name in pooled:
+            cell = pooled[name]
+            span = _span(cell["saved_s"], cell["saved_95_s"])
+            cells.append(f"**{span}**, {100 * cell['share']:.0f} %")
+        lines += [row(others.get(name, f"`timed`, {name}"), *cells, *[""] * (name not in pooled))]
     _write("worth", lines)
+
+
+def _told(cell: dict[str, Any], name: str) -> str:
+    """Mean time, crossings, and the time saved."""
+    saved = "" if name == "nothing" else f": {_span(cell['saved_s'], cell['saved_95_s'])}"
+    return f"{cell['mean_s']:.1f}, {cell['successes']}{saved}"
 
 
 def _span(value: float, ends: Any) -> str:
@@ -531,7 +543,7 @@ def tell_readings(result: dict[str, Any]) -> None:
         lines += ["", row(f"{kind} ({counts})", *labels), row(*["---"] * 4)]
         for name, found in sets.items():
             cells = [
-                f"{m['mean']:.2f} ({m['interval_95'][0]:.2f} to {m['interval_95'][1]:.2f})"
+                f"{m['mean']:.2f} ({m['interval_95'][0]:.2f}–{m['interval_95'][1]:.2f})"
                 for m in (found[label] for label in labels)
             ]
             lines += [row(name, *cells)]

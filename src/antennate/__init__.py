@@ -3,6 +3,8 @@
 Every name of `__all__` is imported when it is first used, so that `import antennate` costs nothing.
 """
 
+import sys
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -49,3 +51,8 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """The public names, for completion."""
     return [*__all__, "__version__"]
+
+
+if "gymnasium" in sys.modules:  # `gymnasium.make("antennate:Tunnel-v1")` imports this package
+    with suppress(ImportError):  # an older one
+        import_module("antennate.envs")

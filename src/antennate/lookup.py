@@ -6,7 +6,7 @@ import functools
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -56,6 +56,7 @@ class Registry(Generic[T]):
     - a name of ours, or one given to `add`;
     - an entry point that an installed package declares in `group`;
     - `module:Name`, for a module that Python can import;
+    - a file, where objects of this kind can be made of files;
     - `folder/file.py:Name`, the path relative to the working directory. Modules beside the file can
       be imported from it.
 
@@ -63,13 +64,21 @@ class Registry(Generic[T]):
         kind: What the objects are, in the singular, for messages.
         group: Entry-point group.
         ours: The objects of this package.
+        files: What makes an object of a file's name, by the end of that name, such as `.onnx`.
 
     Attributes:
         added: Objects that were given to `add`, by name.
     """
 
-    def __init__(self, kind: str, group: str, ours: Mapping[str, T]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        ours: Mapping[str, T],
+        files: Mapping[str, Callable[[str], T]] | None = None,
+    ) -> None:
         self._kind, self._group = kind, group
+        self._files = files or {}
         self._ours: dict[str, T] = dict(ours)
         self.added: dict[str, T] = ADDED.setdefault(group, {})
 
@@ -99,9 +108,10 @@ class Registry(Generic[T]):
         """
         place, _, attribute = name.rpartition(":")
         known = name in self._ours or name in self.added or name in self.names
-        if known or (place and attribute):
+        if known or (place and attribute) or Path(name).suffix in self._files:
             return name
         forms = "FILE.xml, MODULE:NAME" if self._kind == "scene" else "MODULE:NAME"
+        forms = ", ".join([*(f"FILE{end}" for end in self._files), forms])
         meant = f" (did you mean {name}:NAME?)" if name.endswith(".py") else ""
         ours = f"one of {', '.join(self.names)}, or " if self.names else ""
         raise ConfigError(
@@ -123,6 +133,8 @@ class Registry(Generic[T]):
                 raise WorkerError(added.reason)
             return added
         self.check(name)
+        if (make := self._files.get(Path(name).suffix)) is not None:
+            return make(name)
         try:
             value = self._load(name)
         except KeyboardInterrupt:

@@ -117,17 +117,21 @@ class SensorChain:
         self._play[:, rows] = 0.0
         self._crept[:, rows] = 0.0
 
-    def step(self, flex: Floats, noise: Floats | float = 0.0) -> Floats:
+    def step(self, flex: Floats, noise: Floats | float = 0.0, rows: Bools | None = None) -> Floats:
         """Sample all sensors once.
 
         Args:
             flex: Summed hinge angles under each sensor [rad], of the shape given.
             noise: Added before rounding and clipping [counts].
+            rows: Rows whose sensors remember this sample, shape (B,); all if not given.
 
         Returns:
             Readings [counts], same shape.
         """
+        play, crept = self._play, self._crept.copy() if rows is not None else self._crept
         sensed = self.with_memory(sensed_flex(self._params, flex))
+        if rows is not None:
+            self._play[:, ~rows], self._crept[:, ~rows] = play[:, ~rows], crept[:, ~rows]
         return _read(self._params, sensed, noise, self._curve)
 
     def with_memory(self, sensed: Floats) -> Floats:

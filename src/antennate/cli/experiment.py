@@ -30,14 +30,14 @@ from antennate.errors import (
 from antennate.experiments.running import keep, require_films, write_films
 from antennate.messages import shortened, typed
 from antennate.params.base import Params
-from antennate.studies.engines import BATCHED, EVERYWHERE, LOCAL, WARP, make_engine
+from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOGS, RESULT, SHARD, files_of
+from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -58,6 +58,7 @@ class RunOptions(ResultOptions):
         f"where the workers are: {', '.join(EVERYWHERE)}; for tunnel and studies of it "
         f"also {', '.join(BATCHED)}",
         "ENGINE",
+        examples=[form for form in FORMS if ":" not in form],
     )
     shard: str | None = option(None, "run one of N parts, for `antennate study merge`", "I/N")
     slurm: tuple[str, ...] = option(
@@ -98,8 +99,8 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
         ("shard",): experiment.in_shards,
         ("video", "video_trial"): experiment.films is not None,
         ("video_trial",): "trials" in experiment.config.model_fields,
-        tuple(fields_of(ViewOptions)): experiment.viewed is not None,
-        ("log",): experiment.logged is not None,
+        tuple(fields_of(ViewOptions)): experiment.shown,
+        ("log",): experiment.logs is not None,
         ("trust_code",): experiment.continued,
     }
     return [name for names, there in has.items() if not there for name in names]
@@ -247,11 +248,10 @@ def _folder(
     identity: dict[str, Any],
     shards: Shards | None,
 ) -> contextlib.AbstractContextManager[RunDirectory]:
-    """The run directory; shards are put together in a new one, apart from theirs."""
+    """The run directory; shards are put together in a new one."""
     how: dict[str, Any] = {}
     if shards:
-        reads = [file for folder in shards.folders for file in files_of(folder)]
-        how = {"command": "merge", "reads": reads}
+        how = {"command": "merge"}
     elif experiment.on_workers:
         resume = options.resume or options.retry or experiment.continued
         tasks = experiment.grows if options.shard is None else None
@@ -268,9 +268,10 @@ def _outcome(
     view: SimulationView | None,
 ) -> Outcome:
     """Run it: watched, logged, or neither."""
-    if options.log:
+    how: dict[str, Any] = {} if view is None else {"view": view}
+    if options.log and experiment.logs is not None:
         run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
-    logs = run.folder(LOGS) if options.log else None
+        how["logs"] = run.folder(LOGS)
     interim = Interim()
 
     def on_row(row: Any) -> None:
@@ -282,11 +283,7 @@ def _outcome(
         return None if rows is None else drawn_table(rows)
 
     with progress(experiment.parts, table) as step:
-        if view is not None and experiment.viewed is not None:
-            return experiment.viewed(config, step, on_row, view, logs)
-        if logs is not None and experiment.logged is not None:
-            return experiment.logged(config, workers, step, on_row, logs)
-        return experiment.run(config, workers, step, on_row)
+        return experiment.run(config, workers, step, on_row, **how)
 
 
 def _end(

@@ -158,8 +158,8 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
     """An option for each field that a flag can set, group by group.
 
-    A group whose class has `named(text)` is also an option of its own: a name or a file, which its
-    `choice` describes.
+    A group whose class has `named(text)` is also an option of its own: a name (its `known` are
+    offered) or a file, which its `choice` describes.
 
     Args:
         default: A model or pydantic dataclass with its default values.
@@ -172,8 +172,8 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
             yield from _option((*path, name), model, field, value)
             continue
         if hasattr(group, "choice"):
-            examples = tuple(map(str, field.examples or ()))
-            yield Option((*path, name), "NAME|FILE", frozenset({str}), model, examples)
+            known = tuple(getattr(group, "known", ()))
+            yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known)
         yield from options_of(group() if value is None else value, (*path, name))
 
 

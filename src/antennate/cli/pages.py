@@ -26,8 +26,9 @@ from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 
 if TYPE_CHECKING:  # these import much, for a page that few runs want
     from antennate.studies.run_directory import RunDirectory
+    from antennate.telemetry.view.foxglove import FoxgloveSink
     from antennate.telemetry.view.process import ViewProcess
-    from antennate.telemetry.view.show import Display
+    from antennate.telemetry.view.show import Page
     from antennate.telemetry.view.simulation import SimulationView
 
 MODULE = "antennate.cli.pages"
@@ -152,7 +153,7 @@ def _serve(
 ) -> None:
     from antennate.telemetry.view.show import run
 
-    displays: list[Display] = []
+    displays: list[Page | FoxgloveSink] = []
     with contextlib.ExitStack() as stack:
         if foxglove is not None:
             displays.append(_sink(foxglove))
@@ -164,7 +165,7 @@ def _serve(
         run(channel, displays)
 
 
-def _sink(port: int) -> Display:
+def _sink(port: int) -> FoxgloveSink:
     from antennate.telemetry.view.foxglove import FoxgloveSink, layout
 
     sink = FoxgloveSink(port)
@@ -172,7 +173,7 @@ def _sink(port: int) -> Display:
     return sink
 
 
-def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack) -> Display:
+def _page(channel: Channel, listener: socket.socket, stack: contextlib.ExitStack) -> Page:
     from antennate.telemetry.view.server import Gate, load_page, serve
     from antennate.telemetry.view.show import Page
 

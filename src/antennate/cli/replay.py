@@ -80,8 +80,7 @@ def command(argv: Sequence[str]) -> int:
     log.require_ticks()
     result = _result(log, replayed, config)
     if options.out is not None:
-        donor = [log_of(Path(options.donor))] if options.donor else []
-        with folder_for(VIEW, options, config, argv, reads=[*log.parts, *donor]) as folder:
+        with folder_for(VIEW, options, config, argv) as folder:
             _keep(folder, path, replayed)
             say_by_hand(by_hand, folder)
             folder.finish(result)

@@ -33,9 +33,7 @@ from antennate.studies.run_files import (
     LOGS,
     REPORT,
     files_of,
-    is_same,
     listed,
-    require_apart,
 )
 from antennate.studies.store import Tasks
 from antennate.telemetry.header import RECOVERED
@@ -46,9 +44,7 @@ class ResultOptions(FromFile):
     """Where the results go."""
 
     out: Path | None = option(None, "folder for the results, else runs/COMMAND-N", "FOLDER")
-    overwrite: bool = option(
-        False, "first rename the folder to FOLDER.old, in place of an older one", needs=["--out"]
-    )
+    overwrite: bool = option(False, "first rename the folder to FOLDER.old", needs=["--out"])
     json: bool = option(False, "print the content of result.json and nothing else")
 
 
@@ -62,7 +58,6 @@ def folder_for(
     resume: bool | None = None,
     retry: bool = False,
     command: str = "",
-    reads: Sequence[Path] = (),
     tasks: Tasks | None = None,
 ) -> Iterator[RunDirectory]:
     """A run directory with its configuration.
@@ -78,18 +73,15 @@ def folder_for(
         resume: Go on with the run that the folder holds, if there is one; None if it never can.
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
-        reads: Files that it reads, beside those that the configuration names.
         tasks: As for `RunDirectory.create`.
 
     Raises:
         BadInputError: The run that is to go on is another one, or no file can keep the words.
-        OutputError: It cannot be written, or it holds another run, or one that is read.
+        OutputError: It cannot be written, or it holds another run.
     """
     for flag, words in flags_and_words(argv):
         for word in words:
             require_text(flag or view.name, word)
-    given = [] if options.config is None else [options.config]
-    require_apart(options.out, options.overwrite, config.model_dump(), [*reads, *given])
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place, tasks=tasks) as folder:
         folder.describe(config, ["antennate", *command_words(command or view.name).split(), *argv])
@@ -267,7 +259,7 @@ def command(argv: Sequence[str]) -> int:
     else:
         raise ConfigError("expected the folder of a run, or --compare RUN RUN, found none")
     sources = (file for run in runs for file in files_of(run) if file.name != REPORT)
-    if any(is_same(place, file) for file in sources):
+    if place.exists() and any(place.samefile(file) for file in sources):
         raise OutputError(f"--out: expected no file that the page is made of, found {place}")
     if own and listed(runs[0]) is not None:
         RunDirectory.open(runs[0]).claim_names([REPORT])

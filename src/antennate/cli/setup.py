@@ -13,7 +13,7 @@ from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
 from antennate.cli.options import option
 from antennate.cli.results import print_table
-from antennate.cli.robot import BusOptions, parse_robot, parse_writer, require_bus
+from antennate.cli.robot import USUAL, BusOptions, parse_robot, parse_writer, require_bus
 from antennate.cli.terminal import StatusLine, stop_signals, write
 from antennate.dxl.bus import Bus
 from antennate.dxl.models import model_name
@@ -225,7 +225,8 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
     change(path, by_group(robot, "zeros", zeros) | by_group(robot, "directions", directions))
     person.close()
     _show_zeros(robot, zeros, directions, zeroing.measured)
-    sys.stderr.write(f"{path} is written. Next: {typed('doctor', '--config', str(path))}\n")
+    named = () if path == USUAL else ("--config", str(path))
+    sys.stderr.write(f"{path} is written. Next: {typed('doctor', *named)}\n")
     return OK
 
 

@@ -124,6 +124,21 @@ class RunningMean:
         self._seen = np.minimum(self._seen + 1, self.length)
         return total / self._seen[:, None]
 
+    def begin(self, counts: Floats, rows: Bools) -> Floats:
+        """Take the first reading of some rows in the tick that the others have had.
+
+        Args:
+            counts: Readings [counts], shape (B, 2); those of other rows are not looked at.
+            rows: Rows that were reset since, shape (B,).
+
+        Returns:
+            Their means, shape (B, 2), NaN in other rows.
+        """
+        first = np.where(usable(counts), counts, np.nan)
+        self._ring[self._next - 1, rows] = first[rows]
+        self._seen[rows] = 1
+        return np.where(rows[:, None], first, np.nan)
+
 
 _FREE, _CONTACT, _UNKNOWN = int(Contact.FREE), int(Contact.CONTACT), int(Contact.UNKNOWN)
 """As plain integers: comparing an array with an enum costs four times as much."""

@@ -26,7 +26,7 @@ from antennate.params.gaits import GaitParams, LiftParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 
-_DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
+DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
 """Sense in which the phase runs in each maneuver: REVERSE runs body and legs backwards."""
 _STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
 """Sign of the yaw offset in each maneuver."""
@@ -58,6 +58,7 @@ def targets(
     offset: Floats,
     sweep: Floats | None = None,
     lifting: bool = True,
+    amplitude: Floats | None = None,
 ) -> JointCommand:
     """Joint targets at a gait phase. Pitch joints stay at 0.
 
@@ -68,9 +69,11 @@ def targets(
         offset: Yaw offset [rad], shape (B,); positive turns right.
         sweep: Phase S of the antenna bases [rad], shape (B,); 0 if absent.
         lifting: Whether lifting legs step; at 0 all of them stand.
+        amplitude: Amplitude of the yaw joints [rad], shape (B,); that of the gait if absent.
     """
     joints, links = _lags(params.wave_number, params.body_phase, robot.links)
-    yaw = params.amplitude * np.sin(joints - phase[:, None]) + offset[:, None]
+    size = params.amplitude if amplitude is None else amplitude[:, None]
+    yaw = size * np.sin(joints - phase[:, None]) + offset[:, None]
     largest = robot.yaw_limit
     yaw = np.minimum(np.maximum(yaw, -largest), largest)
     if robot.legs.kind == "rolling":
@@ -130,7 +133,7 @@ class Gait:
         change = _STEER[maneuver] * size - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * moves
-        self.phase += _DIRECTION[maneuver] * self._advance
+        self.phase += DIRECTION[maneuver] * self._advance
         self.sweep += moves * self._swing
         command = targets(self.params, self._robot, self.phase, self.offset, self.sweep)
         return command if self._legs else replace(command, leg=np.zeros_like(command.leg))

@@ -49,11 +49,23 @@ ABOUT = {
 RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
+
+def _of_policy(name: str) -> ControllerFactory:
+    """What makes controllers of a policy file."""
+    from antennate.control.policy.controller import policy_factory  # only where one is named
+
+    return policy_factory(name)
+
+
+_FILES: dict[str, Callable[[str], ControllerFactory]] = {".onnx": _of_policy}
 CONTROLLERS: Registry[ControllerFactory] = Registry(
-    "controller", "antennate.controllers", BUILT_IN | PRIVILEGED
+    "controller", "antennate.controllers", BUILT_IN | PRIVILEGED, _FILES
 )
-"""All controllers: ours, of installed packages, and one's own as MODULE:NAME or FILE.py:NAME."""
-_FOR_ROBOTS: Registry[ControllerFactory] = Registry("controller", "antennate.controllers", BUILT_IN)
+"""All controllers: ours, of installed packages, one's own as MODULE:NAME or FILE.py:NAME, and
+learned policies as FILE.onnx."""
+_FOR_ROBOTS: Registry[ControllerFactory] = Registry(
+    "controller", "antennate.controllers", BUILT_IN, _FILES
+)
 
 
 def check_for_robots(name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import FILMS, require_apart
+from antennate.studies.run_files import FILMS
 
 _PARTS = 100
 """Parts of the making of a film that are told."""
@@ -146,7 +145,7 @@ def run(
     for name, given in {"overwrite": overwrite, "resume": resume}.items():
         if given and out is None:
             raise ConfigError(f"{name}: expected out beside it, found none")
-    experiment, config = _configured(name_or_config, settings, workers)
+    experiment, config = _configured(name_or_config, settings)
     experiment.check(config)
     if engine != LOCAL and not experiment.on_workers:
         raise ConfigError(
@@ -157,7 +156,6 @@ def run(
     pool = Workers(workers, make_engine(engine), shared=environment(experiment.name, config))
     if out is None:
         return Result(experiment, config, experiment.run(config, pool, on_step, lambda row: None))
-    require_apart(out, overwrite, config.model_dump())
     place = (
         experiment.name,
         out,
@@ -286,13 +284,13 @@ def list_experiments() -> dict[str, str]:
 
 
 def _configured(
-    experiment: str | Params, settings: Mapping[str, Any], workers: int
+    experiment: str | Params, settings: Mapping[str, Any]
 ) -> tuple[Experiment[Any, Any], Params]:
     if isinstance(experiment, str):
         chosen = experiments.load(experiment)
         values = dict(settings)
         if "controllers" in values:
-            values["controllers"] = _names(values["controllers"], workers)
+            values["controllers"] = _names(values["controllers"])
         return chosen, from_values(chosen.config, values)
     if settings:
         raise ConfigError(
@@ -309,7 +307,7 @@ def _configured(
     )
 
 
-def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tuple[str, ...]:
+def _names(controllers: Iterable[str | ControllerFactory]) -> tuple[str, ...]:
     """Controllers by name; classes become known to this process under their own."""
     names = []
     if isinstance(controllers, str):
@@ -322,18 +320,6 @@ def _names(controllers: Iterable[str | ControllerFactory], workers: int) -> tupl
             continue
         checks.function("controllers", controller)
         name = controller.__name__
-        if workers > 1 and not _importable(controller):
-            raise ConfigError(
-                f"controllers: expected what worker processes can import, found {name} of a "
-                f"notebook or a function; put it into a file, or use 1 worker"
-            )
         CONTROLLERS.add(name, controller)
         names.append(name)
     return tuple(names)
-
-
-def _importable(controller: ControllerFactory) -> bool:
-    """Whether a fresh process finds this class: at the top of a module that is a file."""
-    module = sys.modules.get(controller.__module__)
-    known = getattr(module, controller.__name__, None)
-    return known is controller and hasattr(module, "__file__")

@@ -86,6 +86,7 @@ in the rest. The period is not published; 2 s is assumed.
 class GaitParams(Params):
     """The serpenoid body wave and the stepping legs."""
 
+    known: ClassVar[tuple[str, ...]] = tuple(GAITS)
     choice: ClassVar[str] = f"{', '.join(GAITS)} (the first is the default), or a TOML file"
     frequency: float = number(
         0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0

@@ -41,6 +41,7 @@ ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
+    known: ClassVar[tuple[str, ...]] = ROBOTS
     choice: ClassVar[str] = f"{', '.join(ROBOTS)} or a TOML file of your own (default: {ROBOTS[0]})"
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""

@@ -18,7 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT
 from antennate.sim.world import World
-from antennate.types import AntennaFrame, Floats, Ints, JointCommand, joint_angles
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, joint_angles
 
 _STATE = int(
     mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
@@ -276,16 +276,20 @@ class SimRobot:
         """Time [s] since the batch began."""
         return self._ticks * self._period
 
-    def read(self) -> AntennaFrame:
-        """Sample both sensors of every row."""
+    def read(self, rows: Bools | None = None) -> AntennaFrame:
+        """Sample both sensors of every row, or of these alone, shape (B,).
+
+        The sensors of other rows do not remember it; the frame holds no reading of them.
+        """
         self._look()
         at = [0] * self._batch
         for i, row in self._rows.items():
             at[i] = row.tick % NOISE_BLOCK
-            if not at[i]:
+            if not at[i] and (rows is None or rows[i]):
                 self._noise[i] = row.chance.noise_block()
         noise = self._noise[self._every, at]
-        counts = self._sensors.step(self._states.hinges.sum(axis=2) * self._bends, noise)
+        flex = self._states.hinges.sum(axis=2) * self._bends
+        counts = self._sensors.step(flex, noise, rows)
         counts[self._missing] = np.nan
         joints = self._states.joints
         joints[:, : self._yaws] -= self._bias  # a servo reports angles about its own zero

@@ -43,8 +43,8 @@ class TrialConfig(Params):
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
     scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
-    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, a MJCF file.xml,
-    MODULE:CLASS or file.py:CLASS."""
+    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, a MJCF
+    file.xml, MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
     robot: RobotSpec = RobotSpec()

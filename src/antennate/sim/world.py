@@ -255,6 +255,12 @@ class World:
         w, x, y, z = self.data.qpos[self.root + 3 : self.root + 7]
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
+    @property
+    def overturned(self) -> bool:
+        """Whether the undersides of most links point up."""
+        up = self.data.xmat[self.places.links, 8]
+        return bool(np.count_nonzero(up < 0.0) > 0.5 * len(up))
+
     def links(self) -> Floats:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self.places.links, :2]

@@ -1,37 +1,31 @@
 """How a run takes its directory; with `--overwrite`, NAME is renamed to NAME.old first.
 
-The rename is one step, so a process that is killed at any moment leaves the old run whole, under
-one of the two names. A new run that ends with nothing to keep gives the name back.
+Where there is a NAME.old it becomes NAME.old2, and so on: nothing is removed. The rename is one
+step, so a process that is killed at any moment leaves the old run whole, under one of the two
+names. A new run that ends with nothing to keep gives the name back.
 """
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
+import itertools
 import os
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from antennate.errors import OutputError
 from antennate.studies.run_files import (
-    COMMAND,
-    CONFIG,
     FILES,
     FOLDERS,
-    JOBS,
     PARTIAL,
     ROOM,
-    VERSIONS,
     add_to_list,
     files_of,
     holds_run,
     is_finished,
-    is_folder,
     listed,
-    old_of,
     others_of,
     outdated,
     place_of,
@@ -39,7 +33,7 @@ from antennate.studies.run_files import (
     sweep,
     writing,
 )
-from antennate.studies.store import STORE, Store, Tasks, nobody_else, open_store, parsed
+from antennate.studies.store import STORE, Store, Tasks, nobody_else, open_store
 
 
 class Claim(NamedTuple):
@@ -151,21 +145,15 @@ def _require_folder(place: Path) -> None:
 def _set_aside(place: Path) -> Path:
     """Rename a folder that holds a run; its new name."""
     _require_renamable(place)
-    old, spare = old_of(place), place.parent / f".{place.name}.old"
+    numbers = itertools.count(2)
+    old = place.parent / f"{place.name}.old"
+    while os.path.lexists(old):
+        old = place.parent / f"{place.name}.old{next(numbers)}"
     with contextlib.ExitStack() as locks:
         for file in (place / FILES, place / STORE):
             if file.exists():
                 locks.callback(os.close, _locked(file))
-        if not (place / FILES).exists():
-            raise nobody_else(place)
-        for earlier in (old, spare):
-            _require_run_alone(earlier)
-            if (earlier / FILES).exists():
-                locks.callback(os.close, _locked(earlier / FILES))
-        if (old / FILES).exists() and _is_only_begun(place):
-            remove_run(place)  # the run before it stays what can be had back
-        else:
-            _rename(place, old, spare)
+        place.rename(old)
     return old
 
 
@@ -179,80 +167,11 @@ def _require_renamable(place: Path) -> None:
         )
     if place.is_symlink():
         raise OutputError(f"{place}: expected a folder to rename, found a link; give its own name")
-    working = (Path.cwd(), *Path.cwd().parents)
-    if place.name in ("", "..") or {place.resolve(), old_of(place).resolve()} & {*working}:
+    if place.resolve() in (Path.cwd(), *Path.cwd().parents):
         raise OutputError(
             f"{place}: expected a folder to rename, found the working directory or one above it; "
             "go to another directory, or choose another folder"
         )
-    if place.is_mount():
-        raise OutputError(
-            f"{place}: expected a folder to rename, found a file system of its own; choose a "
-            "folder in it"
-        )
-    if not os.access(place.parent, os.W_OK):  # before anything is moved
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-
-def _rename(place: Path, old: Path, spare: Path) -> None:
-    """Rename a folder; what has the new name is removed last, and has it again on an error."""
-    _remove_old(spare)
-    if os.path.lexists(old):
-        old.rename(spare)
-    try:
-        place.rename(old)
-    except OSError:
-        if spare.exists():
-            spare.rename(old)
-        raise
-    _remove_old(spare)
-
-
-def _is_only_begun(place: Path) -> bool:
-    """Whether a folder holds a run that was killed before anything was measured, and no more."""
-    known = {*files_of(place)}
-    return all(path in known and _is_description(path) for path in place.rglob("*"))
-
-
-def _is_description(file: Path) -> bool:
-    """Whether a file of a run says what is to be measured, and not what was."""
-    if file.name == PARTIAL:
-        return not file.stat().st_size
-    if file.name == STORE:
-        return not parsed(file.read_bytes()).records
-    return file.name in (CONFIG, VERSIONS, COMMAND, ROOM, FILES)
-
-
-def _require_run_alone(old: Path) -> None:
-    """Refuse what an earlier overwrite left under a name if it holds more than a run.
-
-    An empty folder is taken, too.
-    """
-    if not os.path.lexists(old):
-        return
-    others = [old]
-    if is_folder(old):
-        sweep(old)
-        files = files_of(old)
-        own = {*files, *(folder for file in files for folder in file.parents)}
-        own |= {old / name for name in FOLDERS if files}
-        others = sorted(path for path in old.rglob("*") if path not in own)
-        if files:
-            others = [path for path in others if old / JOBS not in (path, *path.parents)]
-    if others:
-        raise OutputError(
-            f"{old}: expected an old run alone, which --overwrite removes, found {others[0]}, "
-            f"which no run wrote; move {old} away"
-        )
-
-
-def _remove_old(old: Path) -> None:
-    """Remove a run that was replaced, with its folder."""
-    if os.path.lexists(old):
-        shutil.rmtree(old / JOBS, ignore_errors=True)
-        remove_run(old)
-        if is_folder(old):
-            old.rmdir()
 
 
 def _locked(file: Path) -> int:

@@ -257,7 +257,8 @@ class Experiment(Generic[Config, Found]):
         description: What `--help` says; its first sentence is the summary in the list of commands.
         config: Its configuration.
         run: run(config, workers, on_step, on_row) -> outcome, which does not depend on the number
-            of worker processes.
+            of worker processes. Where there are `logs` it also takes `logs`, a folder for them, and
+            where it can be `shown` a `view`: then all runs in this process.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
         figures: Figures of an outcome by name.
@@ -265,12 +266,8 @@ class Experiment(Generic[Config, Found]):
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
-        logged: Runs as `run` does and keeps the log of each trial in a folder, which is given as
-            well; None if there are no controllers to log.
-        logs: Names of the logs that `logged` and `viewed` write into that folder.
-        viewed: viewed(config, on_step, on_row, view, logs) runs as `run` does, in this process, and
-            shows each trial on a page; the folder for logs may be None. None where nothing can be
-            shown.
+        logs: Names of the logs of a configuration; None if there are no controllers to log.
+        shown: Whether its trials can be shown on a page.
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
         body: HTML that stands in its report in place of tables and figures.
@@ -288,7 +285,7 @@ class Experiment(Generic[Config, Found]):
     name: str
     description: str
     config: type[Config]
-    run: Callable[[Config, Workers, OnStep, OnRow], Found]
+    run: Callable[..., Found]
     tables: Callable[[Mapping[str, Any]], Sequence[Table]]
     sentence: Callable[[Mapping[str, Any]], str]
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
@@ -296,9 +293,8 @@ class Experiment(Generic[Config, Found]):
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
-    logged: Callable[[Config, Workers, OnStep, OnRow, Path], Found] | None = None
-    logs: Callable[[Config], Sequence[str]] = lambda config: ()
-    viewed: Callable[[Config, OnStep, OnRow, SimulationView, Path | None], Found] | None = None
+    logs: Callable[[Config], Sequence[str]] | None = None
+    shown: bool = False
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Body | None = None
     trials: Trials[Config] | None = None
@@ -335,27 +331,18 @@ class Experiment(Generic[Config, Found]):
         run: Callable[..., Found],
         tables: Callable[[Mapping[str, Any]], Sequence[Table]],
         sentence: Callable[[Mapping[str, Any]], str],
-        shown: bool = False,
         **more: Any,
     ) -> Experiment[Config, Found]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. Without `figures` they are those that
         `figures(outcome)` of the module `figure` beside it returns, which is imported when they are
-        drawn. If it is `shown`, `run` also takes a `view`, and with `logs` a folder `logs`.
+        drawn.
         """
         folder = module.rpartition(".")[0]
         if "figures" not in more:
             more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
                 outcome
-            )
-        if "logs" in more:
-            more["logged"] = lambda c, workers, on_step, on_row, logs: run(
-                *(c, workers, on_step, on_row), logs=logs
-            )
-        if shown:
-            more["viewed"] = lambda c, on_step, on_row, view, logs: run(
-                *(c, 1, on_step, on_row), view=view, **({"logs": logs} if "logs" in more else {})
             )
         return cls(
             folder.rpartition(".")[2],

@@ -40,10 +40,11 @@ def identity(command: str, config: Params) -> dict[str, Any]:
 
 
 def packages_used(command: str, config: Params) -> tuple[str, ...]:
-    """Optional packages that its numbers depend on: of the chain solver, a GPU, a search."""
-    words = command.split()
+    """Optional packages that its numbers depend on: of chain solver, policies, GPU, search."""
+    words, values = command.split(), [*texts(config.model_dump(mode="json"))]
     return (
-        *(("numba",) if "chain" in texts(config.model_dump(mode="json")) else ()),
+        *(("numba",) if "chain" in values else ()),
+        *(("onnxruntime",) if any(text.endswith(".onnx") for text in values) else ()),
         *(("mujoco-warp", "warp-lang") if "warp" in words else ()),
         *(("optuna",) if "design" in words else ()),
     )

@@ -15,15 +15,13 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.spawn import get_preparation_data
 from pathlib import Path
 from typing import Any
 
-from antennate.errors import WorkerError, in_one_line, raised
+from antennate.errors import WorkerError, in_one_line
 from antennate.lookup import NotSent
 from antennate.sim.engine_setup import dropped
 from antennate.studies.work import (
@@ -275,15 +273,7 @@ def _serve(connection: Connection, added: Packed) -> None:
         while True:
             part: Part = connection.recv()
             connection.send((_BEGUN, 0, None))  # what it needs is imported by now
-            replace(part, function=partial(_uninterrupted, part.function)).carry_out(emit, fail)
-
-
-def _uninterrupted(function: Callable[..., Any], *given: Any) -> Any:
-    """What a function returns; no Ctrl-C arrives in a worker, so that one is of the user's code."""
-    try:
-        return function(*given)
-    except KeyboardInterrupt as error:
-        raise WorkerError(raised(error)) from None
+            part.carry_out(emit, fail)
 
 
 def _end_with_parent() -> None:

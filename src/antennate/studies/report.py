@@ -29,7 +29,6 @@ from antennate.studies.run_files import (
     FIGURES,
     FILMS,
     LARGEST,
-    LOGS,
     PARTIAL,
     REPORT,
     RESULT,
@@ -40,8 +39,6 @@ from antennate.studies.run_files import (
 
 _MOST_REASONS = 20
 """Most trials whose failure is quoted."""
-_MOST_LOGS = 6
-"""Most logs that are named."""
 Result = Mapping[str, Any]
 Body = Callable[[Result, Mapping[str, str]], str]
 """HTML of a result and of its figures, images by name."""
@@ -123,7 +120,12 @@ def report(run: RunDirectory, view: View) -> str:
     result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>{page.escape(view.title)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
-    parts.append(page.paragraphs(_sentence(run, result, view), "headline"))
+    headline = (
+        f"This run has not ended, or was stopped: {len(run.rows())} trials were kept."
+        if result is None
+        else view.sentence(result)
+    )
+    parts.append(page.paragraphs(headline, "headline"))
     parts.append(page.block(run.text(BY_HAND), wrap=True))
     films = "".join(page.captioned(film, name) for name, film in _films(run).items())
     parts.append(f'<div class="pair">{films}</div>' if films else "")
@@ -131,14 +133,8 @@ def report(run: RunDirectory, view: View) -> str:
         parts.append(_shown(run, result, view))
     parts.append(f"<h2>How it was run</h2>{page.paragraphs(_when(run, result))}")
     parts.append(page.block(_command(run, view), wrap=True))
-    parts += [_logs(run), _failures(run), _settings(run, view), _versions(run)]
+    parts += [_failures(run), _settings(run, view), _versions(run)]
     return page.page(view.title, "".join(parts))
-
-
-def _sentence(run: RunDirectory, result: Result | None, view: View) -> str:
-    if result is None:
-        return f"This run has not ended, or was stopped: {len(run.rows())} trials were kept."
-    return view.sentence(result)
 
 
 def _command(run: RunDirectory, view: View) -> str:
@@ -181,16 +177,6 @@ def _films(run: RunDirectory) -> dict[str, str]:
 
 _SHOWN = ("controllers", "profiles")
 """Parameters whose entries have a film each."""
-
-
-def _logs(run: RunDirectory) -> str:
-    """Which logs there are."""
-    folders = (run.path, run.path / LOGS)
-    logs = [path for folder in folders for path in sorted(folder.glob("*.mcap"))]
-    names = ", ".join(str(path.relative_to(run.path)) for path in logs[:_MOST_LOGS])
-    more = f" and {len(logs) - _MOST_LOGS} more" if len(logs) > _MOST_LOGS else ""
-    kind = "log" if len(logs) == 1 else "logs"
-    return page.paragraphs(f"Beside this page: {kind} {names}{more}.", "muted") if logs else ""
 
 
 def _shown(run: RunDirectory, result: Result, view: View) -> str:

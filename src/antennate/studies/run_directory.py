@@ -47,7 +47,6 @@ from antennate.studies.run_files import (
     inside,
     listed,
     read_as,
-    remove_described,
     remove_run,
     with_end,
     writing,
@@ -96,8 +95,8 @@ class RunDirectory:
         Args:
             command: Name of the experiment or command.
             path: The directory; the next free `runs/COMMAND-N` if not given.
-            overwrite: If it holds a run, rename it to NAME.old first. A NAME.old that holds only a
-                run goes then. If the new run leaves nothing, the name is given back.
+            overwrite: If it holds a run, rename it to NAME.old first, or to NAME.old2 and so on
+                where there is one. If the new run leaves nothing, the name is given back.
             identity: What is run, by `antennate.studies.identity`, for a run that can be resumed.
             resume: Go on with the run that it holds, if there is one. Of one that is finished only
                 files that are missing are written, and the report with them. None if `command`
@@ -110,7 +109,7 @@ class RunDirectory:
             BadInputError: The run that is to go on is another one, the path is none, or the command
                 has a name that no folder can have.
             OutputError: It cannot be made or written to, it holds another run, or another process
-                works on it; or, to overwrite it, it holds no run, or NAME.old holds anything else.
+                works on it; or, to overwrite it, it holds no run.
         """
         return cls(claim(command, path, overwrite, identity, resume, retry, tasks))
 
@@ -356,7 +355,7 @@ class RunDirectory:
             with contextlib.suppress(OSError, OutputError):
                 self._drop_partial()
                 self._give_room()
-                (remove_described if self.old is None else remove_run)(self.path)
+                remove_run(self.path)
                 give_back(self.path, self._created, self.old)
         if self._lock is not None:
             os.close(self._lock)

@@ -12,14 +12,13 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
-from antennate.studies.identity import code_named, texts
 from antennate.studies.store import STORE
 from antennate.telemetry.header import MOST_PARTS, part
 
@@ -133,54 +132,6 @@ def holds_run(place: Path, held: Sequence[Path], resume: bool | None) -> OutputE
     )
 
 
-def old_of(place: Path) -> Path:
-    """The new name of a folder that is overwritten."""
-    return place.parent / f"{place.name}.old"
-
-
-def require_apart(
-    out: str | Path | None,
-    overwrite: bool,
-    config: Mapping[str, Any],
-    reads: Iterable[Path] = (),
-) -> None:
-    """Check that what a run reads stays where it is when the run takes its folder.
-
-    Args:
-        out: The folder.
-        overwrite: Whether it is renamed, and what an earlier overwrite left is removed.
-        config: The configuration, with names of files.
-        reads: More files.
-
-    Raises:
-        OutputError: It would go.
-    """
-    held = files_of(Path(out)) if out is not None else []
-    if out is None or not held:
-        return
-    place = Path(out).resolve()
-    moved = {place, old_of(place)} if overwrite else set()
-    for path in (*reads, *map(Path, texts(config)), *map(Path, code_named(config))):
-        if any(is_same(path, file) for file in held) or moved & _folders_of(path):
-            raise OutputError(f"expected another folder than that of {path}, found {out}")
-
-
-def _folders_of(path: Path) -> set[Path]:
-    """All folders that a file lies in; none if there is no such file."""
-    try:
-        return set(path.resolve().parents) if path.is_file() else set()
-    except (OSError, ValueError, RuntimeError):  # not even a name of one
-        return set()
-
-
-def is_same(path: Path, other: Path) -> bool:
-    """Whether both names lead to one file."""
-    try:
-        return path.samefile(other)
-    except (OSError, ValueError):  # no file, or not even a name of one
-        return False
-
-
 def outdated(held: Sequence[Path], finished: bool) -> list[Path]:
     """Which of the files that a directory holds go before a run goes on.
 
@@ -275,22 +226,6 @@ def writing(path: Path) -> Iterator[None]:
 def is_folder(folder: Path) -> bool:
     """Whether it is a folder itself, and no link to one."""
     return folder.is_dir() and not folder.is_symlink()
-
-
-def remove_described(place: Path) -> None:
-    """Remove what is known before a run, and its logs, from a directory without a result.
-
-    Raises:
-        OSError: Something cannot be removed.
-    """
-    for file in files_of(place):
-        if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == place / LOGS:
-            file.unlink()
-    if files_of(place) == [place / FILES]:
-        (place / FILES).unlink()
-    if is_folder(place / LOGS):
-        with contextlib.suppress(OSError):  # it holds files of somebody else
-            (place / LOGS).rmdir()
 
 
 def place_of(command: str, path: str | Path | None) -> Path:

@@ -70,7 +70,9 @@ def simulate(
         time_limit = checks.real("time_limit", time_limit, "s", above=0.0)
     control = ControlParams() if control is None else control
     checks.instance("control", control, ControlParams)
-    log = None if log is None else _log(log)
+    log = None if log is None else checks.path("log", log)
+    if log is not None and log.suffix != ".mcap":
+        raise ConfigError(f"log: expected a name with .mcap, found {log}")
     config = from_values(TrialConfig, settings)
     try:
         require_own_curves(config.robot, control)
@@ -114,14 +116,6 @@ def simulate(
             "outcome": walk.outcome,
         }
     )
-
-
-def _log(given: str | Path) -> Path:
-    """The path of the log that is asked for."""
-    log = checks.path("log", given)
-    if log.suffix != ".mcap":
-        raise ConfigError(f"log: expected a name with .mcap, found {log}")
-    return log
 
 
 class _Walk:

@@ -72,10 +72,6 @@ def no_failure(place: int, failure: Failure) -> None:
     """Take a failure where there cannot be one."""
 
 
-def _unseen(model: str) -> None:
-    """Keep no model of a processor."""
-
-
 @dataclass(frozen=True)
 class Work:
     """Tasks of one kind.
@@ -101,7 +97,7 @@ class Work:
     folder: Path | None = None
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
-    saw: Callable[[str], None] = _unseen
+    saw: Callable[[str], None] = lambda model: None
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""
@@ -125,11 +121,10 @@ class Part:
         """
         left = dict(self.tasks)
         emit_error: Exception | None = None
-        process, back = os.getpid(), _way_back()
+        back = _way_back()
 
         def take(place: int, result: Any) -> None:
             nonlocal emit_error
-            _end_forked(process)
             try:
                 emit(place, result)
             except Exception as error:
@@ -150,7 +145,6 @@ class Part:
                 else:
                     take(now[0], self.function(*self.tasks[now[0]]))
             except Exception as error:  # noqa: BLE001  (a trial may raise anything)
-                _end_forked(process)
                 if emit_error is not None:
                     raise emit_error from None
                 known = isinstance(error, LogError | WorkerError)
@@ -177,12 +171,6 @@ def _way_back() -> Callable[[], None]:
             os.chdir(folder)
 
     return back
-
-
-def _end_forked(process: int) -> None:
-    """End the copy of a worker that a user's function has forked, and that came back from it."""
-    if os.getpid() != process:
-        os._exit(0)
 
 
 class Engine(Protocol):

@@ -36,9 +36,6 @@ LIBRARY = "antennate "
 """How the program is named that writes the logs of antennate, before its version."""
 RECOVERED = "-recovered"
 """What follows the name of a log that was recovered."""
-_OLD = re.compile(rb"\x00.[\x01-\x09]\x01", re.S)
-"""How a log from before MCAP begins: its schema and the kind of its first record."""
-_OLD_VERSION = re.compile(rb'"version": "([\w.+-]{1,30})"')
 
 
 @lru_cache
@@ -156,21 +153,6 @@ def _checked(content: bytes | Mapping[str, Any]) -> Header:
         return read(content)  # type: ignore[arg-type]
     except ValidationError as error:
         raise LogError(f"expected a header of a log: {describe(error, Header)}") from None
-
-
-def refuse_old(path: Path, begin: bytes) -> None:
-    """Look whether a file that has no header is a log from before logs were MCAP.
-
-    Raises:
-        LogError: It is.
-    """
-    if _OLD.match(begin):
-        version = _OLD_VERSION.search(begin)
-        by = version[1].decode() if version else "of an unknown version"
-        raise LogError(
-            f"{path}: expected an MCAP file, found a log of antennate {by} from before logs were "
-            "MCAP; read it with the antennate that wrote it"
-        )
 
 
 def log_name(name: str) -> str:

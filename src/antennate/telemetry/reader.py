@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from antennate import __version__
 from antennate.errors import LogError, reason
 from antennate.files import lock, open_regular, replacing
-from antennate.telemetry.header import Header, parts, refuse_old
+from antennate.telemetry.header import Header, parts
 from antennate.telemetry.survey import Record, Survey, by_summary, tick_by_tick
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import (
@@ -293,8 +293,6 @@ class LogReader:
                 return Header.of_messages(self._first)
             except LogError as error:
                 raise LogError(f"{self.path}: {error}") from None
-        self._file.seek(0)
-        refuse_old(self.path, self._file.read(1 << 16))
         ticks = sum(1 for _ in self)
         content = f"no intact header, {ticks} intact ticks; damaged places: {self.bad}"
         if self.bad:

@@ -8,13 +8,12 @@ threads run.
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -37,7 +36,6 @@ from antennate.telemetry.topics import (
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Floats, JointCommand
 
-Taken = TypeVar("Taken")
 HEAD = 9
 """Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
 Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
@@ -55,7 +53,7 @@ _PATIENCE = 0.15
 """Longest that a tick waits for others [s]; where there are many logs, for their thread too."""
 
 
-class RowLog(Generic[Taken]):
+class RowLog:
     """One file, new; as a context it closes itself.
 
     Args:
@@ -70,17 +68,16 @@ class RowLog(Generic[Taken]):
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Taken]], Rows]) -> None:
+    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Any]], Rows]) -> None:
         self.path, self._rows = path, rows
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._angles = len(header.robot.joint_names)
         self._forms = _forms(header.robot.joint_names)
-        self._held: list[Taken] = []
+        self._held: list[Any] = []
         self._since = math.inf
         self._writing: Future[None] | None = None
-        self._process = os.getpid()
 
-    def add(self, tick: Taken) -> None:
+    def add(self, tick: Any) -> None:
         """Keep one tick.
 
         Raises:
@@ -93,14 +90,14 @@ class RowLog(Generic[Taken]):
         if len(self._held) == _MOST or now - self._since >= _PATIENCE:
             self._begin()
 
-    def write(self, ticks: Sequence[Taken]) -> None:
+    def write(self, ticks: Sequence[Any]) -> None:
         """Write ticks at once, in this thread, after those that were added.
 
         Raises:
             LogError: The disk is full or gone.
         """
         self.flush()
-        if ticks and not self._forked:
+        if ticks:
             self._write(ticks)
 
     def settle(self) -> None:
@@ -112,8 +109,7 @@ class RowLog(Generic[Taken]):
         if time.monotonic() - self._since >= _PATIENCE:
             self.flush()
         self._wait()
-        if not self._forked:
-            self._out.settle()
+        self._out.settle()
 
     def event(self, text: str, t: float = 0.0) -> None:
         """Keep what happened after the last tick, at a time of the loop [s].
@@ -136,8 +132,7 @@ class RowLog(Generic[Taken]):
             self.flush()  # the thread works on: the file is closed behind it
             raise
         finally:
-            if not self._forked:
-                self._out.close()
+            self._out.close()
 
     def __enter__(self) -> Self:
         return self
@@ -158,17 +153,12 @@ class RowLog(Generic[Taken]):
         """Let the thread write what is held, once it has written what was held before."""
         self._wait()
         ticks, self._held, self._since = self._held, [], math.inf
-        if ticks and not self._forked:
+        if ticks:
             self._writing = _encoder().submit(self._write, ticks)
-
-    @property
-    def _forked(self) -> bool:
-        """Whether this is a copy in another process: the file is not its own, and has no thread."""
-        return os.getpid() != self._process
 
     def _wait(self) -> None:
         """Wait until the thread has written."""
-        if self._writing is not None and not self._forked:
+        if self._writing is not None:
             try:
                 self._writing.result()
             except Exception:
@@ -176,7 +166,7 @@ class RowLog(Generic[Taken]):
                 raise
         self._writing = None
 
-    def _write(self, ticks: Sequence[Taken]) -> None:
+    def _write(self, ticks: Sequence[Any]) -> None:
         """Encode ticks, and hand them to the operating system."""
         count, (rows, beside) = len(ticks), self._rows(ticks)
         size = sum(len(data) for messages in beside.values() for data in messages.values())
@@ -217,9 +207,6 @@ class RowLog(Generic[Taken]):
 def _encoder() -> ThreadPoolExecutor:
     """The thread of all logs of this process."""
     return ThreadPoolExecutor(1, "logs")
-
-
-os.register_at_fork(after_in_child=_encoder.cache_clear)
 
 
 def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
@@ -314,30 +301,46 @@ class TakenTick(NamedTuple):
     contacts: Contacts | None
 
 
-class TickRows:
-    """Takes the ticks of one simulated robot, and makes the rows and messages of its log of them.
+class SimulatedLog(RowLog):
+    """The log of one simulated robot, tick by tick; as a context it closes itself.
 
     Args:
+        path: A file that does not exist yet.
+        header: What stands at its beginning.
         world: The robot in its scene.
         decisions: What is decided for it.
         row: Its row there.
+
+    Raises:
+        LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, world: World, decisions: Decisions, row: int = 0) -> None:
+    def __init__(
+        self, path: Path, header: Header, world: World, decisions: Decisions, row: int = 0
+    ) -> None:
+        super().__init__(path, header, self._rows_of)
         self._world, self._decisions, self._row = world, decisions, row
-        self._angles, self._ticks = len(world.robot.joint_names), 0
+        self._ticks = 0
         values = world.root, (0.0,) * world.model.nq
         self._form = Form(COORDINATES.type, values, ("position",))
 
-    def take(self, decided: bytes) -> TakenTick:
-        """One tick, of which `Decisions` says this."""
+    def take(self, decided: bytes) -> None:
+        """Keep one tick, of which `Decisions` says this.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        self.add(self.tick(decided))
+
+    def tick(self, decided: bytes) -> TakenTick:
+        """One tick, of which `Decisions` says this, for `add` or `write`."""
         self._ticks += 1
         look = (self._ticks - 1) % LOOK_EVERY == 0
         world = self._world
         return TakenTick(decided, world.snapshot(), Contacts.of(world.data) if look else None)
 
-    def rows(self, ticks: Sequence[TakenTick]) -> Rows:
-        """What `RowLog` writes of some ticks; many at once take hardly longer than one."""
+    def _rows_of(self, ticks: Sequence[TakenTick]) -> Rows:
+        """What is written of some ticks; many at once take hardly longer than one."""
         rows = np.empty((len(ticks), HEAD + 4 * self._angles))
         end = HEAD + self._angles
         self._decisions.rows([tick.decided for tick in ticks], self._row, rows[:, :end])
@@ -366,32 +369,3 @@ class TickRows:
                 message[CONTACT_FORCES] = encode(*(column[begin:end] for column in columns))
             begin = end
         return messages
-
-
-class SimulatedLog(RowLog[TakenTick]):
-    """The log of one simulated robot, tick by tick; as a context it closes itself.
-
-    Args:
-        path: A file that does not exist yet.
-        header: What stands at its beginning.
-        world: The robot in its scene.
-        decisions: What is decided for it.
-        row: Its row there.
-
-    Raises:
-        LogError: The file exists or cannot be written, or the disk is nearly full.
-    """
-
-    def __init__(
-        self, path: Path, header: Header, world: World, decisions: Decisions, row: int = 0
-    ) -> None:
-        self._ticks = TickRows(world, decisions, row)
-        super().__init__(path, header, self._ticks.rows)
-
-    def take(self, decided: bytes) -> None:
-        """Keep one tick, of which `Decisions` says this.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
-        self.add(self._ticks.take(decided))

@@ -1,54 +1,26 @@
 """The time series of one trial: what was read, decided and commanded at each control tick.
 
-A file is `.npz`, NumPy's zip of arrays (never pickled objects), and gives back every bit of every
-number; `to_dataframe` makes a table for other programs.
+`columns` and `to_dataframe` make a table for other programs.
 """
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
-from antennate import checks
 from antennate.errors import BadInputError
-from antennate.files import read_limited, write_whole
-from antennate.messages import shortened, shown
+from antennate.messages import shortened
 from antennate.notebook import from_columns, html
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
-FORMAT = "antennate time series 1"
-_LARGEST_FILE = 1 << 30
-_ARRAYS: dict[str, tuple[tuple[int | str, ...], type]] = {
-    "t": ((), np.float64),
-    "counts": ((2,), np.float64),
-    "level": ((2,), np.float64),
-    "contact": ((2,), np.int64),
-    "maneuver": ((), np.int64),
-    "yaw": (("Y",), np.float64),
-    "leg": (("L", 2), np.float64),
-    "antenna": (("A",), np.float64),
-    "pitch": (("P",), np.float64),
-    "head": ((2,), np.float64),
-}
-"""Axes after the first, which is time, and type of each array."""
 _ENDS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("counts", "level", "contact", "leg", "antenna"), ("left", "right")),
     "head": ("x", "y"),
 }
 """What the columns of the last axis are called; those of others are numbered, head first."""
-_UNUSABLE = (
-    *(ValueError, KeyError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError),
-    *(zlib.error, zipfile.BadZipFile),
-)
-"""What damaged files make the standard library and NumPy raise."""
 _SHOWN_COLUMNS = (
     *("ticks [%]", "level left", "level right", "contact left [%]", "contact right [%]"),
 )
@@ -70,10 +42,6 @@ class TimeSeries:
         pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
         head: Position of the head in the world [m], shape (n, 2).
         meta: What the series is of, such as controller, robot and seed.
-
-    Raises:
-        BadInputError: An array has another shape or kind of numbers, or `meta` holds what is
-            neither text nor a number nor None.
     """
 
     t: Floats
@@ -87,22 +55,6 @@ class TimeSeries:
     pitch: Floats
     head: Floats
     meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        ticks = len(checks.array("t", self.t, ("n",), "s", finite=False))
-        for name, (sizes, kind) in _ARRAYS.items():
-            values, shape = getattr(self, name), (ticks, *sizes)
-            array = (
-                checks.whole_array(name, values, shape)
-                if kind is np.int64
-                else checks.array(name, values, shape, finite=False)
-            )
-            object.__setattr__(self, name, array)
-        for name, value in checks.mapping("meta", self.meta).items():
-            if not isinstance(value, str | int | float | None):
-                raise BadInputError(
-                    f"meta: {name}: expected text, a number or None, found {shown(value)}"
-                )
 
     def __len__(self) -> int:
         """Number of ticks."""
@@ -153,7 +105,7 @@ class TimeSeries:
         body are numbered, head first: `yaw_0`, `leg_5_right`.
         """
         columns: dict[str, Floats | Ints] = {}
-        for name in _ARRAYS:
+        for name in _NAMES:
             values = getattr(self, name)
             for index in np.ndindex(values.shape[1:]):
                 words = [name, *map(str, index)]
@@ -170,51 +122,21 @@ class TimeSeries:
         """
         return from_columns(self.columns())
 
-    def save(self, path: str | Path, overwrite: bool = False) -> None:
-        """Write the series to a file that ends in `.npz`.
 
-        Raises:
-            BadInputError: The path is none, or the file has another ending.
-            OutputError: There is such a file and it may not be replaced, or it cannot be written.
-        """
-        path = checks.path("path", path)
-        _require_npz(path)
-        file = io.BytesIO()
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        head = json.dumps({"format": FORMAT, "meta": dict(self.meta)})
-        np.savez_compressed(file, allow_pickle=False, header=np.array(head), **arrays)
-        write_whole(path, file.getvalue(), overwrite)
-
-    @classmethod
-    def load(cls, path: str | Path) -> TimeSeries:
-        """Read a file that `save` wrote.
-
-        Raises:
-            BadInputError: The path is none, or the file cannot be read or is not a whole time
-                series.
-        """
-        path = checks.path("path", path)
-        _require_npz(path)
-        data = read_limited(path, _LARGEST_FILE)
-        try:
-            return _from_npz(data)
-        except _UNUSABLE as error:
-            why = " ".join(str(error).split())
-            raise BadInputError(f"{path}: expected an {FORMAT}, found {why}") from None
+_NAMES = tuple(each.name for each in fields(TimeSeries) if each.name != "meta")
 
 
 class TimeSeriesRecorder:
-    """Collects one row of a batch, tick by tick.
+    """Collects the ticks of one robot.
 
     Args:
         controller: What decides: its `level`, `contact` and `maneuver` are read after each step.
         head: Gives the position of the robot's head [m], shape (2,).
-        row: Row of the batch.
     """
 
-    def __init__(self, controller: Any, head: Callable[[], Floats], row: int = 0) -> None:
-        self._controller, self._head, self._row = controller, head, row
-        self._ticks: dict[str, list[Any]] = {name: [] for name in _ARRAYS}
+    def __init__(self, controller: Any, head: Callable[[], Floats]) -> None:
+        self._controller, self._head = controller, head
+        self._ticks: dict[str, list[Any]] = {name: [] for name in _NAMES}
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> None:
         """Keep one tick."""
@@ -225,7 +147,7 @@ class TimeSeriesRecorder:
         ):
             for name in names:
                 batch = getattr(source, name)
-                values = batch[self._row] if batch.size else ()  # pitch may have no joints
+                values = batch[0] if batch.size else ()  # pitch may have no joints
                 self._ticks[name].append(np.array(values))
         self._ticks["head"].append(np.array(self._head()))
 
@@ -237,36 +159,5 @@ class TimeSeriesRecorder:
         """
         if not self._ticks["t"]:
             raise BadInputError("time series: expected at least one tick, found none")
-        arrays: dict[str, Any] = {
-            name: np.array(values, dtype=_ARRAYS[name][1]) for name, values in self._ticks.items()
-        }
+        arrays: dict[str, Any] = {name: np.array(values) for name, values in self._ticks.items()}
         return TimeSeries(**arrays, meta=dict(meta))
-
-
-def _require_npz(path: Path) -> None:
-    if path.suffix != ".npz":
-        raise BadInputError(f"{path}: expected a name that ends in .npz")
-
-
-def _meta(text: str) -> dict[str, Any]:
-    head = json.loads(text)
-    if not isinstance(head, dict) or head.get("format") != FORMAT:
-        raise ValueError("another format")
-    meta = head.get("meta")
-    if not isinstance(meta, dict):
-        raise ValueError("no meta data")
-    return meta
-
-
-def _from_npz(data: bytes) -> TimeSeries:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(member.file_size for member in archive.infolist())
-        if size > _LARGEST_FILE:
-            raise ValueError(f"{size} bytes unpacked, more than {_LARGEST_FILE}")
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name: file[name] for name in _ARRAYS}
-        meta = _meta(str(file["header"]))
-    for name, values in arrays.items():
-        if values.dtype != (wanted := np.dtype(_ARRAYS[name][1])):
-            raise ValueError(f"{name} of type {values.dtype} in place of {wanted}")
-    return TimeSeries(**arrays, meta=meta)

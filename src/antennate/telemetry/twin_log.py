@@ -18,7 +18,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Generic, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
 from antennate.telemetry.header import TWIN, Header
-from antennate.telemetry.simulated import Decisions, RowLog, Taken, TakenTick, TickRows
+from antennate.telemetry.simulated import Decisions, RowLog, SimulatedLog
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Contact
@@ -46,7 +46,7 @@ class _Event(NamedTuple):
     t: float
 
 
-class LogQueue(Generic[Taken]):
+class LogQueue:
     """The queue and its thread; as a context it closes the log.
 
     Args:
@@ -60,16 +60,14 @@ class LogQueue(Generic[Taken]):
         failure: Why it cannot be written any more; empty while it can.
     """
 
-    def __init__(
-        self, log: RowLog[Taken], on_failure: Callable[[str], None] = lambda _: None
-    ) -> None:
+    def __init__(self, log: RowLog, on_failure: Callable[[str], None] = lambda _: None) -> None:
         self.path, self.dropped, self.failure = log.path, 0, ""
         self._log, self._on_failure = log, on_failure
-        self._queue, self._over = deque[Taken | _Event](), threading.Event()
+        self._queue, self._over = deque[Any](), threading.Event()
         self._thread = threading.Thread(target=self._write_all, name="log", daemon=True)
         self._thread.start()
 
-    def add(self, tick: Taken) -> None:
+    def add(self, tick: Any) -> None:
         """Hand over one tick; it is dropped if there is no room."""
         self._hand_over(tick)
 
@@ -92,7 +90,7 @@ class LogQueue(Generic[Taken]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _hand_over(self, content: Taken | _Event) -> None:
+    def _hand_over(self, content: Any) -> None:
         if self.failure:
             return
         if len(self._queue) >= _MOST:
@@ -114,7 +112,7 @@ class LogQueue(Generic[Taken]):
 
     def _write(self) -> None:
         """Write what waits."""
-        ticks: list[Taken] = []
+        ticks: list[Any] = []
         for _ in range(len(self._queue)):
             content = self._queue.popleft()
             if isinstance(content, _Event):
@@ -138,7 +136,7 @@ class _Unknown:
     maneuver = np.array([UNKNOWN_MANEUVER])
 
 
-class TwinLog(LogQueue[TakenTick]):
+class TwinLog(LogQueue):
     """The log of a twin: its ticks while the physics runs.
 
     Args:
@@ -161,14 +159,15 @@ class TwinLog(LogQueue[TakenTick]):
         on_failure: Callable[[str], None],
     ) -> None:
         self._robot, self._decisions = robot, Decisions(config.robot, _Unknown())
-        self._rows = TickRows(robot.world, self._decisions)
-        super().__init__(RowLog(path, _header(config, start), self._rows.rows), on_failure)
+        header = _header(config, start)
+        self._ticks = SimulatedLog(path, header, robot.world, self._decisions)
+        super().__init__(self._ticks, on_failure)
 
     def take(self, world: World) -> None:
         """Keep a tick, its time that of the twin."""
         robot = self._robot
         frame = AntennaFrame(t=np.array([robot.t]), counts=robot.counts[None])
-        self.add(self._rows.take(self._decisions.take(frame, robot.command)))
+        self.add(self._ticks.tick(self._decisions.take(frame, robot.command)))
 
 
 def _header(config: TwinConfig, start: int) -> Header:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -23,7 +22,7 @@ from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError, ConfigError
-from antennate.experiments.bench import mean_since
+from antennate.experiments.bench import bench_films, mean_since
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
@@ -38,7 +37,7 @@ from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
 
 if TYPE_CHECKING:
-    from antennate.telemetry.film import Film
+    pass
 
 _BETTER = 0.2
 """How much more of the level each direction alone explains where hysteresis is asked about."""
@@ -238,26 +237,21 @@ def record(
     return replace(whole, sha256=hashlib.sha256(write(whole).encode()).hexdigest())
 
 
-def films(config: CalibrateConfig, trial: int) -> dict[str, Callable[[], Film]]:
-    """A film of the first push at each speed, in slow motion.
-
-    Raises:
-        ConfigError: There is a recording, and so no rig.
-    """
+def _filmed(config: CalibrateConfig) -> list[str]:
+    """The speeds of which there are films, by name."""
     if config.recording is not None:
         raise ConfigError("video: expected the rig, which alone can be filmed, found a recording")
-    speeds = enumerate(config.rig.speeds)
-    return {f"{speed:g} m_s": functools.partial(_film, config, i) for i, speed in speeds}
+    return [f"{speed:g} m_s" for speed in config.rig.speeds]
 
 
-def _film(config: CalibrateConfig, which: int) -> Film:
-    """A film of a push at one of the speeds."""
-    from antennate.experiments.bench import BenchRecorder  # slow to import
+def _film(config: CalibrateConfig, name: str, trial: int, watch: Watch) -> str:
+    """The first push at a speed, for its film; the title."""
+    push(config, _filmed(config).index(name) * config.rig.pushes, watch)
+    return f"{name.replace('_', '/')}, {1 / _FILM_SPEED:g} times slower"
 
-    recorder = BenchRecorder(config.antenna, _FILM_SPEED)
-    push(config, which * config.rig.pushes, recorder.watch)
-    speed = config.rig.speeds[which]
-    return recorder.film(f"{speed:g} m/s, {1 / _FILM_SPEED:g} times slower", "rod")
+
+films = bench_films(_filmed, _film, "rod", _FILM_SPEED)
+"""A film of the first push at each speed, in slow motion."""
 
 
 def averaged(recording: Recording, averaging_time: float) -> Recording:

@@ -157,28 +157,7 @@ def figures(outcome: ServoOutcome) -> dict[str, Figure]:
         _draw_course(panel, outcome, i, traces[:, :, i])
     panels[-1].set_xlabel("time [s]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    return {"servo": figure, "recordings": _draw_errors(outcome)}
-
-
-@style.styled
-def _draw_errors(outcome: ServoOutcome) -> Figure:
-    """The error of each recording: over all, while the shaft stalls, and else."""
-    rows = outcome.rows
-    figure = style.canvas(style.WIDTH, 1.2 + 0.3 * len(rows))
-    panel, places = figure.subplots(), np.arange(len(rows))
-    panel.barh(places, [row.error_deg for row in rows], color=style.FAINT, label="all of its time")
-    for name, colour, label in (
-        ("error_else_deg", style.SERIES[0], "without stalls"),
-        ("error_stalled_deg", style.SERIES[4], "while it stalls"),
-    ):
-        panel.plot([getattr(row, name) for row in rows], places, "o", color=colour, label=label)
-    panel.set_yticks(places, [f"{row.name}, gain {row.p_gain:g}" for row in rows])
-    panel.invert_yaxis()
-    panel.set_xlim(left=0.0)
-    panel.set_xlabel("mean error [deg]")
-    panel.grid(visible=False, axis="y")
-    figure.legend(*panel.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+    return {"servo": figure}
 
 
 def _draw_course(panel: Axes, outcome: ServoOutcome, place: int, traces: Floats) -> None:
@@ -216,7 +195,6 @@ EXPERIMENT = Experiment.of_folder(
     captions={
         "servo": "Goals and measured positions of each recording, with those of two models; "
         "shaded: full drive while the shaft rests.",
-        "recordings": "Mean error of each recording with the last model, while it stalls and else.",
     },
     explained="docs/results.md",
     on_workers=False,

@@ -17,17 +17,6 @@ import numpy as np
 from antennate.dxl.model import FULL_DRIVE
 from antennate.errors import BadInputError
 from antennate.experiments.servo import drive_log, fitting
-from antennate.experiments.servo.fitting import (
-    EVERY,
-    Data,
-    Held,
-    Model,
-    data_of,
-    measured_divisor,
-    models,
-    splits,
-    with_divisor,
-)
 from antennate.experiments.servo.recording import (
     GRAVITY,
     SLOW,
@@ -106,11 +95,11 @@ class ServoOutcome:
 
     config: ServoConfig
     recordings: list[Recording]
-    data: Data
-    models: list[Model]
+    data: fitting.Data
+    models: list[fitting.Model]
     fitted: Floats
     errors: Floats
-    held: list[Held]
+    held: list[fitting.Held]
     held_errors: Floats
     interval: Floats
     rows: list[RecordingRow]
@@ -137,7 +126,7 @@ class ServoOutcome:
             "models": [self._model(i, model) for i, model in enumerate(self.models)],
         }
 
-    def _model(self, i: int, model: Model) -> dict[str, Any]:
+    def _model(self, i: int, model: fitting.Model) -> dict[str, Any]:
         """What result.json says of a model."""
         ends = dict(zip(MODEL_NUMBERS, np.moveaxis(self.interval[i], 1, 0), strict=True))
         names = [name for name, _ in self.held]
@@ -193,17 +182,19 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     if config.supply is not None and all(np.isfinite(r.supply).all() for r in recordings):
         raise BadInputError("--supply: expected a recording that tells none, found that all do")
     recordings = [_supplied(recording, config) for recording in recordings]
-    data = data_of(recordings, config.given.voltage, config.inertia)
+    data = fitting.data_of(recordings, config.given.voltage, config.inertia)
     parts, loaded = data.parts(), any(r.mass * r.length > 0 for r in recordings)
-    rows = models(config, measured_divisor(recordings), loaded)
-    held = splits(recordings, parts) if config.fit else []
+    rows = fitting.models(config, fitting.measured_divisor(recordings), loaded)
+    held = fitting.splits(recordings, parts) if config.fit else []
     seen = [parts, *(parts & ~out for _, out in held)]
     total = len(seen) + bool(held)
     fits: list[Floats] = []
     for done, part in enumerate(seen):
         on_step(done, total)
-        divisor = measured_divisor([recordings[i] for i in np.flatnonzero(part.any(axis=1))])
-        fits.append(_fitted(data, [with_divisor(row, divisor) for row in rows], part))
+        divisor = fitting.measured_divisor(
+            [recordings[i] for i in np.flatnonzero(part.any(axis=1))]
+        )
+        fits.append(_fitted(data, [fitting.with_divisor(row, divisor) for row in rows], part))
     interval = np.full((len(rows), 2, len(MODEL_NUMBERS)), np.nan)
     if config.fit:
         on_step(len(seen), total)
@@ -216,7 +207,7 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     ]
     errors = fitting.errors(data, fits[0], _same(parts, len(rows)))
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
-    replayed = servos.replay(fits[0][-1:], data.course, EVERY)[:, 0]
+    replayed = servos.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
     return ServoOutcome(
         *(config, recordings, data, rows, fits[0], errors, held, held_errors, interval),
         rows=_recording_rows(recordings, data, replayed),
@@ -255,7 +246,7 @@ def _same(parts: Bools, count: int) -> Floats:
     return np.repeat(parts[None].astype(float), count, axis=0)
 
 
-def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
+def _fitted(data: fitting.Data, rows: list[fitting.Model], parts: Bools) -> Floats:
     """Parameters of all models from some pieces; those without free ones as they were."""
     start, free = np.array([row.values for row in rows]), np.array([row.mask for row in rows])
     values = start.copy()
@@ -265,7 +256,9 @@ def _fitted(data: Data, rows: list[Model], parts: Bools) -> Floats:
     return values
 
 
-def _intervals(recordings: list[Recording], data: Data, best: Floats, rows: list[Model]) -> Floats:
+def _intervals(
+    recordings: list[Recording], data: fitting.Data, best: Floats, rows: list[fitting.Model]
+) -> Floats:
     """Ends of the 95 % intervals, shape (M, 2, 6); NaN for what is not fitted."""
     weights = fitting.left_out(data.parts(), _by_file(recordings))
     mask = np.array([row.mask for row in rows])
@@ -278,7 +271,7 @@ def _intervals(recordings: list[Recording], data: Data, best: Floats, rows: list
 
 
 def _recording_rows(
-    recordings: list[Recording], data: Data, positions: Floats
+    recordings: list[Recording], data: fitting.Data, positions: Floats
 ) -> list[RecordingRow]:
     """A row for each recording.
 
@@ -287,15 +280,15 @@ def _recording_rows(
         data: The same on one grid of times.
         positions: What the model gives at every `EVERY`-th of them [rad], shape (S, F).
     """
-    away = np.degrees(abs(positions - data.course.position[::EVERY]))
-    counts = (data.known & data.course.torque)[::EVERY]
+    away = np.degrees(abs(positions - data.course.position[:: fitting.EVERY]))
+    counts = (data.known & data.course.torque)[:: fitting.EVERY]
     lifted = 0.0  # largest torque of a weight that was held at rest with drive to spare
     for recording in recordings:
         spare = abs(recording.drive) < _BELOW * FULL_DRIVE
         held = recording.torque & spare & _rests(recording)
         lifted = max(lifted, float(abs(_weight(recording))[held].max(initial=0.0)))
     return [
-        _row(recording, away[:, i], counts[:, i], lifted, STEP * EVERY)
+        _row(recording, away[:, i], counts[:, i], lifted, STEP * fitting.EVERY)
         for i, recording in enumerate(recordings)
     ]
 

@@ -66,6 +66,7 @@ class SpringsOutcome(Outcome):
             "stiffness_n_m_per_rad": k,
             "paper_n_mm_per_deg": printed,
             "paper_exact_n_mm_per_deg": None if printed is None else 3 * PAPER_TABLE[3.0] / coils,
+            "angle_deg": config.angle_deg,
             "torque_at_angle_n_mm": 1e3 * k * math.radians(config.angle_deg),
             "yield_angle_deg": math.degrees(springs.yield_angle(config, wire, coil, coils)),
         }
@@ -113,7 +114,8 @@ SPRING = (
     Measure("stiffness_n_mm_per_deg", "stiffness", "N·mm/deg", form=".4f"),
     Measure("paper_n_mm_per_deg", "  the paper prints", form=".3f"),
     Measure("stiffness_n_m_per_rad", "stiffness", "N·m/rad", form=".5f"),
-    Measure("torque_at_angle_n_mm", "torque at the angle", "N·mm"),
+    Measure("angle_deg", "angle to bear", "deg", form="g"),
+    Measure("torque_at_angle_n_mm", "  torque at it", "N·mm"),
     Measure("yield_angle_deg", "yields at", "deg", form=".0f"),
 )
 WINDING = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from enum import Enum
@@ -16,14 +17,12 @@ from antennate import experiments
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import SUCCESS
-from antennate.files import in_units
 from antennate.lookup import Registry
 from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
-from antennate.studies.formats import dumped
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
 
@@ -41,8 +40,6 @@ FUNCTIONS: Registry[Callable[..., Any]] = Registry("trial function", "antennate.
 """Functions trial(config, seed) -> row: config holds the parameters by name, seed is a number."""
 OF_STUDY = ("point", "trial", "seed", "status", "reason")
 """Columns that a study fills itself."""
-LARGEST_ROW = 1_000_000
-"""Most bytes of a row as JSON: a million rows of a hundred numbers have 2 kB each (assumed)."""
 EmitRows = Callable[[int, Rows], None]
 
 
@@ -297,8 +294,7 @@ def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
         taken: Names of what varies, which are columns of the study as well.
 
     Raises:
-        BadInputError: It is something else, too large, or has a column or a value that cannot be
-            kept.
+        BadInputError: It is something else, or has a column or a value that cannot be kept.
     """
     if is_dataclass(result) and not isinstance(result, type):
         result = asdict(result)
@@ -314,64 +310,27 @@ def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
             raise BadInputError(
                 f"column {shortened(name)}: expected another name, as the study has this column"
             )
-        where = "the name of a column"
         try:
-            key, where = _text(name), f"column {shortened(name)}"
-            row[key] = _json(value)
+            text = json.dumps({name: value}, default=_as_json, ensure_ascii=False)
+            row |= json.loads(text.encode(), parse_int=_whole)
         except ValueError as error:
-            raise BadInputError(f"{where}: {error}") from None
-    if (size := len(dumped(row))) > LARGEST_ROW:
-        raise BadInputError(
-            f"expected a row of at most {in_units(LARGEST_ROW)} as JSON, found {in_units(size)}"
-        )
+            raise BadInputError(f"column {shortened(name)}: {error}") from None
     return row
 
 
-def _json(value: Any) -> Any:
-    """A value as JSON has it; a ValueError says what was expected of it."""
+def _as_json(value: Any) -> Any:
+    """What JSON can hold of a value that it does not know."""
     match value:
         case Enum():
-            return _json(value.value)
-        case None | bool():
-            return value
-        case np.bool_():
-            return bool(value)
-        case int() | np.integer():
-            return _whole(int(value))
-        case float() | np.floating():
-            return float(value)
-        case str():
-            return _text(value)
-        case np.ndarray():
-            return _json(value.tolist())
-        case list() | tuple():
-            return [_json(item) for item in value]
+            return value.value
+        case np.ndarray() | np.generic():
+            return value.tolist()
         case Mapping():
-            return {_key(key): _json(item) for key, item in value.items()}
+            return dict(value)
     kind = type(value).__name__  # its own text may be long, or raise
     raise ValueError(f"expected numbers or text, found an object of type {kind}")
 
 
-def _key(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"expected keys as text, found {type(value).__name__}")
-    return _text(value)
-
-
-def _whole(value: int) -> int:
-    try:
-        float(value)
-    except OverflowError:
-        bits = value.bit_length()
-        raise ValueError(
-            f"expected a number below 1.8e308, found a whole number of {bits} bits"
-        ) from None
-    return value
-
-
-def _text(value: str) -> str:
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValueError(f"expected Unicode text, found {value[:40]!a}") from None
-    return str(value)
+def _whole(digits: str) -> int | float:
+    """A whole number; infinity where no float is so large."""
+    return int(digits) if math.isfinite(float(digits)) else float(digits)

@@ -17,17 +17,6 @@ from antennate.errors import BadInputError
 from antennate.experiments.tracks import measures, synthetic
 from antennate.experiments.tracks.cleaning import COUNTED, Antennae, clean
 from antennate.experiments.tracks.config import TracksConfig
-from antennate.experiments.tracks.measures import (
-    FREE,
-    NAMES,
-    NEAR,
-    SHAPES,
-    UNKNOWN,
-    Antenna,
-    Wall,
-    require_inside,
-    wall_of,
-)
 from antennate.experiments.tracks.readers import read
 from antennate.experiments.tracks.track import Track
 from antennate.messages import shortened
@@ -112,8 +101,8 @@ class TracksOutcome:
 
     config: TracksConfig
     rows: list[TrackRow] = field(default_factory=list[TrackRow])
-    antennae: list[Antenna] = field(default_factory=list[Antenna])
-    walls: dict[str, Wall] = field(default_factory=dict[str, Wall])
+    antennae: list[measures.Antenna] = field(default_factory=list[measures.Antenna])
+    walls: dict[str, measures.Wall] = field(default_factory=dict[str, measures.Wall])
     skipped: int = 0
     unseen: list[Unseen] = field(default_factory=list["Unseen"])
     files: dict[bytes, str] = field(default_factory=dict[bytes, str])
@@ -207,7 +196,7 @@ class TracksOutcome:
         joined = np.concatenate([np.zeros(0), *near])
         if self.walls[name].kind not in ("line", "circle") or not len(joined):
             return {"nearest": None, "beyond": None}
-        beyond = (joined < -NEAR).mean()
+        beyond = (joined < -measures.NEAR).mean()
         return {"nearest": float(joined.min()), "beyond": float(beyond)}
 
     def frames_csv(self) -> str:
@@ -226,7 +215,9 @@ class TracksOutcome:
             for i, (numbers, shape) in enumerate(rows):
                 cells = ["" if math.isnan(v) else v for v in numbers[: 2 + inner]]
                 time = f"{i / antenna.rate:.6f}"
-                writer.writerow([antenna.trial, antenna.side, i, time, *cells, NAMES[shape]])
+                writer.writerow(
+                    [antenna.trial, antenna.side, i, time, *cells, measures.NAMES[shape]]
+                )
         return file.getvalue()
 
 
@@ -272,15 +263,15 @@ def run(
     return outcome
 
 
-def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> Wall:
+def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> measures.Wall:
     """The wall of a file, from its animals."""
     if not animals:
-        return Wall("none")
+        return measures.Wall("none")
     places = [antenna for animal in animals for antenna in animal.places.values()]
     lengths = [measures.length_of(side) for animal in animals for side in animal.sides.values()]
     usual, file = float(np.nanmedian(lengths)), animals[0].track.file
-    wall = wall_of(config.wall, file, np.concatenate([p[:, -1] for p in places]), usual)
-    require_inside(file, wall, np.concatenate([p[:, 0] for p in places]))
+    wall = measures.wall_of(config.wall, file, np.concatenate([p[:, -1] for p in places]), usual)
+    measures.require_inside(file, wall, np.concatenate([p[:, 0] for p in places]))
     return wall
 
 
@@ -314,14 +305,16 @@ def frame_rate(config: TracksConfig, track: Track) -> float:
     return config.rate or stated
 
 
-def _row(config: TracksConfig, animal: Antennae, antenna: Antenna, truth: Ints | None) -> TrackRow:
+def _row(
+    config: TracksConfig, animal: Antennae, antenna: measures.Antenna, truth: Ints | None
+) -> TrackRow:
     shape = measures.shapes_of(config.criteria, antenna)
     contact, angles = shape >= 0, antenna.outline
     direction, flex = (
         float(np.median(values[contact])) if contact.any() else None
         for values in (angles.direction, angles.flex)
     )
-    shares = zip(SHAPES, measures.shares([shape]).tolist(), strict=True)
+    shares = zip(measures.SHAPES, measures.shares([shape]).tolist(), strict=True)
     return TrackRow(
         seed=config.seed,
         trial=antenna.trial,
@@ -331,8 +324,8 @@ def _row(config: TracksConfig, animal: Antennae, antenna: Antenna, truth: Ints |
         status="contact" if contact.any() else "no_contact",
         rate_hz=antenna.rate,
         frames=animal.frames,
-        unknown=int((shape == UNKNOWN).sum()),
-        free=int((shape == FREE).sum()),
+        unknown=int((shape == measures.UNKNOWN).sum()),
+        free=int((shape == measures.FREE).sum()),
         contact=int(contact.sum()),
         angle_median_rad=direction,
         flex_median_rad=flex,

@@ -227,9 +227,9 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     two_by_two = Table.of(
         "Pairs, trial by trial",
         {
-            f"{short[first]} minus {short[second]}": pairs[f"{first}-{second}"]
+            f"{short[first]} minus {short[second]}": pair
             for first, second in shown_pairs
-            if f"{first}-{second}" in pairs
+            if (pair := _minus(pairs, first, second))
         },
         two,
         "McNemar's test is exact; Wilcoxon's takes failures as the limit, and zeros by Pratt's "
@@ -239,10 +239,28 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _shown_pairs(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Pairs that the table shows: of many, those with the rival; result.json holds all."""
-    pairs = list(combinations(names, 2))
+    """Pairs that the table shows: of many, those with the rival; result.json holds all.
+
+    The second of each, which is subtracted, is the rival, else the one that was named earlier.
+    """
+    pairs = [(b, a) if b != RIVAL else (a, b) for a, b in combinations(names, 2)]
     with_rival = [pair for pair in pairs if RIVAL in pair]
     return with_rival if len(names) > 3 and with_rival else pairs
+
+
+def _minus(pairs: Mapping[str, Any], first: str, second: str) -> Mapping[str, Any] | None:
+    """A comparison with the differences of first minus second; None where there is none."""
+    if pair := pairs.get(f"{first}-{second}"):
+        return pair
+    pair = pairs.get(f"{second}-{first}")
+    if pair is None:
+        return None
+    turned = {**pair, "only_first": pair["only_second"], "only_second": pair["only_first"]}
+    turned["both_time_s"] = (times := pair.get("both_time_s")) and times[::-1]
+    for name, value in pair.items():
+        if "_difference" in name and value is not None:
+            turned[name] = [-end for end in value[::-1]] if name.endswith("_95") else -value
+    return turned
 
 
 def sentence(result: Mapping[str, Any]) -> str:

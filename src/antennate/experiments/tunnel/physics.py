@@ -26,7 +26,7 @@ from antennate.control.readings import (
     condition,
     require_whole_delay,
 )
-from antennate.control.registry import BUILT_IN, CONTROLLERS, USUAL
+from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED, USUAL
 from antennate.errors import SceneError
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
@@ -54,10 +54,10 @@ class TunnelConfig(TrialConfig):
         "1",
         "assumed: without touch, with the published rule and with ours",
         min_length=1,
-        examples=[*BUILT_IN],
+        examples=[*BUILT_IN, *PRIVILEGED],
     )
-    """Controllers to run: open, timed, paper, closed, closed-1, schedule, zigzag, random, map, or
-    MODULE:NAME or FILE.py:NAME of your own."""
+    """Controllers to run: open, timed, paper, closed, closed-1, schedule, zigzag, random, map,
+    MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )

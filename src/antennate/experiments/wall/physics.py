@@ -240,44 +240,6 @@ class Passage:
         ways = {"down": -GRAVITY, "up": GRAVITY, "off": 0.0}
         return 0.0, ways[self.config.wall.gravity]
 
-    def bench(self) -> Bench:
-        """The bench at the trial's start."""
-        model = compile_bench(self.config.physics, self.antenna, self.balls, self.pull)
-        for i, factor in enumerate(self.factors):
-            joint = model.joint(f"antenna/hinge{i}")
-            joint.stiffness *= factor
-        bench = Bench(model, self.antenna)
-        bench.place(0.0, 0.0, self.base)
-        return bench
-
-    def traverse(self, begin: float, motion: chain.Motion) -> Traverse:
-        """What was seen on the way.
-
-        Args:
-            begin: Place of the tip along the wall as the travel began [m].
-            motion: After the commands `kept_commands`.
-        """
-        path = ramp(self.config.wall.travel, self.config.wall.speed)
-        rows, shown_at = kept_commands(len(path)), marks(path)
-        sampled = [row for row, i in enumerate(rows) if i % SAMPLES == 0]
-        shown = [row for row, i in enumerate(rows) if i in shown_at]
-        seen = motion[sampled]
-        return Traverse(
-            np.array(path[::SAMPLES]),
-            seen.joints[:, -1, 1] - begin,
-            seen.touching.astype(float),
-            np.hypot(*seen.force.T),
-            seen.hinges[:, : self.antenna.sensed_hinges].sum(axis=1),
-            seen.hinges,
-            motion[shown].joints - [self.crest, 0.0],
-            from_crest(self.balls, self.crest),
-        )
-
-
-def kept_commands(count: int) -> list[int]:
-    """Commands of a travel of so many after which something is kept: samples, and shapes."""
-    return sorted({*range(0, count, SAMPLES), *marks(range(count))})
-
 
 def draw(config: WallConfig, profile: str, trial: int) -> Passage:
     """Draw a trial of a profile; all profiles meet the same chance."""
@@ -309,7 +271,12 @@ def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatch
 
 def _on_engine(drawn: Passage, watch: Watch) -> Traverse:
     wall, physics = drawn.config.wall, drawn.config.physics
-    bench, base, approach = drawn.bench(), drawn.base, drawn.approach
+    base, approach = drawn.base, drawn.approach
+    model = compile_bench(physics, drawn.antenna, drawn.balls, drawn.pull)
+    for i, factor in enumerate(drawn.factors):
+        model.joint(f"antenna/hinge{i}").stiffness *= factor
+    bench = Bench(model, drawn.antenna)
+    bench.place(0.0, 0.0, base)
     bench.step(round(SETTLE / physics.timestep))
     substeps = round(COMMAND_PERIOD / physics.timestep)
     for x in ramp(approach, wall.speed):
@@ -351,7 +318,17 @@ def _on_chain(drawn: Passage) -> Traverse:
     came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
     along = np.column_stack([np.full_like(path, drawn.approach), path])
     motion = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
-    return drawn.traverse(came[-1:].joints[-1, -1, 1], motion[kept_commands(len(path))])
+    seen, shown = motion[::SAMPLES], motion[sorted(marks(path))]
+    return Traverse(
+        path[::SAMPLES],
+        seen.joints[:, -1, 1] - came[-1:].joints[-1, -1, 1],
+        seen.touching.astype(float),
+        np.hypot(*seen.force.T),
+        seen.hinges[:, : drawn.antenna.sensed_hinges].sum(axis=1),
+        seen.hinges,
+        shown.joints - [drawn.crest, 0.0],
+        from_crest(drawn.balls, drawn.crest),
+    )
 
 
 def spheres(

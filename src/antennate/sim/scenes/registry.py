@@ -16,6 +16,7 @@ from antennate.sim.scenes.geometry import Arm, Room
 from antennate.sim.scenes.mjcf import MjcfScene, require_compiles
 from antennate.sim.scenes.scene import TIME_LIMIT, FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
+from antennate.sim.scenes.wall import WallScene
 
 _CORNER = TunnelParams(turns_deg=(120.0,))
 _U_TURN = TunnelParams(segments=(1.0, 0.8, 1.0), turns_deg=(90.0, 90.0))
@@ -44,6 +45,7 @@ _SHIPPED: dict[str, Callable[[], Scene]] = {
     TUNNEL: TunnelScene,
     "flat": FlatScene,
     CORRIDORS: CorridorsScene,
+    "wall": WallScene,
     **HARD,
 }
 SHIPPED = tuple(_SHIPPED)

@@ -151,7 +151,7 @@ class Tunnel:
         add_floor(spec)
         friction = self.params.cylinder.contact_friction
         for i, (start, end, out) in enumerate(self.pieces()):
-            _add_wall(spec, f"wall{i}", start, end, out, friction)
+            add_wall(spec, f"wall{i}", start, end, out, friction)
         for i, where in enumerate(self.cylinders):
             _add_cylinder(spec, f"cylinder{i}", where, self.params.cylinder)
 
@@ -214,9 +214,10 @@ def _is_free(point: Floats, placed: list[Floats], distance: float) -> bool:
     return all(math.hypot(*(point - other)) >= distance for other in placed)
 
 
-def _add_wall(
+def add_wall(
     spec: mujoco.MjSpec, name: str, start: Floats, end: Floats, out: float, friction: float
 ) -> None:
+    """Add a wall between points [m], shapes (2,), that lies to their left (out 1) or right (-1)."""
     along = end - start
     length = float(np.linalg.norm(along))
     normal = out * np.array([-along[1], along[0]]) / length

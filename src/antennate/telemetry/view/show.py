@@ -10,7 +10,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import viser
@@ -33,6 +33,7 @@ from antennate.telemetry.view.channel import (
     read,
 )
 from antennate.telemetry.view.charts import LABELS, Charts, Map
+from antennate.telemetry.view.foxglove import FoxgloveSink
 from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.view.player import LogScene
 from antennate.telemetry.view.scene import Controls, SceneView
@@ -49,23 +50,7 @@ _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
 
 
-class Display(Protocol):
-    """Shows what comes."""
-
-    def take(self, kind: bytes, content: bytes) -> None:
-        """Take a message."""
-        ...
-
-    def draw(self, now: float) -> float:
-        """Draw what is due at a time [s]; the time until more may be due [s]."""
-        ...
-
-    def end(self) -> None:
-        """Show that the program has ended."""
-        ...
-
-
-def run(channel: Channel, displays: Sequence[Display]) -> None:
+def run(channel: Channel, displays: Sequence[Page | FoxgloveSink]) -> None:
     """Show what comes until the program has ended, and that it has."""
     ended = False
     while not (ended or channel.closed):

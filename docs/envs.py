@@ -1,0 +1,235 @@
+"""Write docs/envs.md with the tables of environments and policies; with --check only compare it."""
+
+from collections.abc import Iterable
+
+from generated import finish, heads, row
+
+from antennate import envs
+from antennate.control.policy.interface import PolicyInterface, Quantity, actions, channels
+from antennate.envs.config import EnvConfig, Randomisation
+from antennate.envs.reward import REWARD_VERSION, TERMS
+from antennate.params.base import meaning
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+
+PAGE = """\
+# Learn to walk by touch
+
+A robot in a tunnel, its two antennae and a reward: environments of
+[Gymnasium](https://gymnasium.farama.org) for learned policies. A policy that is trained here runs
+without a changed line wherever a [controller](controllers.md) is named: in `tunnel`, upon a log,
+on the twin and behind the supervisor of the real robot.
+
+## Train one
+
+```bash
+uv sync --extra gym --extra onnx
+uv pip install torch
+uv run --no-sync python examples/train_ppo.py --out my_policy
+uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --seed 5
+```
+
+The third line takes 20 minutes on one core; `--workers 8` uses eight, `--scene uturn` another
+scene, `--readings none` trains the same network without touch, which is what it has to beat. It
+says how many of the last hundred episodes got out. The fourth line compares the policy with two of
+our controllers in thirty tunnels that it has not seen. `examples/train_ppo.py` is PPO on PyTorch
+alone, in one file to be read and changed.
+
+## Use one
+
+```python
+import gymnasium as gym
+
+import antennate.envs  # registers them
+
+env = gym.make("antennate/Tunnel-v1", action="gait")
+observation, info = env.reset(seed=1)
+observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+
+many = gym.make_vec("antennate/Tunnel-v1", num_envs=24)  # in lockstep, in one process
+```
+
+`gym.make("antennate:Tunnel-v1")` imports the package by itself, where `antennate` was not imported
+before `gymnasium`. After `SCENES.add("mine", ...)`, `antennate.envs.register()` adds an
+environment for your [own scene](scenes.md).
+
+{ids}
+
+- **An episode** follows from its seed and number alone, never from what ran before. It is the
+  trial of `antennate tunnel` with that seed and number, bit for bit. `reset(seed=s)` begins
+  episode 0, `reset()` the next one, `options={{"episode_number": n}}` that one. In a vector of B
+  robots row i plays the episodes i, i + B, i + 2 B ...; with a list of seeds each plays 0, 1, 2 ...
+  of its own.
+- An episode in which the robot has no room at its start is left out, and the next one begins.
+- **Ends**: terminated are `success` (the head is out by the exit), `left` (out another way),
+  `overturned` and `invalid` (the physics or the scene failed; `info["reason"]` says how).
+  Truncated is `timeout`, at the scene's limit, `time_limit` or `max_episode_steps`.
+- **Autoreset** of a vector: `autoreset_mode="NEXT_STEP"` (the default), `"SAME_STEP"` (with
+  `final_obs` and `final_info`) or `"DISABLED"` (with `reset(options={{"reset_mask": rows}})`).
+- **`info`** holds what only the simulation knows: `head` (x, y [m], heading [rad]), `progress` and
+  `length` [m], `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`, the terms of the reward,
+  and at the end `outcome` and `reason`. None of it is in an observation.
+
+Stable-Baselines3 takes the single environment, `PPO("MlpPolicy", env)`; skrl takes the vector,
+`wrap_env(many)`, with `headless` set in its trainer. rsl_rl and LeRobot have interfaces of their
+own: `examples/rsl_rl_env.py`, `examples/lerobot_env.py`. `tests/test_training.py` tries all four.
+
+## Observation
+
+{observation}
+
+Of each channel a policy is given the last `history` samples, one a decision, newest first, and a
+mean with the time constant `memory_time`; then sine and cosine of the gait phase; with joint
+targets the goal of each joint, too; and with `servos` how far each joint is from its goal, now and
+on average. A number is divided by its scale and clipped to its range. What came before the start
+counts as a free antenna and a robot that stood. A reading that cannot be used counts as that of a
+free antenna, and the robot holds. On a bus the servos tell their angles a tick late.
+
+## Action
+
+One decision is {ticks} control ticks long by default, {seconds:g} s. Numbers lie from -1 to 1 and
+are clipped; one that is not finite is HOLD.
+
+{action}
+
+## Interface
+
+`gym.make(..., interface={{"history": 64}})`; `action` can be given alone. All that differs is in
+the [contract](#policy-files) of a policy.
+
+{interface}
+
+Further arguments: `control`, `robot`, `variation`, `tunnel`, `corridors` and `physics`, as of
+`antennate tunnel` ([parameters](parameters.md)), and `readings`: `own`, `none` or `swapped`.
+
+## Reward
+
+Version {version}. It is the sum of these terms; each is in `info` as `reward_NAME`.
+
+{reward}
+
+Time costs by the decision, so with the default of 0.1 s a decision it is 0.1 a second, and with
+`ticks` 50 it is 0.02. A robot that sees no way out is then better off behind the entrance than
+inside until the limit: look at the outcomes, not at the sum.
+
+## Randomisation
+
+`gym.make(..., randomise={{"leg_friction": (0.7, 1.3)}})`: for each episode a number is drawn from
+each range, uniformly.
+
+{randomisation}
+
+What differs between the trials of a scene, such as its cylinders, the start and slipping legs, is
+drawn anyway (`variation`).
+
+## Policy files
+
+An ONNX file whose metadata `antennate` holds one JSON value, the contract: version, interface,
+rate, averaging time, gait, joints, robot with its hash, and every number of observation and action
+with name, unit, scale and clip. `FILE.onnx` is then a controller:
+
+```bash
+uv run antennate tunnel --controllers my_policy/policy.onnx
+uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
+    --controller my_policy/policy.onnx
+```
+
+- Input `observation`, shape (1, n); output `action`, shape (1, k). Of maneuvers it is their
+  scores, of which the largest is done.
+- The normaliser is in the graph. Recurrent states are inputs and outputs that the contract names;
+  they are zeros at a start.
+- A policy made for another robot, rate, gait, observation or action is refused before the first
+  trial, with what was expected and what was found. Ids, directions and zeros of servos may differ.
+- An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind
+  every controller.
+
+`write_policy` writes a network of dense layers, `add_contract` puts a contract into the file of
+another exporter:
+
+```python
+from antennate.control.policy.contract import contract_of
+from antennate.control.policy.writer import add_contract
+
+config = env.unwrapped.config
+contract = contract_of(config.interface, config.control, config.robot, about="my PPO, seed 3")
+add_contract("mine.onnx", contract)
+```
+
+## What is measured
+
+- 4,096 first observations of one environment are those of fresh processes that begin the same
+  episodes in the opposite order, bit for bit (`benchmarks/envs.py --resets 4096`).
+- A vector takes as many control ticks in a second of processor time as as many trials of `tunnel`
+  in lockstep: `benchmarks/envs.py` says {rates}.
+- The environments are versioned: where a scene, an observation or a reward changes, `v1` becomes
+  `v2`.
+"""
+RATES = "1.02 times as many as under `open` for 8 robots, 1.03 for 24"
+
+
+def table(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown."""
+    return "\n".join([heads(*names), *(row(*cells) for cells in rows)])
+
+
+def quantities(found: Iterable[Quantity]) -> str:
+    """A table of numbers."""
+    rows = (
+        (f"`{q.name}`", q.unit, f"{q.scale:.4g}", f"{q.low:g} to {q.high:g}", q.meaning)
+        for q in found
+    )
+    return table(("name", "unit", "scale", "range", "meaning"), rows)
+
+
+def parameters(model: type) -> str:
+    """A table of a group of parameters."""
+    rows = []
+    for name, field in model.model_fields.items():
+        extra = field.json_schema_extra
+        default = field.default if isinstance(field.default, str) else str(field.default)
+        rows.append((f"`{name}`", extra["unit"], f"`{default}`", meaning(model, name, unit=False)))
+    return table(("name", "unit", "default", "meaning"), rows)
+
+
+def action_tables() -> str:
+    """A table for each action mode."""
+    robot = RobotSpec()
+    heads_of = {
+        "maneuver": "`maneuver`, a number from 0 to 3: FORWARD, TURN_L, TURN_R, REVERSE.",
+        "gait": "`gait`, four numbers. Amplitude and offset change by `gait.offset_rate`.",
+        "joints": "`joints`, a number for each joint. Goals move no faster than the `fastest` of "
+        "the joint's group, such as `robot.yaw.fastest`. One of each kind:",
+    }
+    parts = []
+    for mode, text in heads_of.items():
+        found = actions(PolicyInterface.model_validate({"action": mode}), robot)
+        if mode == "joints":
+            found = tuple(q for q in found if q.name in ("yaw1", "leg_l0", "antenna_l_base"))
+        parts.append(text if mode == "maneuver" else f"{text}\n\n{quantities(found)}")
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    """Write the page, or compare it."""
+    interface, control = PolicyInterface(), ControlParams()
+    reward = table(
+        ("term", "weight", "for each", "when"),
+        ((f"`{t.name}`", f"{t.weight:g}", t.unit, t.meaning) for t in TERMS),
+    )
+    page = PAGE.format(
+        ids=table(("id", "scene"), ((f"`{i}`", f"`{s}`") for i, s in envs.ids().items())),
+        observation=quantities(channels(PolicyInterface(action="gait"), EnvConfig().robot)),
+        ticks=interface.ticks,
+        seconds=interface.ticks * control.period,
+        action=action_tables(),
+        interface=parameters(PolicyInterface),
+        version=REWARD_VERSION,
+        reward=reward,
+        randomisation=parameters(Randomisation),
+        rates=RATES,
+    )
+    finish(__file__, page)
+
+
+if __name__ == "__main__":
+    main()

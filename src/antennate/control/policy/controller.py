@@ -1,0 +1,203 @@
+"""A policy file as a controller: FILE.onnx wherever a controller is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.control.conditioning import ContactState, curves, level_and_fraction
+from antennate.control.policy.actors import make_actor
+from antennate.control.policy.contract import KEY, Contract, read_contract, require_match
+from antennate.control.policy.interface import actions
+from antennate.control.policy.observer import Observer, Vector
+from antennate.errors import ConfigError, ControllerError, MissingPackageError, in_one_line
+from antennate.files import read_limited
+from antennate.messages import extra, shown
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec, require_antennae
+from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
+
+SUFFIX = ".onnx"
+LARGEST = 50_000_000
+"""Most bytes of a policy file."""
+OBSERVATION, ACTION = "observation", "action"
+"""Names of the input and the output of a policy."""
+
+
+class Policy:
+    """A policy file: its contract, and its network for one robot at a time.
+
+    Rows of a batch are asked one by one, so that none changes the last bits of another.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ConfigError: It cannot be read, is no ONNX model, or has no contract.
+        MissingPackageError: onnxruntime is not installed.
+
+    Attributes:
+        contract: What it was made for.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import onnxruntime as ort  # large, and only policies need it
+        except ImportError:
+            raise MissingPackageError(
+                f"controller: expected the package onnxruntime for {path}, found none; install it "
+                f"with {extra('onnx')}"
+            ) from None
+        data = read_limited(path, LARGEST, ConfigError)
+        options: Any = ort.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4
+        try:
+            self._session: Any = ort.InferenceSession(data, options, ["CPUExecutionProvider"])
+        except Exception as error:
+            raise ConfigError(
+                f"{path}: expected an ONNX model, found {in_one_line(error)}"
+            ) from error
+        text = self._session.get_modelmeta().custom_metadata_map.get(KEY)
+        if text is None:
+            raise ConfigError(
+                f"{path}: expected a policy with a contract in its metadata {KEY!r}, found none"
+            )
+        self.contract: Contract = read_contract(text, str(path))
+        self._require_names(path)
+        size = len(self.contract.observations)
+        answer, _ = self.answer(np.zeros((1, size), np.float32), self.start())
+        if answer.shape != (1, len(self.contract.actions)):
+            raise ConfigError(
+                f"{path}: expected {ACTION} of shape (1, {len(self.contract.actions)}), found "
+                f"{answer.shape}"
+            )
+
+    def _require_names(self, path: Path) -> None:
+        states = self.contract.states
+        for kind, wanted, nodes in (
+            ("inputs", [OBSERVATION, *(s.input for s in states)], self._session.get_inputs()),
+            ("outputs", [ACTION, *(s.output for s in states)], self._session.get_outputs()),
+        ):
+            names = [node.name for node in nodes]
+            if sorted(names) != sorted(wanted):
+                raise ConfigError(
+                    f"{path}: expected the {kind} {', '.join(wanted)}, found {', '.join(names)}"
+                )
+
+    def start(self) -> dict[str, Vector]:
+        """The recurrent states of a robot that begins, by input."""
+        return {s.input: np.zeros(s.shape, np.float32) for s in self.contract.states}
+
+    def answer(
+        self, observation: Vector, states: dict[str, Vector]
+    ) -> tuple[Floats, dict[str, Vector]]:
+        """The answer for one robot, shape (1, k), and its states from then on.
+
+        Raises:
+            ControllerError: The network cannot be run.
+        """
+        outputs = [ACTION, *(s.output for s in self.contract.states)]
+        try:
+            answer, *after = self._session.run(outputs, {OBSERVATION: observation, **states})
+        except Exception as error:
+            raise ControllerError(f"the policy failed: {in_one_line(error)}") from error
+        names = [s.input for s in self.contract.states]
+        return np.asarray(answer, float), dict(zip(names, after, strict=True))
+
+
+class PolicyController:
+    """Control of B robots by a policy.
+
+    Args:
+        policy: Decides.
+        control: All numbers of the control.
+        robot: The robot.
+        batch: Number of robots B.
+        where: The file, for messages.
+
+    Raises:
+        ConfigError: The policy was made for another robot, rate or gait.
+
+    Attributes:
+        level: Bending levels b of the last step, shape (B, 2).
+        contact: `Contact` of the last step, shape (B, 2).
+        maneuver: The `Maneuver` nearest to what was done, shape (B,); HOLD of an answer that is no
+            number, and where a reading is UNKNOWN.
+    """
+
+    def __init__(
+        self, policy: Policy, control: ControlParams, robot: RobotSpec, batch: int, where: str
+    ) -> None:
+        require_antennae(robot, "this controller")
+        require_match(policy.contract, control, robot, where)
+        interface = policy.contract.interface
+        self._policy, self._ticks = policy, interface.ticks
+        self._curves = curves(control)
+        self._observer = Observer(interface, control, robot, batch)
+        self._actor = make_actor(interface, control, robot, batch)
+        self._contacts = ContactState(control.rule, batch)
+        self._answers: Floats = np.zeros((batch, len(actions(interface, robot))))
+        self._states = [policy.start() for _ in range(batch)]
+        self._count: Ints = np.zeros(batch, np.int64)
+        self.level: Floats = np.zeros((batch, 2))
+        self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
+        self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self.reset(np.arange(batch))
+
+    @property
+    def phase(self) -> Floats:
+        """Gait phase [rad], shape (B,)."""
+        return self._actor.phase
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Forget everything about some rows and start their gait at `phase` [rad]."""
+        self._observer.reset(rows)
+        self._actor.reset(rows, phase)
+        self._contacts.reset(rows)
+        self._count[rows] = 0
+        for row in np.arange(len(self._count))[rows].tolist():
+            self._states[row] = self._policy.start()
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period: the command for this frame, both with B rows."""
+        self._observer.feel(frame)
+        self.level, _ = level_and_fraction(self._curves, self._observer.mean)
+        self.contact = self._contacts.step(self.level)
+        due = self._count % self._ticks == 0
+        if due.any():
+            self._decide(due)
+        self._count += 1
+        command = self._actor.step(self._observer.unknown)
+        self._observer.told(command)
+        self.maneuver = self._actor.maneuver.astype(np.int64)
+        return command
+
+    def _decide(self, rows: Bools) -> None:
+        """Ask the policy for some rows."""
+        observations = self._observer.look(self._actor, rows)
+        for row in np.flatnonzero(rows).tolist():
+            answer, self._states[row] = self._policy.answer(
+                observations[row : row + 1], self._states[row]
+            )
+            self._answers[row] = answer[0]
+        self._actor.decide(self._answers, rows)
+
+
+def policy_factory(name: str) -> Callable[[ControlParams, RobotSpec, int], PolicyController]:
+    """What makes controllers of a policy file.
+
+    Raises:
+        ConfigError: There is no such file.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise ConfigError(f"expected a policy file, found no file {shown(name)}")
+
+    def make(control: ControlParams, robot: RobotSpec, batch: int) -> PolicyController:
+        return PolicyController(Policy(path), control, robot, batch, name)
+
+    return make

@@ -1,0 +1,105 @@
+"""Policy files: a network of dense layers as ONNX, and the contract of any ONNX model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from antennate.control.policy.contract import KEY, Contract
+from antennate.control.policy.controller import ACTION, OBSERVATION
+from antennate.errors import MissingPackageError
+from antennate.messages import extra
+
+OPSET = 17
+Weights = NDArray[np.floating[Any]]
+
+
+def write_policy(
+    path: Path | str,
+    contract: Contract,
+    layers: Sequence[tuple[Weights, Weights]],
+    mean: Weights,
+    scale: Weights,
+    clip: float,
+) -> Path:
+    """Write a network of dense layers with tanh between them, its normaliser in the graph.
+
+    Args:
+        path: The file.
+        contract: What it was made for.
+        layers: Weights, shape (outputs, inputs), and biases, shape (outputs,), of each layer.
+        mean: Subtracted from an observation, shape (n,).
+        scale: What it is divided by then, shape (n,).
+        clip: Largest normalised number either way.
+
+    Returns:
+        The path.
+
+    Raises:
+        MissingPackageError: The package onnx is not installed.
+    """
+    onnx = _onnx()
+    helper, numpy_helper, kind = onnx.helper, onnx.numpy_helper, onnx.TensorProto.FLOAT
+    constants = {"mean": mean, "scale": scale, "low": np.array(-clip), "high": np.array(clip)}
+    nodes = [
+        helper.make_node("Sub", [OBSERVATION, "mean"], ["centred"]),
+        helper.make_node("Div", ["centred", "scale"], ["scaled"]),
+        helper.make_node("Clip", ["scaled", "low", "high"], ["x0"]),
+    ]
+    for i, (weight, bias) in enumerate(layers):
+        constants |= {f"w{i}": weight, f"b{i}": bias}
+        last = i == len(layers) - 1
+        out = ACTION if last else f"y{i}"
+        nodes.append(helper.make_node("Gemm", [f"x{i}", f"w{i}", f"b{i}"], [out], transB=1))
+        if not last:
+            nodes.append(helper.make_node("Tanh", [out], [f"x{i + 1}"]))
+    shapes = (OBSERVATION, len(mean)), (ACTION, len(layers[-1][1]))
+    given, answer = (helper.make_tensor_value_info(n, kind, [1, size]) for n, size in shapes)
+    tensors = [
+        numpy_helper.from_array(np.asarray(value, np.float32), name)
+        for name, value in constants.items()
+    ]
+    graph = helper.make_graph(nodes, "policy", [given], [answer], tensors)
+    imports = [helper.make_opsetid("", OPSET)]
+    model = helper.make_model(graph, opset_imports=imports, ir_version=8)
+    return _save(model, contract, Path(path))
+
+
+def add_contract(path: Path | str, contract: Contract) -> Path:
+    """Put a contract into an ONNX file that another exporter wrote; the path.
+
+    Its inputs must be `observation` and those of the contract's states, its first output `action`.
+
+    Raises:
+        MissingPackageError: The package onnx is not installed.
+    """
+    return _save(_onnx().load(str(path)), contract, Path(path))
+
+
+def _save(model: Any, contract: Contract, path: Path) -> Path:
+    onnx = _onnx()
+    for prop in [p for p in model.metadata_props if p.key == KEY]:
+        model.metadata_props.remove(prop)
+    prop = model.metadata_props.add()
+    prop.key, prop.value = KEY, contract.model_dump_json()
+    onnx.checker.check_model(model)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(model.SerializeToString())
+    return path
+
+
+def _onnx() -> Any:
+    try:
+        import onnx  # large, and only for who writes policies
+        import onnx.checker
+        import onnx.helper
+        import onnx.numpy_helper
+    except ImportError:
+        raise MissingPackageError(
+            f"policy: expected the package onnx, found none; install it with {extra('onnx')}"
+        ) from None
+    return onnx

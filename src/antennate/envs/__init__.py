@@ -1,0 +1,53 @@
+"""Environments of Gymnasium: a robot that walks by touch, for learned policies.
+
+Importing this registers them; see docs/envs.md.
+"""
+
+from __future__ import annotations
+
+from gymnasium.envs import registration
+
+from antennate.envs.config import EnvConfig, Randomisation
+from antennate.envs.single import AntennaEnv
+from antennate.envs.vector import AntennaVectorEnv
+from antennate.sim.scenes.registry import SCENES
+
+__all__ = ["AntennaEnv", "AntennaVectorEnv", "EnvConfig", "Randomisation", "ids", "register"]
+
+NAMESPACE = "antennate"
+VERSION = 1
+"""Version of all environments: it rises when a scene, an observation or a reward changes."""
+_NAMES = {"uturn": "UTurn", "corner": "Corner120", "deadend": "DeadEnd"}
+"""Scenes whose name in an id is not their own with a capital letter."""
+
+
+def ids() -> dict[str, str]:
+    """The scene of each environment, by its id."""
+    names = {name: _NAMES.get(name, _capitals(name)) for name in SCENES.names}
+    return {f"{NAMESPACE}/{name}-v{VERSION}": scene for scene, name in names.items()}
+
+
+def register() -> tuple[str, ...]:
+    """Register an environment for every scene that has a name; the ids.
+
+    Importing this module does so; call it again after a scene was added. Each has a second id
+    without the namespace, for `gymnasium.make("antennate:Tunnel-v1")`.
+    """
+    known = ids()
+    for full, scene in known.items():
+        for name in (full, full.partition("/")[2]):
+            if name not in registration.registry:
+                registration.register(
+                    name,
+                    entry_point="antennate.envs.single:AntennaEnv",
+                    vector_entry_point="antennate.envs.vector:AntennaVectorEnv",
+                    kwargs={"scene": scene},
+                )
+    return tuple(known)
+
+
+def _capitals(name: str) -> str:
+    return "".join(part[:1].upper() + part[1:] for part in name.replace("_", "-").split("-"))
+
+
+register()

@@ -1,0 +1,361 @@
+"""Episodes of B robots in lockstep: trials of a scene, walked one decision after the other.
+
+An episode follows from its seed and number alone, as a trial of `antennate tunnel` does; the
+readings, the looks that end it and the physics are the same, so it is the same trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from antennate.antenna import sensor
+from antennate.control.policy.actors import make_actor
+from antennate.control.policy.observer import Observer, Vector
+from antennate.control.readings import make_readings
+from antennate.envs.config import EnvConfig, Randomisation, varied
+from antennate.envs.reward import TERMS, terms_of
+from antennate.errors import SceneError
+from antennate.sim.scenes.scene import Scene, SceneInstance
+from antennate.sim.sim_robot import SimRobot
+from antennate.sim.trial import (
+    LOOK_EVERY,
+    Judge,
+    Trial,
+    draw_trial,
+    progress_of,
+    require_room,
+    scene_of,
+    time_limit_of,
+)
+from antennate.types import AntennaFrame, Bools, Floats, Ints
+
+Outcome = Literal["success", "timeout", "left", "overturned", "invalid"]
+OUTCOMES: tuple[Outcome, ...] = ("success", "timeout", "left", "overturned", "invalid")
+_MOST_SKIPPED = 100
+"""Episodes in a row without room for the robot, after which a scene is given up."""
+
+
+@dataclass(slots=True)
+class Episode:
+    """One episode as it runs.
+
+    Attributes:
+        seed, number: What it follows from.
+        scene: Its scene.
+        judge: Says when the head is out, or has left.
+        progress: Progress at the last decision [m].
+        decisions: Decisions so far.
+    """
+
+    seed: int
+    number: int
+    scene: SceneInstance
+    judge: Judge
+    progress: float = 0.0
+    decisions: int = 0
+
+
+@dataclass(slots=True)
+class Truth:
+    """What only the simulation knows of B robots; each call makes arrays of its own.
+
+    Attributes:
+        seed, episode_number: What the episodes follow from, shape (B,).
+        t: Time since the start [s], shape (B,).
+        head: Position and heading of the head [m, m, rad], shape (B, 3).
+        progress: How far the head has come [m], shape (B,); `length` is that of the exit.
+        force: Sum of the normal forces on the robot [N], shape (B,).
+        maneuver: What was done, a `Maneuver`, shape (B,).
+        terms: Terms of the reward in the order of `TERMS`, shape (B, terms).
+        outcome: Number in `OUTCOMES`, -1 while an episode goes on, shape (B,).
+        reason: Why an episode is invalid, by row.
+    """
+
+    seed: Ints
+    episode_number: Ints
+    t: Floats
+    head: Floats
+    progress: Floats
+    length: Floats
+    force: Floats
+    maneuver: Ints
+    terms: Floats
+    outcome: Ints
+    reason: dict[int, str] = field(default_factory=dict[int, str])
+
+    @classmethod
+    def empty(cls, batch: int) -> Truth:
+        """That of rows without an episode."""
+        whole = (np.zeros(batch, np.int64) for _ in range(3))
+        real = (np.zeros(batch) for _ in range(4))
+        seed, episode, maneuver = whole
+        t, progress, length, force = real
+        head, terms = np.zeros((batch, 3)), np.zeros((batch, len(TERMS)))
+        outcome = np.full(batch, -1)
+        return cls(seed, episode, t, head, progress, length, force, maneuver, terms, outcome)
+
+
+@dataclass(slots=True)
+class Decision:
+    """What came of one decision.
+
+    Attributes:
+        observation: Newest observations, shape (B, n); of an episode that ended here its last one,
+            unless another has begun in its row.
+        truth: What only the simulation knows at the end of the decision.
+        ended: Rows whose episode ended, shape (B,).
+        begun: Rows in which another episode begins with this observation, shape (B,).
+        last: Last observations of the episodes that ended, shape (B, n).
+        start: Truth of the episodes that begin, else as `truth`.
+    """
+
+    observation: Vector
+    truth: Truth
+    ended: Bools
+    begun: Bools
+    last: Vector
+    start: Truth
+
+
+class Episodes:
+    """B robots in episodes of a scene.
+
+    Args:
+        config: What decides them.
+        batch: Number of robots B.
+
+    Attributes:
+        size: Numbers of an observation.
+        running: Rows that hold an episode, shape (B,).
+
+    Raises:
+        ConfigError: There is no such scene.
+        SceneError: The scene cannot be used.
+    """
+
+    def __init__(self, config: EnvConfig, batch: int) -> None:
+        self.config, self._batch = config, batch
+        control, robot = config.control, config.robot
+        self._scene = scene_of(config)
+        self._body = SimRobot(batch, robot, control.period, config.physics.timestep)
+        self._actor = make_actor(config.interface, control, robot, batch)
+        self._observer = Observer(config.interface, control, robot, batch)
+        self._readings = make_readings(config.readings, control, batch)
+        self._episodes: dict[int, Episode] = {}
+        self._seeds: Ints = np.zeros(batch, np.int64)
+        self._next: Ints = np.arange(batch)
+        self._stride: Ints = np.full(batch, batch)
+        self._gains, self._offsets = np.ones((batch, 2)), np.zeros((batch, 2))
+        self._straight = float(sensor.counts(robot.antenna.sensor, np.zeros(1))[0])
+        self._affine = config.randomise.sensor_gain != (1.0, 1.0)
+        self._affine |= config.randomise.sensor_offset != (0.0, 0.0)
+        self._count: Ints = np.zeros(batch, np.int64)
+        self._limits: Floats = np.full(batch, np.inf)
+        self._t: Floats = np.full(batch, np.nan)
+        self._ticks = 0
+        self.size = self._observer.size
+
+    @property
+    def running(self) -> Bools:
+        """Rows that hold an episode, shape (B,)."""
+        rows = np.zeros(self._batch, dtype=bool)
+        rows[[*self._episodes]] = True
+        return rows
+
+    def seed(self, row: int, seed: int, number: int, stride: int) -> None:
+        """Choose the next episode of a row; the numbers of those after it are a stride apart."""
+        self._seeds[row], self._next[row], self._stride[row] = seed, number, stride
+
+    def choose(self, row: int, number: int) -> None:
+        """The next episode of a row has this number."""
+        self._next[row] = number
+
+    def begin(self, rows: Bools) -> tuple[Vector, Truth]:
+        """Begin the next episodes of some rows, shape (B,); the others stand still meanwhile.
+
+        Returns:
+            Observations, shape (B, n), and the truth; both only of the rows that begin.
+        """
+        self._load(rows)
+        some = rows if (~rows & self.running).any() else None
+        self._observer.feel(self._given(self._body.read(some), some), some)
+        return self._observer.look(self._actor, rows), self._begun(rows)
+
+    def step(self, answers: Floats, fresh: Bools, again: bool) -> Decision:
+        """Walk one decision.
+
+        Args:
+            answers: Of the table of actions, shape (B, k).
+            fresh: Rows that begin their next episode in this decision; their answer is not read.
+            again: Whether a row whose episode ends here begins its next one at once.
+        """
+        running, period = self.running, self.config.control.period
+        ended, begun = np.zeros((2, self._batch), bool)
+        last = np.zeros((self._batch, self.size), np.float32)
+        truth = Truth.empty(self._batch)
+        self._actor.decide(answers, running)
+        for episode in self._episodes.values():
+            episode.decisions += 1
+        for tick in range(1, self.config.interface.ticks + 1):
+            whole = tick == self.config.interface.ticks
+            command = self._actor.step(self._observer.unknown)
+            self._body.write(command)
+            self._observer.told(command)
+            self._ticks += 1
+            self._count += 1
+            over = self._judge(truth, whole)
+            if over.any():
+                last[over] = self._observer.look(self._actor, over)[over]
+                ended |= over
+            if whole:
+                begun = fresh | (ended & again)
+                self._load(begun)
+            self._body.sleep_until(self._ticks * period)
+            self._observer.feel(self._given(self._body.read()))
+        observation = self._observer.look(self._actor)
+        stays = ended & ~begun
+        observation[stays] = last[stays]
+        self._note(truth, np.flatnonzero(running & ~ended).tolist())
+        start = replace_rows(truth, self._begun(begun), begun) if begun.any() else truth
+        return Decision(observation, truth, ended, begun, last, start)
+
+    def _given(self, frame: AntennaFrame, rows: Bools | None = None) -> AntennaFrame:
+        """What the policy is given of a frame."""
+        self._t = frame.t if rows is None else np.where(rows, frame.t, self._t)
+        if self._affine:
+            change = self._gains * (frame.counts - self._straight) + self._offsets
+            counts = np.clip(np.rint(self._straight + change), 0.0, sensor.FULL_SCALE)
+            frame = replace(frame, counts=counts)
+        return self._readings.change(frame)
+
+    def _load(self, rows: Bools) -> None:
+        """Put the next episode into some rows."""
+        for row in np.flatnonzero(rows).tolist():
+            one, phase = np.array([row]), self._draw(row)
+            self._count[row] = 0
+            self._actor.reset(one, phase)
+            self._observer.reset(one)
+            self._readings.reset(one)
+
+    def _draw(self, row: int) -> float:
+        """Put the next episode with room for the robot into a row; its gait phase [rad]."""
+        trouble: SceneError | None = None
+        for _ in range(_MOST_SKIPPED):
+            seed, number = int(self._seeds[row]), int(self._next[row])
+            self._next[row] += self._stride[row]
+            try:
+                trial, gains, offsets = draw_episode(self.config, self._scene, seed, number)
+                require_room(trial.world)
+                limit = time_limit_of(trial.scene, self.config.time_limit)
+                progress = progress_of(trial.scene, trial.world.head[:2])
+            except SceneError as error:
+                trouble = error
+                continue
+            self._body.load(row, trial.world, trial.chance)
+            self._gains[row], self._offsets[row], self._limits[row] = gains, offsets, limit
+            judge = Judge(trial.scene)
+            self._episodes[row] = Episode(seed, number, trial.scene, judge, progress)
+            return trial.phase
+        raise SceneError(
+            f"expected an episode that can begin, found {_MOST_SKIPPED} that cannot: {trouble}"
+        )
+
+    def _judge(self, truth: Truth, whole: bool) -> Bools:
+        """End the episodes that are over at this tick; their rows, shape (B,)."""
+        over = np.zeros(self._batch, bool)
+        for row, error in [*self._body.failures.items()]:
+            if row in self._episodes:
+                self._end(row, truth, "invalid", str(error))
+                over[row] = True
+        most = self.config.max_episode_steps
+        late = self._t >= self._limits
+        due = (self._count % LOOK_EVERY == 0) | late | (whole and most is not None)
+        for row in np.flatnonzero(due).tolist():
+            if (episode := self._episodes.get(row)) is None:
+                continue
+            looks = late[row] or not self._count[row] % LOOK_EVERY
+            outcome, reason = self._look(row, episode) if looks else (None, "")
+            if outcome is None and (late[row] or (whole and episode.decisions == most)):
+                outcome = "timeout"
+            if outcome is not None:
+                self._end(row, truth, outcome, reason)
+                over[row] = True
+        return over
+
+    def _look(self, row: int, episode: Episode) -> tuple[Outcome | None, str]:
+        """How the episode of a row has ended, None if it goes on, and why it is invalid."""
+        world = self._body.world(row)
+        try:
+            outcome = episode.judge.look(world.head[:2])
+        except SceneError as error:
+            return "invalid", str(error)
+        return outcome or ("overturned" if world.overturned else None), ""
+
+    def _end(self, row: int, truth: Truth, outcome: Outcome, reason: str) -> None:
+        """Note how the episode of a row ended, and empty the row."""
+        truth.outcome[row] = OUTCOMES.index(outcome)
+        if reason:
+            truth.reason[row] = reason
+        self._note(truth, [row])
+        del self._episodes[row]
+        self._limits[row] = np.inf
+        self._body.unload(row)
+
+    def _note(self, truth: Truth, rows: Iterable[int], begins: bool = False) -> None:
+        """Write the truth about some rows; of those that begin without a reward."""
+        for row in rows:
+            episode, world = self._episodes[row], self._body.world(row)
+            scene, head = episode.scene, world.head[:2].copy()
+            truth.seed[row], truth.episode_number[row] = episode.seed, episode.number
+            truth.t[row], truth.length[row] = world.t, scene.length
+            truth.head[row, :2], truth.head[row, 2] = head, world.heading
+            truth.force[row] = world.obstacle_force()
+            truth.maneuver[row] = self._actor.maneuver[row]
+            if truth.outcome[row] != OUTCOMES.index("invalid"):
+                before, episode.progress = episode.progress, progress_of(scene, head)
+                if not begins:
+                    out = truth.outcome[row] == OUTCOMES.index("success")
+                    gain = episode.progress - before
+                    truth.terms[row] = terms_of(scene, gain, head, out)
+            truth.progress[row] = episode.progress
+
+    def _begun(self, rows: Bools) -> Truth:
+        """The truth about rows that have just begun."""
+        truth = Truth.empty(self._batch)
+        self._note(truth, np.flatnonzero(rows).tolist(), begins=True)
+        return truth
+
+
+def draw_episode(
+    config: EnvConfig, scene: Scene, seed: int, number: int
+) -> tuple[Trial, Floats, Floats]:
+    """An episode at its start; gains and offsets [counts] of its antennae, shapes (2,).
+
+    Without randomisation it is the trial of this number of `antennate tunnel` with this seed.
+
+    Raises:
+        SceneError: The scene cannot be drawn or built.
+    """
+    chance = np.random.default_rng(np.random.SeedSequence([seed, number], spawn_key=(3,)))
+    drawn = config.randomise.draw(chance)
+    robot = config.robot
+    if config.randomise != Randomisation():
+        robot = varied(robot, drawn)
+    own = config.model_copy(update={"seed": seed, "robot": robot})
+    gait, period = config.control.gait, config.control.period
+    trial = draw_trial(own, scene, number, gait, period)
+    return trial, drawn["sensor_gain"], drawn["sensor_offset"]
+
+
+def replace_rows(truth: Truth, other: Truth, rows: Bools) -> Truth:
+    """A truth with some rows, shape (B,), of another one."""
+    parts: dict[str, Any] = {
+        name: np.where(rows.reshape(-1, *[1] * (value.ndim - 1)), getattr(other, name), value)
+        for name in (f.name for f in fields(Truth))
+        if isinstance(value := getattr(truth, name), np.ndarray)
+    }
+    return Truth(**parts, reason=dict(truth.reason))

@@ -1,0 +1,225 @@
+"""A vector of robots in lockstep as an environment of Gymnasium."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from antennate.control.policy.interface import PolicyInterface
+from antennate.envs.config import EnvConfig
+from antennate.envs.episodes import OUTCOMES, Episodes, Truth
+from antennate.envs.reward import TERMS
+from antennate.envs.spaces import action_space, answers_of, observation_space
+from antennate.errors import ConfigError
+from antennate.messages import nearest, shown
+from antennate.params.base import from_values
+from antennate.types import Bools
+
+LARGEST_SEED = 2**62
+
+
+def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
+    """The configuration of keyword arguments; `action` alone stands for `interface.action`.
+
+    Raises:
+        ConfigError: There is no such scene, or a value is unknown or out of bounds.
+    """
+    values = dict(values)
+    if "action" in values:
+        action, interface = values.pop("action"), values.get("interface", {})
+        if isinstance(interface, PolicyInterface):
+            interface = interface.model_dump()
+        values["interface"] = {**interface, "action": action}
+    return from_values(EnvConfig, {"scene": scene, **values})
+
+
+class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
+    """B robots in a scene, stepped in lockstep.
+
+    Row i of an integer seed s plays the episodes i, i + B, i + 2 B ... of seed s; with a list of
+    seeds it plays the episodes 0, 1, 2 ... of its own. Without a seed rows go on with their next
+    ones. `options["episode_number"]`, shape (B,), chooses others.
+
+    Args:
+        num_envs: Number of robots B.
+        scene: Name of the scene.
+        autoreset_mode: When a row begins its next episode: as of Gymnasium, a member or its name.
+        render_mode: None; there are no pictures.
+        values: As of `EnvConfig`, and `action` for `interface.action`.
+
+    Raises:
+        ConfigError: A value cannot be used.
+        SceneError: The scene cannot be used.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scene: str = "tunnel",
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: None = None,
+        **values: Any,
+    ) -> None:
+        self.config = config_of(scene, values)
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space = observation_space(self.config)
+        self.single_action_space = action_space(self.config)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._episodes = Episodes(self.config, num_envs)
+        self._over: Bools = np.ones(num_envs, bool)
+        self._seeded = False
+        self._observation = np.zeros((num_envs, self._episodes.size), np.float32)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes in all rows, or in those of `options["reset_mask"]`, shape (B,).
+
+        Raises:
+            ConfigError: A seed, a mask or an episode cannot be used.
+        """
+        options = options or {}
+        rows = _mask(options.get("reset_mask"), self.num_envs)
+        self._seed(seed, options.get("episode_number"), rows)
+        observation, truth = self._episodes.begin(rows)
+        self._over &= ~rows
+        self._observation = np.where(rows[:, None], observation, self._observation)
+        return self._observation.copy(), _infos(truth, rows, np.zeros(self.num_envs, bool))
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Walk one decision of all rows.
+
+        Raises:
+            ConfigError: The actions have another shape, or there is no such maneuver.
+            ResetNeeded: A row has no episode, and none begins by itself.
+        """
+        fresh = self._over
+        if not self._seeded or (fresh.any() and self.autoreset_mode is AutoresetMode.DISABLED):
+            raise ResetNeeded(f"expected a reset of rows {np.flatnonzero(fresh)} before a step")
+        answers = answers_of(self.config, actions, self.num_envs)
+        again = self.autoreset_mode is AutoresetMode.SAME_STEP
+        decision = self._episodes.step(answers, fresh, again)
+        truth, ended = decision.truth, decision.ended
+        self._over = ended & ~decision.begun
+        self._observation = decision.observation
+        cut = ended & (truth.outcome == OUTCOMES.index("timeout"))
+        rows = np.ones(self.num_envs, bool)
+        infos = _infos(decision.start, rows, ended & ~decision.begun)
+        if again and ended.any():
+            infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
+            for row in np.flatnonzero(ended).tolist():
+                infos["final_obs"][row] = decision.last[row].copy()
+            infos["_final_obs"] = ended.copy()
+            infos["final_info"] = _infos(truth, ended, ended)
+            infos["_final_info"] = ended.copy()
+        reward = truth.terms.sum(axis=1)
+        return decision.observation.copy(), reward, ended & ~cut, cut, infos
+
+    def _seed(self, seed: Any, episode: Any, rows: Bools) -> None:
+        """Say which episodes some rows begin."""
+        count = self.num_envs
+        if seed is None and not self._seeded:
+            seed = int(self.np_random.integers(2**32, LARGEST_SEED))
+        if isinstance(seed, int | np.integer):
+            self._np_random, self._np_random_seed = _generator(int(seed)), int(seed)
+            for row in np.flatnonzero(rows).tolist():
+                self._episodes.seed(row, int(seed), row, count)
+        elif seed is not None:
+            if len(seed) != count:
+                raise ConfigError(f"seed: expected {count} seeds, found {len(seed)}")
+            for row in np.flatnonzero(rows).tolist():
+                if seed[row] is not None:
+                    self._episodes.seed(row, whole("seed", seed[row]), 0, 1)
+        if episode is not None:
+            numbers = np.broadcast_to(np.asarray(episode), (count,))
+            for row in np.flatnonzero(rows).tolist():
+                self._episodes.choose(row, whole("episode_number", numbers[row]))
+        self._seeded = True
+
+
+def _generator(seed: int) -> np.random.Generator:
+    return np.random.default_rng(whole("seed", seed))
+
+
+def whole(name: str, value: Any) -> int:
+    """A seed or the number of an episode.
+
+    Raises:
+        ConfigError: It is no whole number of at least 0.
+    """
+    if not isinstance(value, int | np.integer) or not 0 <= value <= LARGEST_SEED:
+        raise ConfigError(f"{name}: expected a whole number of at least 0, found {shown(value)}")
+    return int(value)
+
+
+def _mode(name: AutoresetMode | str) -> AutoresetMode:
+    """The autoreset mode of a member, its name or its value.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if isinstance(name, AutoresetMode):
+        return name
+    for mode in AutoresetMode:
+        if name in (mode.name, mode.value):
+            return mode
+    names = [mode.name for mode in AutoresetMode]
+    raise ConfigError(
+        f"autoreset_mode: expected one of {', '.join(names)}, found {shown(name)}"
+        f"{nearest(str(name), names)}"
+    )
+
+
+def _mask(mask: Any, batch: int) -> Bools:
+    """Rows to begin: all without a mask.
+
+    Raises:
+        ConfigError: The mask is no array of `batch` booleans with one True at least.
+    """
+    if mask is None:
+        return np.ones(batch, bool)
+    mask = np.asarray(mask)
+    if mask.shape != (batch,) or mask.dtype != np.bool_ or not mask.any():
+        raise ConfigError(
+            f"reset_mask: expected {batch} booleans, one True at least, found "
+            f"{shown(mask.tolist())}"
+        )
+    return mask.copy()
+
+
+def _infos(truth: Truth, rows: Bools, ended: Bools) -> dict[str, Any]:
+    """The truth about some rows as infos of a vector: arrays, and masks of what they hold."""
+    infos: dict[str, Any] = {
+        name: getattr(truth, name).copy()
+        for name in (
+            "seed",
+            "episode_number",
+            "t",
+            "head",
+            "progress",
+            "length",
+            "force",
+            "maneuver",
+        )
+    }
+    infos |= {f"reward_{term.name}": truth.terms[:, i].copy() for i, term in enumerate(TERMS)}
+    infos |= {f"_{name}": rows.copy() for name in [*infos]}
+    if ended.any():
+        infos["outcome"] = np.full(len(rows), None, dtype=object)
+        infos["reason"] = np.full(len(rows), None, dtype=object)
+        for row in np.flatnonzero(ended).tolist():
+            infos["outcome"][row] = OUTCOMES[truth.outcome[row]]
+            infos["reason"][row] = truth.reason.get(row, "")
+        infos["_outcome"], infos["_reason"] = ended.copy(), ended.copy()
+    return infos

@@ -1,0 +1,270 @@
+"""Policy files as controllers: what they are given, where they run, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+from lockstep import BoardPort, LockstepClock
+from pages import blocks
+from policy_files import FORWARD, constant, contract, counting, drawn
+
+from antennate.cli import main
+from antennate.control.policy.contract import Contract, contract_of, require_match
+from antennate.control.policy.controller import Policy
+from antennate.control.policy.interface import PolicyInterface, actions, observations
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.safety.causes import State
+from antennate.hardware.safety.session import Session
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.testing import check_controller
+from antennate.twin.config import TwinConfig, watched
+from antennate.types import AntennaFrame, Maneuver
+
+MODES = ("maneuver", "gait", "joints")
+
+
+def trials_of(path: Path, batch: int = 3, **config: Any) -> list[TrialResult]:
+    """Rows of short trials in order."""
+    values = {"time_limit": 2.0, "seed": 3, **config}
+    rows: list[TrialResult] = []
+    made = TunnelConfig.model_validate({"controllers": [str(path)], **values})
+    run_trials(made, str(path), range(3), lambda result: rows.append(result[0]), batch)
+    return sorted(rows, key=lambda row: row.trial)
+
+
+def frame(t: float, counts: float, batch: int = 1) -> AntennaFrame:
+    return AntennaFrame(np.full(batch, t), np.full((batch, 2), counts))
+
+
+# the network
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_file_answers_as_its_layers_do(tmp_path: Path, mode: str) -> None:
+    path, parts = drawn(tmp_path / "p.onnx", contract(action=mode))
+    policy = Policy(path)
+    x = np.random.default_rng(1).normal(0.0, 3.0, (20, len(parts["mean"])))
+    (w, b), (v, c) = parts["layers"]
+    hidden = np.tanh(np.clip((x - parts["mean"]) / parts["scale"], -10.0, 10.0) @ w.T + b)
+    answers = [policy.answer(row[None].astype(np.float32), {})[0][0] for row in x]
+    assert np.abs(np.array(answers) - (hidden @ v.T + c)).max() < 1e-4
+
+
+def test_the_contract_is_one_json_value_at_full_precision(tmp_path: Path) -> None:
+    robot = RobotSpec(mass=2.0 + 1e-15, link_pitch=0.1 + 0.2 / 7)
+    made = contract_of(PolicyInterface(memory_time=1 / 3), ControlParams(), robot, about="x")
+    path = constant(tmp_path / "p.onnx", FORWARD, made)
+    read = Policy(path).contract
+    assert read == made
+    assert read.robot["link_pitch"] == robot.link_pitch
+    table = json.loads(made.model_dump_json())
+    assert {"version", "rate", "robot_hash", "joints", "observations"} <= set(table)
+    assert [q["name"] for q in table["observations"][:2]] == ["flex_l 0 s", "flex_l -0.1 s"]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_names_are_different_and_have_units(mode: str) -> None:
+    interface, robot = PolicyInterface(action=mode), RobotSpec()
+    for table in (observations(interface, ControlParams(), robot), actions(interface, robot)):
+        assert len({q.name for q in table}) == len(table)
+        assert all(q.unit and q.scale > 0 and q.low < q.high for q in table)
+
+
+# control
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_it_keeps_the_protocol_of_controllers(tmp_path: Path, mode: str) -> None:
+    made = contract(action=mode, servos=mode == "gait")
+    path, _ = drawn(tmp_path / "p.onnx", made)
+    check_controller(lambda c, r, b: make_controller(str(path), c, r, b))
+
+
+def test_it_walks_as_open_does_where_it_always_says_forward(tmp_path: Path) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    rows: list[TrialResult] = []
+    config = TunnelConfig(time_limit=2.0, seed=3)
+    run_trials(config, "open", range(3), lambda result: rows.append(result[0]))
+    want = {(r.trial, r.progress_m, r.time_s, r.force_mean_n) for r in rows}
+    assert {(r.trial, r.progress_m, r.time_s, r.force_mean_n) for r in trials_of(path)} == want
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_rows_do_not_influence_one_another(tmp_path: Path, mode: str) -> None:
+    path, _ = drawn(tmp_path / "p.onnx", contract(action=mode, ticks=7, servos=True))
+    assert trials_of(path, batch=3) == trials_of(path, batch=1)
+
+
+def test_an_answer_that_is_no_number_is_hold(tmp_path: Path) -> None:
+    path = constant(tmp_path / "p.onnx", (np.nan, 0.0, 0.0, 0.0))
+    control = make_controller(str(path))
+    control.reset(np.array([0]), 1.0)
+    first = control.step(frame(0.0, 1800.0))
+    again = control.step(frame(0.01, 1800.0))
+    assert control.maneuver.tolist() == [Maneuver.HOLD]
+    assert np.array_equal(first.yaw, again.yaw)
+    assert [row.share_hold for row in trials_of(path)] == [1.0] * 3
+
+
+def test_a_reading_that_cannot_be_used_is_hold(tmp_path: Path) -> None:
+    control = make_controller(str(constant(tmp_path / "p.onnx", FORWARD)))
+    control.reset(np.array([0]), 0.0)
+    control.step(frame(0.0, 1800.0))
+    assert control.maneuver.tolist() == [Maneuver.FORWARD]
+    control.step(frame(0.01, np.nan))
+    assert control.maneuver.tolist() == [Maneuver.HOLD]
+
+
+def test_a_recurrent_state_is_kept_and_forgotten_at_a_reset(tmp_path: Path) -> None:
+    """The scores are (2.5, n, 0, 0) with n the decisions so far: TURN_L from n = 3 on."""
+    control = make_controller(str(counting(tmp_path / "p.onnx")), batch=2)
+    control.reset(np.arange(2), 0.0)
+    ticks = PolicyInterface().ticks
+    said = []
+    for tick in range(6 * ticks):
+        if tick == 4 * ticks:
+            control.reset(np.array([1]), 0.0)
+        control.step(frame(0.01 * tick, 1800.0, batch=2))
+        if tick % ticks == 0:
+            said.append(control.maneuver.tolist())
+    ahead, left = int(Maneuver.FORWARD), int(Maneuver.TURN_L)
+    assert said == [[ahead] * 2] * 3 + [[left] * 2] + [[left, ahead]] * 2
+
+
+def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:
+    path = constant(tmp_path / "p.onnx", (0.0, 0.0, 5.0, 0.0), contract(servos=True))
+    robot = watched(TwinConfig())[0]
+    clock = LockstepClock(robot)
+    config = DriveConfig(controller=str(path), dry_run=0.5, duration=3.0, touch_check=False)
+    session = prepare(config, BoardPort(robot, clock), clock, clock)
+    maneuvers: list[int] = []
+
+    def on_tick(session: Session, now: float) -> None:
+        maneuvers.append(session.control.decision.maneuver)
+
+    report = drive(session, config, True, on_tick)
+    assert report.worst < State.HOLD, report.why
+    assert set(maneuvers[-200:]) == {Maneuver.TURN_R}
+
+
+def test_its_log_replays_bit_for_bit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    drawn(Path("p.onnx"), contract(action="gait", servos=True))
+    words = ["--trials", "1", "--time-limit", "2", "--workers", "1", "--log", "--out", "run"]
+    assert main(["tunnel", "--controllers", "p.onnx", *words]) == 0
+    capsys.readouterr()
+    log = "run/logs/p.onnx-0.mcap"
+    assert main(["log", "replay", log, "--controller", "p.onnx", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["ticks"] > 150
+    assert (said["different"], said["different_commands"]) == (0, 0)
+
+
+# what is refused
+
+
+def wrong(path: Path, **changes: Any) -> Path:
+    made = contract().model_copy(update=changes)
+    return constant(path, FORWARD, made)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--robot.link-pitch", "0.13"], ("robot.link_pitch 0.12", "found 0.13")),
+        (["--control.rate", "50"], ("rate 100.0", "found 50.0")),
+        (["--control.gait.frequency", "0.5"], ("gait.frequency 0.6", "found 0.5")),
+    ],
+)
+def test_what_it_was_not_made_for_is_refused_before_the_first_trial(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], words: tuple[str, ...]
+) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    assert main(["tunnel", "--controllers", str(path), *flags, "--out", str(tmp_path / "r")]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert all(word in line for word in words), line
+    assert not (tmp_path / "r").exists()
+
+
+def test_other_ids_and_directions_are_no_other_robot(tmp_path: Path) -> None:
+    robot = RobotSpec()
+    ids = tuple(range(101, 101 + robot.yaw_count))
+    other = robot.model_copy(update={"yaw": robot.yaw.model_copy(update={"ids": ids})})
+    require_match(contract(), ControlParams(), other, "p.onnx")
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"observations": contract(history=31).observations}, "observations"),
+        ({"actions": contract(action="gait").actions}, "actions"),
+        ({"robot_hash": "0" * 64}, "hash"),
+    ],
+)
+def test_a_contract_that_contradicts_itself_is_refused(change: Any, word: str) -> None:
+    made: Contract = contract().model_copy(update=change)
+    with pytest.raises(ConfigError, match=word):
+        require_match(made, ControlParams(), RobotSpec(), "p.onnx")
+
+
+def test_files_that_are_no_policy_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = constant(tmp_path / "good.onnx", FORWARD)
+    model = onnx.load(str(path))
+    del model.metadata_props[:]
+    (tmp_path / "bare.onnx").write_bytes(model.SerializeToString())
+    (tmp_path / "text.onnx").write_text("no model")
+    constant(tmp_path / "size.onnx", (1.0, 2.0, 3.0), contract())
+    old = json.loads(contract().model_dump_json()) | {"version": 2}
+    model.metadata_props.add(key="antennate", value=json.dumps(old))
+    (tmp_path / "new.onnx").write_bytes(model.SerializeToString())
+    for name, words in {
+        "bare": "expected a policy with a contract",
+        "text": "expected an ONNX model",
+        "size": "expected action of shape (1, 4), found (1, 3)",
+        "new": "expected a contract of version 1, found 2",
+        "none": "found no file",
+    }.items():
+        argv = ["--controllers", str(tmp_path / f"{name}.onnx"), "--out", str(tmp_path / "run")]
+        assert main(["tunnel", *argv]) == 2
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert words in line
+
+
+def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second block of Python puts a contract into a file that another exporter wrote."""
+    pytest.importorskip("gymnasium")
+    monkeypatch.chdir(tmp_path)
+    code = [block.text for block in blocks("envs.md") if block.kind == "python"]
+    known: dict[str, Any] = {}
+    exec(code[0], known)
+    constant(Path("mine.onnx"), (0.0,) * 4, contract(action="gait"))
+    exec(code[1], known)
+    assert Policy(Path("mine.onnx")).contract.about == "my PPO, seed 3"
+
+
+def test_without_onnxruntime_the_way_to_get_it_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    assert main(["tunnel", "--controllers", str(path), "--out", str(tmp_path / "run")]) != 0
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "expected the package onnxruntime" in line
+    assert "--extra onnx" in line
