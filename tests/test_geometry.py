@@ -117,8 +117,9 @@ def test_lifting_legs_have_no_map():
 
 
 def test_a_row_keeps_what_was_planned():
-    config = GeometryConfig(cycles=2, settling_cycles=0)
-    row = next(iter(experiment.plan(config.model_copy(update={"turns": 1})).rows))
+    few = {"gaits": 3, "wave_numbers": (1.0,), "leads": 3, "front_waves": 1, "repeats": 1}
+    config = GeometryConfig(cycles=2, settling_cycles=0, turns=0, **few)
+    row = experiment.plan(config).rows[0]
     walked = walk(config, row)
     assert (walked.lead_rad, walked.model_speed_m_s) == (row.lead_rad, row.model_speed_m_s)
     assert math.isfinite(walked.speed_m_s)

@@ -189,7 +189,9 @@ def _tasks(config: GaitStudyConfig) -> list[_Task]:
 def _optimum(config: GaitStudyConfig) -> Iterator[_Task]:
     """The walk of the gait that is best by the model, if one is asked for."""
     if config.optimise != "none":
-        best = optimise(config.robot, config.gait, config.optimise)
+        robot, gait = config.robot, config.gait
+        # frozen models have a hash, which the checker does not see
+        best = optimise(robot, gait, config.optimise)  # pyright: ignore[reportArgumentType]
         turning = config.optimise == "turning"
         yield config, OPTIMISED, best, Maneuver.TURN_L if turning else Maneuver.FORWARD
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import product
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.mechanics.legged import Cycle
 from antennate.mechanics.twist import Wave
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles, require_wave, wave_of
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats
+
+if TYPE_CHECKING:
+    from antennate.mechanics.legged import Cycle
 
 Goal = Literal["speed", "cost", "turning"]
 _WAVES = (0.4, 1.5)

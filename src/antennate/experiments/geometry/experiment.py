@@ -41,12 +41,14 @@ class GeometryOutcome(Outcome):
         walked: A row for each gait.
         torus: Motion over body and leg phase, None if legs lift.
         twists: The twist map, None likewise.
+        summary: The content of result.json.
     """
 
     config: GeometryConfig
     walked: list[Walked]
     torus: Torus | None
     twists: TwistMap | None
+    summary: dict[str, Any]
 
     @property
     def rows(self) -> Sequence[Walked]:
@@ -55,37 +57,46 @@ class GeometryOutcome(Outcome):
 
     def part(self, name: str) -> list[Walked]:
         """The gaits of a part."""
-        return [row for row in self.walked if row.part == name]
+        return _part(self.walked, name)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
-        names = dict.fromkeys(row.name for row in self.part("named"))
-        named = [self._repeated(name) for name in names]
-        front = [_numbers(row, self.config) for row in self.part("front")]
-        default = named[0]
-        return {
-            "schema": 1,
-            "command": "geometry",
-            "frequency_hz": self.config.gait.frequency,
-            "body_length_m": self.config.length,
-            "measured_body_lengths_per_cycle": self.config.measured,
-            "agreement": agreement(self.config, self.part("random")),
-            "leads": leads(self.config, self.part("lead")),
-            "named": named,
-            "front": front,
-            "fastest_at_no_more_cost": _fastest(default, [*front, *named[:-1]]),
-            "torus": None if self.torus is None else _torus(self.config, self.torus),
-            "turns": turns(self.part("turn")),
-        }
+        return self.summary
 
-    def _repeated(self, name: str) -> dict[str, Any]:
-        """A named gait: means over its walks, with their intervals."""
-        rows = [_numbers(row, self.config) for row in self.part("named") if row.name == name]
-        middle = dict(rows[len(rows) // 2])
-        for key in ("speed_m_s", "cost_of_transport", "body_lengths_per_cycle"):
-            values = np.array([row[key] for row in rows], float)
-            middle[key], middle[f"{key}_95"] = mean95(values)
-        return middle
+
+def _part(rows: Sequence[Walked], name: str) -> list[Walked]:
+    return [row for row in rows if row.part == name]
+
+
+def summary(config: GeometryConfig, rows: Sequence[Walked], torus: Torus | None) -> dict[str, Any]:
+    """The content of result.json."""
+    names = dict.fromkeys(row.name for row in _part(rows, "named"))
+    named = [_repeated(config, [row for row in rows if row.name == name]) for name in names]
+    front = [_numbers(row, config) for row in _part(rows, "front")]
+    return {
+        "schema": 1,
+        "command": "geometry",
+        "frequency_hz": config.gait.frequency,
+        "body_length_m": config.length,
+        "measured_body_lengths_per_cycle": config.measured,
+        "agreement": agreement(config, _part(rows, "random")),
+        "leads": leads(config, _part(rows, "lead")),
+        "named": named,
+        "front": front,
+        "fastest_at_no_more_cost": _fastest(named[0], [*front, *named[:-1]]),
+        "torus": None if torus is None else _torus(config, torus),
+        "turns": turns(_part(rows, "turn")),
+    }
+
+
+def _repeated(config: GeometryConfig, rows: Sequence[Walked]) -> dict[str, Any]:
+    """A named gait: means over its walks, with their intervals."""
+    numbers = [_numbers(row, config) for row in rows]
+    middle = dict(numbers[len(rows) // 2])
+    for key in ("speed_m_s", "cost_of_transport", "body_lengths_per_cycle"):
+        values = np.array([row[key] for row in numbers], float)
+        middle[key], middle[f"{key}_95"] = mean95(values)
+    return middle
 
 
 def _numbers(row: Walked, config: GeometryConfig) -> dict[str, Any]:
@@ -251,7 +262,8 @@ def run(
         gait = config.gait
         wave = Wave(gait.amplitude, gait.wave_number, gait.body_phase, 0.0)
         torus = Torus.of(config.robot, wave, config.cells)
-    return GeometryOutcome(config, walked, torus, plans.twists)
+    result = summary(config, walked, torus)
+    return GeometryOutcome(config, walked, torus, plans.twists, result)
 
 
 GAIT = (

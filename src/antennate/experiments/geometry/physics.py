@@ -43,8 +43,7 @@ class GeometryConfig(Params):
 
     unread: ClassVar[tuple[str, ...]] = (
         *(path for path in HARDWARE_ALONE if path != "robot.yaw.fastest"),
-        *(f"gait.{name}" for name in ("turn_offset", "antenna_mean")),
-        *(f"gait.antenna_{name}" for name in ("amplitude", "frequency")),
+        "gait.turn_offset",
     )
     gaits: int = number(60, "1", "assumed: an interval of a few percent", ge=3, le=10_000)
     """Random gaits, all at the frequency of the gait."""
@@ -98,7 +97,8 @@ class GeometryConfig(Params):
         """Largest amplitude [rad]."""
         if self.largest_amplitude is not None:
             return self.largest_amplitude
-        return self.robot.yaw_limit - SPARE if self.rolls else self.gait.amplitude
+        fastest = self.robot.yaw.fastest / (2.0 * math.pi * self.gait.frequency)
+        return min(self.robot.yaw_limit - SPARE, fastest) if self.rolls else self.gait.amplitude
 
     @property
     def length(self) -> float:
@@ -201,7 +201,7 @@ def named_gaits(config: GeometryConfig) -> dict[str, GaitParams]:
             name: gait for name, gait in gaits.items() if name == "gait" or gait != config.gait
         }
     faster = min(1.15 * config.gait.frequency, 1.0)
-    gaits["gait at 1.15 f"] = GaitParams(**{**config.gait.model_dump(), "frequency": faster})
+    gaits["gait at 1.15 f"] = config.gait.model_copy(update={"frequency": faster})
     return gaits
 
 
@@ -263,7 +263,7 @@ def _modelled(
 ) -> list[Walked]:
     """Rows of some gaits, with what the model makes of them."""
     f = config.gait.frequency if frequency is None else frequency
-    gait = GaitParams(**{**config.gait.model_dump(), "frequency": f})
+    gait = config.gait.model_copy(update={"frequency": f})
     walked = cycles(config.robot, gait, wave)
     numbers = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in wave))
     amplitude, wave_number, lead, offset = (part.tolist() for part in numbers)
@@ -296,24 +296,25 @@ def walk(config: GeometryConfig, row: Walked) -> Walked:
     Raises:
         SimulationError: The physics became invalid.
     """
-    gait = GaitParams(
-        **{
-            **config.gait.model_dump(),
-            "frequency": row.frequency_hz,
-            "amplitude": row.amplitude_rad,
-            "wave_number": row.wave_number,
-            "body_phase": math.remainder(row.lead_rad, 2.0 * math.pi),
-            "turn_offset": abs(row.offset_rad),
+    numbers = {
+        "frequency": row.frequency_hz,
+        "amplitude": row.amplitude_rad,
+        "wave_number": row.wave_number,
+        "body_phase": math.remainder(row.lead_rad, 2.0 * math.pi),
+        "turn_offset": abs(row.offset_rad),
+    }
+    others = {n: getattr(config.gait, n) for n in GaitParams.model_fields if n not in numbers}
+    gait = GaitParams(**numbers, **others)
+    study = GaitStudyConfig().model_copy(
+        update={
+            "cycles": config.cycles,
+            "settling_cycles": config.settling_cycles,
+            "rate": config.rate,
+            "body_length": config.body_length,
+            "robot": config.robot,
+            "gait": gait,
+            "physics": config.physics,
         }
-    )
-    study = GaitStudyConfig(
-        cycles=config.cycles,
-        settling_cycles=config.settling_cycles,
-        rate=config.rate,
-        body_length=config.body_length,
-        robot=config.robot,
-        gait=gait,
-        physics=config.physics,
     )
     maneuver = Maneuver.FORWARD
     if row.offset_rad:
