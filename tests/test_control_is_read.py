@@ -44,6 +44,8 @@ ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
 def test_what_a_controller_is_said_not_to_read_is_that(
     name: str, trigger: str, robot: dict[str, Any]
 ) -> None:
+    if name == "geometric" and robot:
+        pytest.skip("it refuses lifting legs (test_geometric.py)")
     control = ControlParams.model_validate({"rate": 25.0, "escape": {"trigger": trigger}})
     spec = RobotSpec.model_validate(robot)
     with recorded(control) as read:

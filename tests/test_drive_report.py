@@ -249,7 +249,6 @@ def test_L8_a_drive_that_sent_no_pose_ends_with_2_and_says_so(
     assert result["commands_sent"] == 0
     assert ("STALE" in result["refusal"]) == refused
     page = (tmp_path / "report.html").read_text()
-    assert "Beside this page: log drive.mcap." in page
     assert "<figcaption>Readings, bending level, contact, maneuver and supervisor" in page
 
 

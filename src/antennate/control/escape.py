@@ -24,6 +24,8 @@ round), whether the way ahead is free (then it does not escape), or the angle by
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from antennate.control.conditioning import RepetitionDetector
@@ -159,6 +161,21 @@ _FORWARD, _REVERSE = int(Maneuver.FORWARD), int(Maneuver.REVERSE)
 """As plain integers: comparing an array with an enum costs four times as much."""
 
 
+class Sizes(NamedTuple):
+    """Times and sizes of a search that are not those of `SearchParams`, by the same names."""
+
+    patience: float
+    reverse_time: float
+    reverse_most: float
+    turn_time: float
+    growth: float
+    free_time: float
+    proof_time: float
+    lost_turn: float
+    lost_time: float
+    return_time: float
+
+
 class Search:
     """The search of each row.
 
@@ -172,7 +189,7 @@ class Search:
         knowledge: What a simulation knows of the rows; nothing on a robot.
     """
 
-    def __init__(self, params: SearchParams, batch: int) -> None:
+    def __init__(self, params: SearchParams | Sizes, batch: int) -> None:
         self._params = params
         self.maneuver: Ints = np.full(batch, _FORWARD)
         self.tries: Ints = np.zeros(batch, dtype=np.int64)
@@ -285,18 +302,24 @@ class Search:
 
 
 class SearchRule:
-    """FORWARD until readings repeat; then the search."""
+    """FORWARD until readings repeat; then the search.
+
+    Args:
+        control: All numbers of the control.
+        batch: Number of rows B.
+        sizes: Times and sizes in place of those of `control.search`.
+    """
 
     knows: tuple[Kind, ...] = ("side", "jam", "facing", "free")
     needs: tuple[Kind, ...] = ()
 
-    def __init__(self, control: ControlParams, batch: int) -> None:
+    def __init__(self, control: ControlParams, batch: int, sizes: Sizes | None = None) -> None:
         self.turn_offset = control.escape.turn_offset
         self._pressure = control.repetition.pressure
         self._detector = RepetitionDetector(
             control.repetition, batch, control.period, control.gait.frequency
         )
-        self._search = Search(control.search, batch)
+        self._search = Search(sizes or control.search, batch)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Forget everything about some rows."""

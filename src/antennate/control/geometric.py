@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from antennate.control.controllers import RuleController
-from antennate.control.escape import SearchRule
+from antennate.control.escape import SearchRule, Sizes
 from antennate.control.gait import targets
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE
 from antennate.errors import ConfigError
@@ -119,16 +119,20 @@ class GeometricRule(SearchRule):
     """
 
     def __init__(self, control: ControlParams, gait: TwoGaits, batch: int) -> None:
-        own, self._moves = control.geometric, gait
-        times = {
-            "reverse_time": own.reverse_distance / gait.speed,
-            "reverse_most": own.reverse_most / gait.speed,
-            "turn_time": own.turn_angle / gait.turning,
-            "lost_turn": own.lost_angle / gait.turning,
-            "return_time": own.return_angle / gait.turning,
-        }
-        search = control.search.model_copy(update=times)
-        super().__init__(control.model_copy(update={"search": search}), batch)
+        own, search, self._moves = control.geometric, control.search, gait
+        sizes = Sizes(
+            patience=search.patience,
+            reverse_time=own.reverse_distance / gait.speed,
+            reverse_most=own.reverse_most / gait.speed,
+            turn_time=own.turn_angle / gait.turning,
+            growth=search.growth,
+            free_time=search.free_time,
+            proof_time=search.proof_time,
+            lost_turn=own.lost_angle / gait.turning,
+            lost_time=search.lost_time,
+            return_time=own.return_angle / gait.turning,
+        )
+        super().__init__(control, batch, sizes)
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""

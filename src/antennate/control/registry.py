@@ -41,7 +41,7 @@ ABOUT = {
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
     "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
-    "geometric": "closed by a faster gait; its escapes are metres and degrees by a model of the gait",
+    "geometric": "closed by a faster gait; its escapes are in metres and degrees, by a model",
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",

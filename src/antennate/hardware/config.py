@@ -177,7 +177,7 @@ class DriveConfig(RobotConfig):
     unread: ClassVar[tuple[str, ...]] = UNDRIVEN
 
     controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
-    """Open, timed, paper, closed, closed-1, schedule, zigzag, random, MODULE:NAME or
+    """Open, timed, paper, closed, closed-1, geometric, schedule, zigzag, random, MODULE:NAME or
     FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""

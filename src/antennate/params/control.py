@@ -295,9 +295,7 @@ class GeometricParams(Params):
         math.radians(175.0), "rad", "assumed: as search.return_time", gt=0, le=2 * math.pi
     )
     """Angle to turn round."""
-    soften: float = number(
-        0.0, "1", "assumed: off, as it harms (docs/science/geometry.md)", ge=0, le=1
-    )
+    soften: float = number(0.0, "1", "assumed: off (docs/science/geometry.md)", ge=0, le=1)
     """Share of the amplitude that is given up where an antenna is fully bent."""
 
 

@@ -37,7 +37,7 @@ class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
     controller: str | None = number(None, "1", "assumed: the one recorded", examples=[*BUILT_IN])
-    """Open, timed, paper, closed, closed-1, schedule, zigzag, random, MODULE:NAME or
+    """Open, timed, paper, closed, closed-1, geometric, schedule, zigzag, random, MODULE:NAME or
     FILE.py:NAME of your own, or FILE.onnx, in place of the recorded."""
 
     readings: str = number(OWN, "1", "assumed: what was recorded", examples=[*KINDS])

@@ -56,8 +56,8 @@ class TunnelConfig(TrialConfig):
         min_length=1,
         examples=[*BUILT_IN, *PRIVILEGED],
     )
-    """Controllers to run: open, timed, paper, closed, closed-1, schedule, zigzag, random, map,
-    MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
+    """Controllers to run: open, timed, paper, closed, closed-1, geometric, schedule, zigzag,
+    random, map, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )
