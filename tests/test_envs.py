@@ -138,9 +138,8 @@ def test_beside_the_wall_the_gap_counts() -> None:
     env.reset(seed=3)
     for _ in range(5):
         *_, info = env.step(0)
-        scene = env._episodes._episodes[0].scene
-        wall = scene.build.__self__._y  # y of the wall's face
-        gap = abs(wall - info["head"][1]) - RobotSpec().width / 2
+        wall = env.world.model.geom("wall")
+        gap = abs(wall.pos[1] - info["head"][1]) - wall.size[1] - RobotSpec().width / 2
         assert info["reward_hold"] == pytest.approx(HOLD.weight * abs(gap - GAP), abs=1e-9)
 
 
@@ -160,7 +159,7 @@ def test_time_and_number_of_decisions_truncate() -> None:
 def test_a_robot_on_its_back_has_overturned() -> None:
     env = single("Flat")
     env.reset(seed=1)
-    world = env._episodes._body.world(0)
+    world = env.world
     quaternion = world.data.qpos[world.root + 3 : world.root + 7]
     quaternion[:], world.data.qpos[world.root + 2] = (0.0, 1.0, 0.0, 0.0), 0.1
     *_, ended, cut, info = env.step(0)
@@ -345,7 +344,7 @@ def test_constants_are_drawn_for_each_episode_within_their_ranges() -> None:
         again = other.reset(seed=1, options={"episode_number": number})[0]
         assert np.array_equal(again, there)
         offsets.append(4095.0 * (there - here)[0])
-        frictions.append(other._episodes._body.world(0).robot.leg_friction)
+        frictions.append(other.world.robot.leg_friction)
     assert all(19.0 <= offset <= 61.0 for offset in offsets)
     assert all(0.3 <= friction <= 0.9 for friction in frictions)
     assert len({round(x, 1) for x in offsets}) == len(set(frictions)) == 6
@@ -398,8 +397,7 @@ def test_servos_tell_how_far_each_joint_is_from_its_goal() -> None:
     now = slice(names.index("lag yaw1"), names.index("lag yaw1 mean"))
     assert np.abs(first[now]).max() == 0.0
     observation, *_ = env.step(0)
-    body = env._episodes._body
-    world = body.world(0)
+    world = env.world
     lag = world.drives() - world.data.ctrl[world.places.drives]
     assert observation[now] == pytest.approx(lag, abs=1e-5)
     assert np.abs(lag).max() > 0.01

@@ -170,6 +170,29 @@ class Rule(Protocol):
         ...
 
 
+class Moves(Protocol):
+    """What makes joint targets of maneuvers.
+
+    Attributes:
+        phase: Gait phase [rad], shape (B,).
+    """
+
+    phase: Floats
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew at a phase [rad]."""
+        ...
+
+    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+        """The targets of a maneuver each, shape (B,); HOLD keeps them.
+
+        Args:
+            maneuver: One `Maneuver` a row.
+            turn_offset: Yaw offset of its turns [rad].
+        """
+        ...
+
+
 class _OpenRule:
     """FORWARD, unless a reading cannot be used."""
 
@@ -244,6 +267,7 @@ class RuleController:
         control: All numbers of the control.
         robot: The robot.
         batch: Number of robots B.
+        gait: What makes joint targets of its maneuvers; the `Gait` of the control if not given.
 
     Raises:
         ConfigError: The robot has no antennae.
@@ -257,7 +281,14 @@ class RuleController:
         needs: Those that it needs.
     """
 
-    def __init__(self, rule: Rule, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+    def __init__(
+        self,
+        rule: Rule,
+        control: ControlParams,
+        robot: RobotSpec,
+        batch: int,
+        gait: Moves | None = None,
+    ) -> None:
         require_antennae(robot, "this controller")
         self._curves = curves(control)
         self._mean = RunningMean(control.conditioning, batch, control.period)
@@ -265,7 +296,7 @@ class RuleController:
         self._rule: Any = rule
         self.knows: tuple[Kind, ...] = getattr(rule, "knows", ())
         self.needs: tuple[Kind, ...] = getattr(rule, "needs", ())
-        self.gait = Gait(control.gait, robot, batch, control.period)
+        self.gait: Moves = gait or Gait(control.gait, robot, batch, control.period)
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))

@@ -8,6 +8,7 @@ from antennate.params.base import paths_of
 from antennate.params.control import (
     ControlParams,
     EscapeParams,
+    GeometricParams,
     RandomParams,
     RepetitionParams,
     ScheduleParams,
@@ -92,7 +93,13 @@ _SCHEDULE = paths_of(ScheduleParams, "schedule")
 _ZIGZAG = paths_of(ZigzagParams, "zigzag")
 _RANDOM = paths_of(RandomParams, "random")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
-_SEARCH = paths_of(SearchParams, "search")
+_GEOMETRIC = paths_of(GeometricParams, "geometric")
+_SEARCH = (*paths_of(SearchParams, "search"), *_GEOMETRIC)
+_SIZES = (
+    *(f"search.{name}" for name in ("reverse_time", "reverse_most", "turn_time")),
+    *("search.lost_turn", "search.return_time"),
+)
+"""What `geometric` has in metres and degrees."""
 _TABLE = ("gait.turn_offset", *_BLOCKED, "rule.hold_time")
 """What the published table reads and a walk or an escape does not."""
 _TURNING = tuple(path for path in _ESCAPE if path != "escape.turn_offset")
@@ -118,7 +125,8 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "open": (*_TABLE, *_ESCAPE, *_BLIND, *_SEARCH),
     "timed": _without(_TIMED, *_FELT),
     "paper": (*_ESCAPE, *_BLIND, *_SEARCH),
-    "closed": (*_TABLE, *_BLIND, *_OTHER_ESCAPE),
+    "closed": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_GEOMETRIC),
+    "geometric": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_SIZES),
     "closed-1": (*_TABLE, *_BLIND, *_SEARCH),
     BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_BLIND, *_SEARCH),
     "schedule": _without(_SCHEDULE, *_TURNING),

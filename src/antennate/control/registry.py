@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
-from antennate.control import blind, controllers
+from antennate.control import blind, controllers, geometric
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
@@ -25,6 +25,7 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "paper": controllers.paper,
     "closed": controllers.closed_loop,
     "closed-1": controllers.closed_1,
+    "geometric": geometric.geometric,
     "schedule": blind.schedule,
     "zigzag": blind.zigzag,
     "random": blind.RandomController,
@@ -40,6 +41,7 @@ ABOUT = {
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
     "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
+    "geometric": "closed by a faster gait; its escapes are metres and degrees by a model of the gait",
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",

@@ -7,8 +7,7 @@ readings, the looks that end it and the physics are the same, so it is the same 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from antennate.control.policy.actors import make_actor
 from antennate.control.policy.observer import Observer, Vector
 from antennate.control.readings import make_readings
 from antennate.envs.config import EnvConfig, Randomisation, varied
-from antennate.envs.reward import TERMS, terms_of
+from antennate.envs.reward import terms_of
+from antennate.envs.truth import OUTCOMES, Outcome, Truth, replace_rows
 from antennate.errors import SceneError
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import SimRobot
@@ -31,10 +31,9 @@ from antennate.sim.trial import (
     scene_of,
     time_limit_of,
 )
+from antennate.sim.world import World
 from antennate.types import AntennaFrame, Bools, Floats, Ints
 
-Outcome = Literal["success", "timeout", "left", "overturned", "invalid"]
-OUTCOMES: tuple[Outcome, ...] = ("success", "timeout", "left", "overturned", "invalid")
 _MOST_SKIPPED = 100
 """Episodes in a row without room for the robot, after which a scene is given up."""
 
@@ -57,46 +56,6 @@ class Episode:
     judge: Judge
     progress: float = 0.0
     decisions: int = 0
-
-
-@dataclass(slots=True)
-class Truth:
-    """What only the simulation knows of B robots; each call makes arrays of its own.
-
-    Attributes:
-        seed, episode_number: What the episodes follow from, shape (B,).
-        t: Time since the start [s], shape (B,).
-        head: Position and heading of the head [m, m, rad], shape (B, 3).
-        progress: How far the head has come [m], shape (B,); `length` is that of the exit.
-        force: Sum of the normal forces on the robot [N], shape (B,).
-        maneuver: What was done, a `Maneuver`, shape (B,).
-        terms: Terms of the reward in the order of `TERMS`, shape (B, terms).
-        outcome: Number in `OUTCOMES`, -1 while an episode goes on, shape (B,).
-        reason: Why an episode is invalid, by row.
-    """
-
-    seed: Ints
-    episode_number: Ints
-    t: Floats
-    head: Floats
-    progress: Floats
-    length: Floats
-    force: Floats
-    maneuver: Ints
-    terms: Floats
-    outcome: Ints
-    reason: dict[int, str] = field(default_factory=dict[int, str])
-
-    @classmethod
-    def empty(cls, batch: int) -> Truth:
-        """That of rows without an episode."""
-        whole = (np.zeros(batch, np.int64) for _ in range(3))
-        real = (np.zeros(batch) for _ in range(4))
-        seed, episode, maneuver = whole
-        t, progress, length, force = real
-        head, terms = np.zeros((batch, 3)), np.zeros((batch, len(TERMS)))
-        outcome = np.full(batch, -1)
-        return cls(seed, episode, t, head, progress, length, force, maneuver, terms, outcome)
 
 
 @dataclass(slots=True)
@@ -165,6 +124,10 @@ class Episodes:
         rows = np.zeros(self._batch, dtype=bool)
         rows[[*self._episodes]] = True
         return rows
+
+    def world(self, row: int) -> World:
+        """The world of the episode in a row."""
+        return self._body.world(row)
 
     def seed(self, row: int, seed: int, number: int, stride: int) -> None:
         """Choose the next episode of a row; the numbers of those after it are a stride apart."""
@@ -349,13 +312,3 @@ def draw_episode(
     gait, period = config.control.gait, config.control.period
     trial = draw_trial(own, scene, number, gait, period)
     return trial, drawn["sensor_gain"], drawn["sensor_offset"]
-
-
-def replace_rows(truth: Truth, other: Truth, rows: Bools) -> Truth:
-    """A truth with some rows, shape (B,), of another one."""
-    parts: dict[str, Any] = {
-        name: np.where(rows.reshape(-1, *[1] * (value.ndim - 1)), getattr(other, name), value)
-        for name in (f.name for f in fields(Truth))
-        if isinstance(value := getattr(truth, name), np.ndarray)
-    }
-    return Truth(**parts, reason=dict(truth.reason))

@@ -8,10 +8,12 @@ import numpy as np
 from gymnasium import Env
 from gymnasium.error import ResetNeeded
 
-from antennate.envs.episodes import OUTCOMES, Episodes, Truth
+from antennate.envs.episodes import Episodes
 from antennate.envs.reward import TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
+from antennate.envs.truth import OUTCOMES, Truth
 from antennate.envs.vector import LARGEST_SEED, config_of, whole
+from antennate.sim.world import World
 
 
 class AntennaEnv(Env[Any, Any]):
@@ -39,6 +41,11 @@ class AntennaEnv(Env[Any, Any]):
         self._episodes = Episodes(self.config, 1)
         self._every = np.ones(1, bool)
         self._seeded = False
+
+    @property
+    def world(self) -> World:
+        """The world of the running episode: what only the simulation knows, and its engine."""
+        return self._episodes.world(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -12,9 +12,10 @@ from gymnasium.vector.utils import batch_space
 
 from antennate.control.policy.interface import PolicyInterface
 from antennate.envs.config import EnvConfig
-from antennate.envs.episodes import OUTCOMES, Episodes, Truth
+from antennate.envs.episodes import Episodes
 from antennate.envs.reward import TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
+from antennate.envs.truth import OUTCOMES, Truth
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import from_values

@@ -270,6 +270,37 @@ class SearchParams(Params):
     """Time to turn round; no heading is farther than that from the first one."""
 
 
+class GeometricParams(Params):
+    """What `geometric` does otherwise than `closed`: its way forward, and escapes by their size."""
+
+    forward: Literal["swift", "thrifty", "gait"] = number(
+        "swift", "1", "fitted: antennate geometry; the fastest at no more cost of transport"
+    )
+    """Gait of FORWARD and REVERSE: a named one, or `gait` as the turns."""
+    reverse_distance: float = number(
+        0.5, "m", "assumed: as search.reverse_time by the default gait", gt=0, le=5
+    )
+    """How far to back off at first."""
+    reverse_most: float = number(1.2, "m", "assumed: as search.reverse_most", gt=0, le=5)
+    """Farthest to back off."""
+    turn_angle: float = number(
+        math.radians(60.0), "rad", "assumed: as search.turn_time", gt=0, le=math.pi
+    )
+    """Angle of the first turn."""
+    lost_angle: float = number(
+        math.radians(80.0), "rad", "assumed: as search.lost_turn", gt=0, le=math.pi
+    )
+    """Turn from the first heading after which the robot can have turned round."""
+    return_angle: float = number(
+        math.radians(175.0), "rad", "assumed: as search.return_time", gt=0, le=2 * math.pi
+    )
+    """Angle to turn round."""
+    soften: float = number(
+        0.0, "1", "assumed: off, as it harms (docs/science/geometry.md)", ge=0, le=1
+    )
+    """Share of the amplitude that is given up where an antenna is fully bent."""
+
+
 class ControlParams(Params):
     """Conditioning, contact rule, maneuvers and gait of the controllers."""
 
@@ -283,6 +314,7 @@ class ControlParams(Params):
     repetition: RepetitionParams = RepetitionParams()
     escape: EscapeParams = EscapeParams()
     search: SearchParams = SearchParams()
+    geometric: GeometricParams = GeometricParams()
     timed: TimedParams = TimedParams()
     schedule: ScheduleParams = ScheduleParams()
     zigzag: ZigzagParams = ZigzagParams()

@@ -1,0 +1,143 @@
+"""`geometric`: the search of `closed` in metres and degrees, by the model of the gait.
+
+It walks by the gait that the model found fastest at no more cost of transport, and turns by the
+configured one. How fast both go follows from the quasi-static model (`antennate.robots.mechanics`),
+so an escape keeps its size at every frequency and on every robot. The body wave goes over from one
+to the other at limited rates: no joint target jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from antennate.control.controllers import RuleController
+from antennate.control.escape import SearchRule
+from antennate.control.gait import targets
+from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE
+from antennate.errors import ConfigError
+from antennate.mechanics.twist import Wave
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
+from antennate.robots.mechanics import cycles
+from antennate.robots.spec import RobotSpec
+from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
+
+NUMBER_RATE = 0.25
+"""Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
+_DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
+_STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
+_TURNS = np.array([False, True, True, False, False])
+
+
+@lru_cache
+def _speeds(robot: str, frequency: float, *waves: Wave) -> tuple[Floats, Floats]:
+    """Speed [m/s] and rate of yaw [rad/s] of body waves on a robot, which is given as JSON."""
+    columns = (np.array(part, float) for part in zip(*waves, strict=True))
+    gait = GaitParams(frequency=frequency)
+    walked = cycles(RobotSpec.model_validate_json(robot), gait, Wave(*columns))
+    return frequency * walked.step, frequency * walked.yaw
+
+
+class TwoGaits:
+    """A gait to walk by and one to turn by, with a smooth way between them; as `Gait`.
+
+    Args:
+        control: The gait of turns, the rates, and which gait walks.
+        robot: A robot with rolling legs.
+        batch: Number of robots B.
+
+    Attributes:
+        phase: Gait phase [rad], shape (B,).
+        wave: Amplitude [rad], wave number, lead [rad] and offset [rad] now, shape (B, 4).
+        bent: Largest flex of each row, 0 to 1, shape (B,), of which `soften` gives way.
+        speed: Forward speed by the model [m/s].
+        turning: Rate of a turn by the model [rad/s].
+
+    Raises:
+        ConfigError: The robot's legs lift.
+    """
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        if robot.legs.kind != "rolling":
+            raise ConfigError("expected a robot with rolling legs, found lifting ones")
+        gait, own, most = control.gait, control.geometric, robot.yaw_limit
+        ahead = gait if own.forward == "gait" else GaitParams.named(own.forward)
+        amplitudes = min(ahead.amplitude, most), min(gait.amplitude, most)
+        walk = Wave(amplitudes[0], ahead.wave_number, ahead.body_phase, 0.0)
+        turn = Wave(amplitudes[1], gait.wave_number, gait.body_phase, control.escape.turn_offset)
+        speed, yaw = _speeds(robot.model_dump_json(), gait.frequency, walk, turn)
+        self.speed, self.turning = abs(float(speed[0])), abs(float(yaw[1]))
+        self._goals = np.array([walk, turn], float)
+        self._robot, self._soften, self._gait = robot, own.soften, gait
+        rates = (AMPLITUDE_RATE, NUMBER_RATE, LEAD_RATE, gait.offset_rate)
+        self._most = control.period * np.array(rates)
+        self._advance = 2.0 * math.pi * gait.frequency * control.period
+        self._swing = 2.0 * math.pi * gait.antenna_frequency * control.period
+        self._joint = 2.0 * math.pi * np.arange(1, robot.links) / robot.yaw_count
+        self.phase, self.bent, self._sweep = np.zeros((3, batch))
+        self.wave: Floats = np.tile(self._goals[0], (batch, 1))
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew at a phase [rad], in the wave that walks."""
+        self.phase[rows] = phase
+        self.wave[rows] = self._goals[0]
+        self.bent[rows] = self._sweep[rows] = 0.0
+
+    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+        """Advance one control period and return the targets; HOLD keeps the command."""
+        moves = (maneuver != int(Maneuver.HOLD))[:, None]
+        goal = self._goals[_TURNS[maneuver].astype(int)]
+        goal[:, 0] *= 1.0 - self._soften * self.bent
+        goal[:, 3] *= _STEER[maneuver]
+        self.wave += moves * np.clip(goal - self.wave, -self._most, self._most)
+        self.phase += _DIRECTION[maneuver] * self._advance
+        self._sweep += moves[:, 0] * self._swing
+        amplitude, number, lead, offset = self.wave.T[:, :, None]
+        yaw = amplitude * np.sin(number * self._joint + lead - self.phase[:, None]) + offset
+        limit = self._robot.yaw_limit
+        command = targets(self._gait, self._robot, self.phase, self.wave[:, 3], self._sweep)
+        return replace(command, yaw=np.clip(yaw, -limit, limit), leg=self._legs())
+
+    def _legs(self) -> Floats:
+        """Angles of rolling legs [rad], shape (B, L, 2): each link later by the wave as it is."""
+        lag = 2.0 * math.pi * self.wave[:, 1, None] * np.arange(self._robot.links)
+        turned = self.phase[:, None] - lag / self._robot.links
+        return turned[:, :, None] + np.array([0.0, math.pi])
+
+
+class GeometricRule(SearchRule):
+    """The search of `closed`, its sizes in metres and degrees.
+
+    Args:
+        control: All numbers of the control.
+        gait: How fast it walks and turns, and whom it tells how far antennae are bent.
+        batch: Number of rows B.
+    """
+
+    def __init__(self, control: ControlParams, gait: TwoGaits, batch: int) -> None:
+        own, self._moves = control.geometric, gait
+        times = {
+            "reverse_time": own.reverse_distance / gait.speed,
+            "reverse_most": own.reverse_most / gait.speed,
+            "turn_time": own.turn_angle / gait.turning,
+            "lost_turn": own.lost_angle / gait.turning,
+            "return_time": own.return_angle / gait.turning,
+        }
+        search = control.search.model_copy(update=times)
+        super().__init__(control.model_copy(update={"search": search}), batch)
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        """As of a `Rule`."""
+        self._moves.bent = np.clip(np.nan_to_num(flex).max(axis=1), 0.0, 1.0)
+        return super().step(t, level, contact, flex)
+
+
+def geometric(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
+    """`geometric`: `closed` by a faster gait, with escapes in metres and degrees."""
+    gait = TwoGaits(control, robot, batch)
+    rule = GeometricRule(control, gait, batch)
+    return RuleController(rule, control, robot, batch, gait)
