@@ -1,4 +1,4 @@
-"""The executed notebook in examples: what it shows is what its cells give."""
+"""The executed notebooks in examples: what they show is what their cells give."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-NOTEBOOK = Path(__file__).parents[1] / "examples" / "first_look.ipynb"
+FOLDER = Path(__file__).parents[1] / "examples"
+NAMES = ("first_look", "geometry")
 RUN_CELLS = """
 import ast, contextlib, io, json, sys
 
@@ -56,8 +57,8 @@ def worded(text: str) -> str:
     return " ".join(re.sub(r"-?\b\d+(\.\d*)?\b", "#", text).split())
 
 
-def kept() -> list[dict[str, Any]]:
-    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+def kept(name: str) -> list[dict[str, Any]]:
+    cells = json.loads((FOLDER / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
     return [cell for cell in cells if cell["cell_type"] == "code"]
 
 
@@ -72,28 +73,31 @@ def outputs(cell: dict[str, Any]) -> tuple[str, str, str]:
     return printed, text, page
 
 
-def test_the_notebook_is_executed_small_and_says_nothing_of_the_machine() -> None:
-    text = NOTEBOOK.read_text(encoding="utf-8")
+@pytest.mark.parametrize(("name", "pictures"), [("first_look", 2), ("geometry", 1)])
+def test_a_notebook_is_executed_small_and_says_nothing_of_the_machine(
+    name: str, pictures: int
+) -> None:
+    text = (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
     assert len(text) < 300_000
     held = json.loads(text)
-    assert [cell["execution_count"] for cell in kept()] == [*range(1, len(kept()) + 1)]
+    assert [cell["execution_count"] for cell in kept(name)] == [*range(1, len(kept(name)) + 1)]
     assert all(cell["metadata"] == {} for cell in held["cells"])
     assert set(held["metadata"]) == {"kernelspec", "language_info"}
-    assert all(any(outputs(cell)) for cell in kept())
+    assert all(any(outputs(cell)) for cell in kept(name))
     without_pictures = re.sub(r"base64,[A-Za-z0-9+/=]+", "", text)
     assert not re.search(
         r"/(home|root|tmp|work|Users)\b|\d\d:\d\d:\d\d|20\d\d-\d\d", without_pictures
     )
-    pages = [Cells(outputs(cell)[2]) for cell in kept()]
-    assert sum(page.pictures for page in pages) == 2
+    pages = [Cells(outputs(cell)[2]) for cell in kept(name)]
+    assert sum(page.pictures for page in pages) == pictures
     ticks = {"level_left", "level_right", "contact_left", "contact_right", "head_x", "head_y"}
-    assert any(ticks <= set(page.texts) for page in pages)
+    assert name != "first_look" or any(ticks <= set(page.texts) for page in pages)
 
 
-@pytest.mark.slow
-def test_its_cells_give_what_it_shows(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["geometry", pytest.param("first_look", marks=pytest.mark.slow)])
+def test_its_cells_give_what_it_shows(name: str, tmp_path: Path) -> None:
     """In a process of their own; numbers of walks may differ, those of springs may not."""
-    sources = ["".join(cell["source"]) for cell in kept()]
+    sources = ["".join(cell["source"]) for cell in kept(name)]
     assert all(ast.parse(source).body for source in sources)
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN_CELLS],
@@ -105,7 +109,7 @@ def test_its_cells_give_what_it_shows(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == []
-    for cell, (printed, text, page) in zip(kept(), json.loads(done.stdout), strict=True):
+    for cell, (printed, text, page) in zip(kept(name), json.loads(done.stdout), strict=True):
         before = outputs(cell)
         assert worded(before[0]) == worded(printed)
         if text.startswith("<") or not page:  # the text of a frame depends on the terminal
