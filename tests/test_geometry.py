@@ -34,7 +34,7 @@ def result(tmp_path_factory):
     out = tmp_path_factory.mktemp("geometry") / "run"
     assert main(["geometry", *TINY, "--workers", "1", "--out", str(out)]) == 0
     names = {path.stem for path in (out / "figures").iterdir()}
-    assert names == {"agreement", "leads", "front", "torus", "twists"}
+    assert names == {"agreement", "leads", "front", "torus", "twists", "swimmer"}
     return json.loads((out / "result.json").read_text())
 
 

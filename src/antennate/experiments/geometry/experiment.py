@@ -377,6 +377,7 @@ EXPERIMENT = Experiment.of_folder(
         "front": "Speed and cost of transport, with the configured gait and named ones.",
         "torus": "Curvature over body and leg phase, with the loops of two leads.",
         "twists": "The twist map: amplitude and offset over speed and curvature, and walked turns.",
+        "swimmer": "Beside it: the curvature of Purcell's swimmer, with its best strokes.",
     },
     explained="docs/results.md",
 )

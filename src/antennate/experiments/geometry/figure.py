@@ -15,13 +15,16 @@ from antennate import figures as style
 from antennate.experiments.geometry.experiment import GeometryOutcome
 from antennate.experiments.geometry.physics import Walked, columns
 from antennate.experiments.geometry.torus import Torus
+from antennate.experiments.swimmers import swimmer_figure
+from antennate.mechanics.chain import purcell
+from antennate.mechanics.maps import curvature_map
 from antennate.mechanics.twist import TwistMap
 
 _DASHED = (0, (4, 2))
 
 
 def figures(outcome: GeometryOutcome) -> dict[str, Figure]:
-    """The figures of a run; torus and twist map only where legs roll."""
+    """The figures of a run, and the swimmer; torus and twist map only where legs roll."""
     result = outcome.result()
     drawn = {
         "agreement": agreement(outcome.part("random"), result["agreement"]),
@@ -32,6 +35,7 @@ def figures(outcome: GeometryOutcome) -> dict[str, Figure]:
         drawn["torus"] = torus(outcome.torus, outcome.config.gait.body_phase)
     if outcome.twists is not None:
         drawn["twists"] = twists(outcome.twists, outcome.part("turn"))
+    drawn["swimmer"] = swimmer_figure(curvature_map(purcell()))
     return drawn
 
 
