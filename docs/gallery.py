@@ -43,7 +43,7 @@ SCRIPTS = {
 FEW = {
     "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
-    "geometry": "--gaits 4 --wave-numbers 1 --leads 3 --front-waves 1 --turns 2 --repeats 2",
+    "geometry": "--gaits 4 --wave-numbers 1 --leads 5 --front-waves 1 --turns 2 --repeats 2",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",

@@ -24,7 +24,7 @@ from antennate.robots.mechanics import cycles, peaks, wave_of
 from antennate.robots.spec import RobotSpec
 
 TINY = [
-    *("--gaits", "4", "--wave-numbers", "1", "--leads", "3", "--front-waves", "1"),
+    *("--gaits", "4", "--wave-numbers", "1", "--leads", "5", "--front-waves", "1"),
     *("--turns", "2", "--cells", "8", "--repeats", "2", "--cycles", "2", "--settling-cycles", "1"),
 ]
 
@@ -104,7 +104,7 @@ def test_lifting_legs_have_no_map():
         gait=GaitParams.named("b11bl0"),
         gaits=3,
         wave_numbers=(1.0,),
-        leads=3,
+        leads=5,
         front_waves=1,
         cycles=2,
     )
@@ -117,7 +117,7 @@ def test_lifting_legs_have_no_map():
 
 
 def test_a_row_keeps_what_was_planned():
-    few = {"gaits": 3, "wave_numbers": (1.0,), "leads": 3, "front_waves": 1, "repeats": 1}
+    few = {"gaits": 3, "wave_numbers": (1.0,), "leads": 5, "front_waves": 1, "repeats": 1}
     config = GeometryConfig(cycles=2, settling_cycles=0, turns=0, **few)
     row = experiment.plan(config).rows[0]
     walked = walk(config, row)

@@ -122,7 +122,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {
             "gaits": 3,
             "wave_numbers": [1.0],
-            "leads": 3,
+            "leads": 5,
             "front_waves": 1,
             "turns": 1,
             "cells": 6,

@@ -237,7 +237,7 @@ def test_a_log_that_was_not_closed_is_no_error(
         (["."], "expected a run with a log, found none"),
         (["empty"], "expected a log with ticks, found none"),
         (["text"], "no intact header, 0 intact ticks; damaged places: 1"),
-        (["own"], "give --controller with this name if its code may run"),
+        (["own"], "give --controller with its name if it may run"),
         (
             ["own", "--controller", "sideways"],
             "controller: expected one of open, timed, paper, closed",

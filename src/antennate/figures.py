@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import io
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -127,9 +128,15 @@ def series(count: int) -> list[str]:
 
 
 def controller_colours(names: Sequence[str]) -> dict[str, str]:
-    """A colour for each controller: ours have their own, others take those of `SERIES` in turn."""
+    """A colour for each controller: ours have their own, others take free ones in turn.
+
+    Free are those of `SERIES`, then of ours, that no other of these controllers has.
+    """
     others = [name for name in names if name not in CONTROLLER_COLOURS]
-    return {**CONTROLLER_COLOURS, **dict(zip(others, series(len(others)), strict=True))}
+    used = {CONTROLLER_COLOURS[name] for name in names if name in CONTROLLER_COLOURS}
+    free = dict.fromkeys([*series(len(SERIES)), *CONTROLLER_COLOURS.values()])
+    colours = [colour for colour in free if colour not in used] or [*free]
+    return {**CONTROLLER_COLOURS, **dict(zip(others, itertools.cycle(colours), strict=False))}
 
 
 @functools.cache

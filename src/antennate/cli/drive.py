@@ -20,6 +20,7 @@ from antennate.cli.options import option
 from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
+from antennate.control.registry import BUILT_IN
 from antennate.errors import BadInputError, ConfigError, LogError, OutputError
 from antennate.hardware.config import DriveConfig, RobotFile, TeleopConfig
 from antennate.hardware.driving.connect import connect
@@ -148,6 +149,8 @@ def _walk(
         finally:  # the robot's state is told even if it cannot be kept
             log = folder.path / (result["logs"] or [LOG])[0]
             words = [] if controller is None else ["--controller", "open"]
+            if config.controller not in BUILT_IN and controller is None:
+                words = ["--controller", config.controller]
             _show(result, options, typed("replay", str(log), *words))
         ticks = 0 if result["pace"] is None else result["pace"]["ticks"]
         if result["logs"] and 0 < ticks <= _LONGEST_DRAWN:

@@ -149,11 +149,16 @@ def drawn_table(table: Table) -> Any:
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
     for name in table.columns:
-        parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else name.replace("_", " ")
+        parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else _words(name)
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
     return drawn
+
+
+def _words(name: str) -> str:
+    """A name with spaces for underscores, unless it is a file of the user."""
+    return name if set("/.") & set(name) else name.replace("_", " ")
 
 
 def print_table(table: Table) -> None:

@@ -2,8 +2,9 @@
 
 It walks by the gait that the model found fastest at no more cost of transport, and turns by the
 configured one. How fast both go follows from the quasi-static model (`antennate.robots.mechanics`),
-so an escape keeps its size at every frequency and on every robot. The body wave goes over from one
-to the other at limited rates: no joint target jumps.
+so escapes keep their mean size at every frequency and on every robot. They are times all the same:
+a single turn depends on the gait phase at which it begins (docs/science/geometry.md). The body wave
+goes over from one to the other at limited rates: no joint target jumps.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
 
 NUMBER_RATE = 0.25
 """Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
+_SLOWEST, _LEAST_TURN = 0.02, 0.03
+"""Least speed [m/s] and rate of turns [rad/s]: an escape would take half a minute (assumed)."""
 _DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
 _STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
 _TURNS = np.array([False, True, True, False, False])
@@ -70,7 +73,12 @@ class TwoGaits:
         walk = Wave(amplitudes[0], ahead.wave_number, ahead.body_phase, 0.0)
         turn = Wave(amplitudes[1], gait.wave_number, gait.body_phase, control.escape.turn_offset)
         speed, yaw = _speeds(robot.model_dump_json(), gait.frequency, walk, turn)
-        self.speed, self.turning = abs(float(speed[0])), abs(float(yaw[1]))
+        self.speed, self.turning = float(speed[0]), abs(float(yaw[1]))
+        if self.speed < _SLOWEST or self.turning < _LEAST_TURN:
+            raise ConfigError(
+                f"expected gaits that walk {_SLOWEST:g} m/s and turn {_LEAST_TURN:g} rad/s at "
+                f"least, found {self.speed:.3f} m/s and {self.turning:.3f} rad/s by the model"
+            )
         self._goals = np.array([walk, turn], float)
         self._robot, self._soften, self._gait = robot, own.soften, gait
         rates = (AMPLITUDE_RATE, NUMBER_RATE, LEAD_RATE, gait.offset_rate)

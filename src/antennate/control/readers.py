@@ -152,7 +152,7 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
     paths = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
     if name == "closed-1" and "jam" in knows:
         paths |= {"escape.trigger", *_REPEATED, *_BLOCKED}
-    if name == "closed" and "jam" in knows:
+    if name in ("closed", "geometric") and "jam" in knows:
         paths |= {"search.patience", *_REPEATED}
     if name == "timed" and "jam" in knows:
         paths |= set(_TIMED)

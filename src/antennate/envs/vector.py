@@ -31,6 +31,8 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
         ConfigError: There is no such scene, or a value is unknown or out of bounds.
     """
     values = dict(values)
+    if "seed" in values:
+        raise ConfigError("expected the seed in reset(seed=...), found it as an argument")
     if "action" in values:
         action, interface = values.pop("action"), values.get("interface", {})
         if isinstance(interface, PolicyInterface):
@@ -127,11 +129,17 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         reward = truth.terms.sum(axis=1)
         return decision.observation.copy(), reward, ended & ~cut, cut, infos
 
+    def _seed_by_chance(self, seed: Any) -> None:
+        """Give every row episodes of a seed of its own, unless one seed is given or was."""
+        if not self._seeded and not isinstance(seed, int | np.integer):
+            chance = int(self.np_random.integers(2**32, LARGEST_SEED))
+            for row in range(self.num_envs):
+                self._episodes.seed(row, chance, row, self.num_envs)
+
     def _seed(self, seed: Any, episode: Any, rows: Bools) -> None:
         """Say which episodes some rows begin."""
         count = self.num_envs
-        if seed is None and not self._seeded:
-            seed = int(self.np_random.integers(2**32, LARGEST_SEED))
+        self._seed_by_chance(seed)
         if isinstance(seed, int | np.integer):
             self._np_random, self._np_random_seed = _generator(int(seed)), int(seed)
             for row in np.flatnonzero(rows).tolist():

@@ -313,7 +313,7 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
     """
     wanted = header.controller if name is None else name
     if name is None and wanted not in {*BUILT_IN, *PRIVILEGED}:
-        more = "closed, for example" if wanted == TWIN else "with this name if its code may run"
+        more = "closed, for example" if wanted == TWIN else "with its name if it may run"
         found = shortened(repr(wanted))
         raise LogError(
             f"expected one of {', '.join(BUILT_IN)} in the log, found {found}; give "

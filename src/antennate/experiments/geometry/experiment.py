@@ -296,7 +296,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         named["of the front"] = best["gait"]
     word = "reached" if best["reached"] else "not reached"
     note = (
-        f"The fastest gait that costs no more than the first walks at "
+        f"At its frequency, the fastest gait that costs no more than the first walks at "
         f"{best['speed_over_default']:.2f} of its speed ({FASTER:g} was the aim: {word})."
     )
     if (measured := result["measured_body_lengths_per_cycle"]) is not None:

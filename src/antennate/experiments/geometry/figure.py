@@ -115,7 +115,8 @@ def front(rows: Sequence[Walked], named: Sequence[Mapping[str, Any]]) -> Figure:
     panel.set(
         xlabel="speed [m/s]", ylabel="cost of transport", title="Engine; right and low is good"
     )
-    low, high = np.nanpercentile(cost, [0, 75])
+    own = [row["cost_of_transport"] or math.nan for row in named]
+    low, high = np.nanmin([*cost, *own]), np.nanmax([np.nanpercentile(cost, 75), *own])
     panel.set_ylim(0.9 * low, 1.25 * high)
     figure.colorbar(dots, ax=panel, label="wave number", location="bottom", shrink=0.7)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside upper left", ncols=2)

@@ -57,7 +57,7 @@ class GeometryConfig(Params):
         max_length=50,
     )
     """Wave numbers whose best lead is sought."""
-    leads: int = number(9, "1", "assumed: 40 deg to both sides of the model's best", ge=3, le=36)
+    leads: int = number(9, "1", "assumed: 40 deg to both sides of the model's best", ge=5, le=36)
     """Leads walked about each best one, 10 deg apart."""
     front_waves: int = number(9, "1", "assumed: steps of 0.1", ge=1, le=50)
     """Wave numbers from 0.4 to 1.2 of the gaits that may be fast or cheap."""
