@@ -47,6 +47,7 @@ from antennate.studies.run_files import (
     inside,
     listed,
     read_as,
+    remove_described,
     remove_run,
     with_end,
     writing,
@@ -355,7 +356,7 @@ class RunDirectory:
             with contextlib.suppress(OSError, OutputError):
                 self._drop_partial()
                 self._give_room()
-                remove_run(self.path)
+                (remove_described if self.old is None else remove_run)(self.path)
                 give_back(self.path, self._created, self.old)
         if self._lock is not None:
             os.close(self._lock)

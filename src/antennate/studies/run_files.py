@@ -171,6 +171,22 @@ def remove_run(place: Path) -> None:
         file.unlink()
 
 
+def remove_described(place: Path) -> None:
+    """Remove what is known before a run, and its logs, from a directory without a result.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    for file in files_of(place):
+        if file.name in (CONFIG, VERSIONS, COMMAND) or file.parent == place / LOGS:
+            file.unlink()
+    if files_of(place) == [place / FILES]:
+        (place / FILES).unlink()
+    if is_folder(place / LOGS):
+        with contextlib.suppress(OSError):  # it holds files of somebody else
+            (place / LOGS).rmdir()
+
+
 def is_finished(place: Path) -> bool:
     """Whether a directory holds the whole result of a run that was not interrupted."""
     try:
