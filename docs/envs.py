@@ -64,6 +64,8 @@ environment for your [own scene](scenes.md).
 - **Ends**: terminated are `success` (the head is out by the exit), `left` (out another way),
   `overturned` and `invalid` (the physics or the scene failed; `info["reason"]` says how).
   Truncated is `timeout`, at the scene's limit, `time_limit` or `max_episode_steps`.
+- Ends are looked for at the beginning of a control tick, as in a trial: what happens in the last
+  tick of a decision ends the episode at the first one of the next, which then moves nothing.
 - **Autoreset** of a vector: `autoreset_mode="NEXT_STEP"` (the default), `"SAME_STEP"` (with
   `final_obs` and `final_info`) or `"DISABLED"` (with `reset(options={{"reset_mask": rows}})`).
 - **`info`** holds what only the simulation knows: `head` (x, y [m], heading [rad]), `progress` and

@@ -419,3 +419,28 @@ def test_without_a_seed_episodes_are_of_a_seed_of_chance() -> None:
     seeds.append([single("Flat").reset()[1]["seed"]] * 2)
     assert all(a == b and a >= 2**32 for a, b in seeds)
     assert len({a for a, _ in seeds}) == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"render_mode": "human"}, "as environments draw nothing, found 'human'"),
+        ({"seed": 5}, r"expected the seed in reset\(seed=\.\.\.\)"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(given, said):
+    for make in (envs.AntennaEnv, envs.AntennaVectorEnv):
+        with pytest.raises(ConfigError, match=said):
+            make(scene="flat", **given)
+
+
+def test_a_vector_of_no_robots_is_refused():
+    with pytest.raises(ConfigError, match="num_envs: expected at least 1, found 0"):
+        envs.AntennaVectorEnv(num_envs=0, scene="flat")
+
+
+def test_rows_without_a_seed_of_their_own_get_one_by_chance():
+    vector = gym.make_vec("antennate/Flat-v1", num_envs=3)
+    _, info = vector.reset(seed=[1, None, 2])
+    assert info["seed"][[0, 2]].tolist() == [1, 2]
+    assert info["seed"][1] >= 2**32

@@ -24,6 +24,7 @@ from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.experiments.wall import experiment as wall
 from antennate.experiments.wall.physics import Traverse
+from antennate.figures import controller_colours
 from antennate.robots.spec import RobotSpec
 from antennate.robots.wiring import wiring
 from antennate.types import Maneuver
@@ -382,3 +383,9 @@ def test_paths_are_kept_of_the_trials_that_are_drawn():
     assert found[last].parts
     assert found[last].before
     assert found[last + 1] is None
+
+
+def test_no_two_controllers_of_a_figure_have_one_colour():
+    names = ["timed", "closed", "closed@yoked", "closed@swapped", "a.py:a", "b.py:b"]
+    colours = controller_colours(names)
+    assert len({colours[name] for name in names}) == len(names)

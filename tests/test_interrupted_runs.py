@@ -20,6 +20,7 @@ from antennate.errors import OutputError
 from antennate.messages import command_words
 from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.store import Store
 from antennate.telemetry.reader import LogReader
 
 TUNNEL = ["tunnel", "--controllers", "open", "--time-limit", "0.2", "--trials", "3"]
@@ -101,6 +102,27 @@ def test_an_interrupted_run_names_the_whole_command_that_goes_on(
     assert main(told[1:]) == 0
     result = json.loads((tmp_path / folder / "result.json").read_text())
     assert result["controllers"]["open"]["trials"] == 3
+
+
+def test_an_interrupted_gait_goes_on_after_the_walks_that_had_ended(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("UV", raising=False)
+    words = ["gait", "--sweep-points", "2", "--cycles", "2", "--settling-cycles", "0"]
+    kept = Store.append
+
+    def append(self, *given):
+        kept(self, *given)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "append", append)
+        assert main([*words, "--out", "run", "--workers", "1", "--no-figures"]) == 130
+    said = capsys.readouterr().err
+    (line,) = [a for a in said.splitlines() if a.startswith("to go on: ")]
+    told = shlex.split(line.removeprefix("to go on: "))
+    assert told[:2] == ["antennate", "gait"]
+    assert main(told[1:]) == 0
+    assert (tmp_path / "run" / "result.json").exists()
 
 
 def test_an_interrupted_run_within_uv_names_the_command_of_uv(capsys, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 
 from antennate.control.gait import targets
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE, TwistGait
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles, twist_map
@@ -48,6 +48,12 @@ def test_out_of_reach_is_the_nearest(map_of_robot):
     assert fast.amplitude == pytest.approx(RobotSpec().yaw_limit)
     assert map_of_robot.gait(0.0, 0.0).amplitude == pytest.approx(0.0, abs=1e-9)
     assert map_of_robot.gait(0.2, 99.0) == map_of_robot.gait(0.2, map_of_robot.sharpest)
+
+
+@pytest.mark.parametrize("wanted", [(math.nan, 0.0), (0.2, math.inf)])
+def test_a_twist_that_is_not_finite_is_refused(map_of_robot, wanted):
+    with pytest.raises(BadInputError, match="expected a finite speed and curvature"):
+        map_of_robot.gait(*wanted)
 
 
 def test_the_model_walks_what_is_wanted(map_of_robot):

@@ -176,6 +176,11 @@ def carry_out(
             if shards and run.store is not None:
                 run.store.take(shards.records, shards.processors)
             outcome = _outcome(experiment, config, options, workers, run, view)
+        except KeyboardInterrupt:
+            if shards is None and run.store is not None and run.store.holds_trials:
+                again = _go_on(experiment.name, argv, run.path)
+                sys.stderr.write(f"to go on: {again}\n")
+            raise
         except (LogError, OutputError, WorkerError):
             if shards:
                 run.discard()

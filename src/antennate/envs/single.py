@@ -12,7 +12,7 @@ from antennate.envs.episodes import Episodes
 from antennate.envs.reward import TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
 from antennate.envs.truth import OUTCOMES, Truth
-from antennate.envs.vector import LARGEST_SEED, config_of, whole
+from antennate.envs.vector import LARGEST_SEED, config_of, require_no_pictures, whole
 from antennate.sim.world import World
 
 
@@ -33,6 +33,7 @@ class AntennaEnv(Env[Any, Any]):
     """
 
     def __init__(self, scene: str = "tunnel", render_mode: None = None, **values: Any) -> None:
+        require_no_pictures(render_mode)
         self.config = config_of(scene, values)
         self.metadata = {"render_modes": []}
         self.render_mode = render_mode

@@ -41,6 +41,19 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
     return from_values(EnvConfig, {"scene": scene, **values})
 
 
+def require_no_pictures(render_mode: object) -> None:
+    """Refuse a render mode.
+
+    Raises:
+        ConfigError: One is given.
+    """
+    if render_mode is not None:
+        raise ConfigError(
+            f"render_mode: expected None, as environments draw nothing, found {render_mode!r}; "
+            "`antennate tunnel --controllers FILE.onnx --video` makes a film"
+        )
+
+
 class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
     """B robots in a scene, stepped in lockstep.
 
@@ -68,7 +81,10 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         render_mode: None = None,
         **values: Any,
     ) -> None:
+        require_no_pictures(render_mode)
         self.config = config_of(scene, values)
+        if num_envs < 1:
+            raise ConfigError(f"num_envs: expected at least 1, found {num_envs}")
         self.num_envs, self.render_mode = num_envs, render_mode
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}

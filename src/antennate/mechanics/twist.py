@@ -7,11 +7,13 @@ yaw over forward distance [1/m], positive to the left; a positive offset turns r
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from antennate.errors import BadInputError
 from antennate.types import Floats
 
 
@@ -108,7 +110,14 @@ class TwistMap:
         """The gait of a forward speed [m/s] and a curvature [1/m]; else the nearest there is.
 
         Of what cannot be had together the curvature is kept, and the speed gives way.
+
+        Raises:
+            BadInputError: One is not finite.
         """
+        if not math.isfinite(speed + curvature):
+            raise BadInputError(
+                f"twist map: expected a finite speed and curvature, found {speed} and {curvature}"
+            )
         amplitudes, offsets, ranges, height = self._inverse
         count = len(ranges)
         row, part = _columns(abs(curvature), 0.0, height, count)

@@ -363,9 +363,21 @@ def sentence(result: Mapping[str, Any]) -> str:
         )
     return (
         f"FORWARD walks at {forward['speed_m_s']:.3f} m/s and TURN_L turns by "
-        f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation. A walk "
-        "has no random part: a second run gives the same."
+        f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation{_best(result['optimised'])}. "
+        "A walk has no random part: a second run gives the same."
     )
+
+
+def _best(optimised: Mapping[str, Any] | None) -> str:
+    """What the optimised gait does, for the sentence; empty without one."""
+    if optimised is None:
+        return ""
+    row = optimised["gaits"][OPTIMISED]
+    if optimised["goal"] == "turning":
+        return f"; optimised, {row['yaw_deg_per_cycle']:.1f} deg"
+    cost = row["cost_of_transport"]
+    at = "" if cost is None else f" at a cost of transport of {cost:.3f}"
+    return f"; optimised for {optimised['goal']}, {row['speed_m_s']:.3f} m/s{at}"
 
 
 def films(config: GaitStudyConfig, trial: int) -> dict[str, Callable[[], Film]]:
