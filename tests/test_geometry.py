@@ -98,6 +98,7 @@ def test_an_optimum_is_better_than_what_was_given(goal):
         assert after.cost[0] < before.cost[0]
 
 
+@pytest.mark.slow
 def test_lifting_legs_have_no_map():
     config = GeometryConfig(
         robot=RobotSpec.named("hexapod"),
