@@ -40,7 +40,7 @@ def first(maneuvers, wanted, period):
 
 
 @pytest.mark.parametrize("frequency", [0.4, 0.6])
-def test_an_escape_has_its_size_at_every_frequency(frequency):
+def test_an_escape_lasts_as_long_as_its_size_takes_at_the_speed_of_the_engine(frequency):
     """`swift` walks 0.274 m/s at 0.6 Hz, and a turn is 60° in 2.6 s (both by the engine)."""
     control = ControlParams(gait=GaitParams(frequency=frequency))
     maneuvers, _ = walked(control, [PRESSED, PRESSED], 40.0)

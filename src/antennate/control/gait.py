@@ -28,7 +28,7 @@ from antennate.types import Bools, Floats, Ints, JointCommand
 
 DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
 """Sense in which the phase runs in each maneuver: REVERSE runs body and legs backwards."""
-_STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
+STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
 """Sign of the yaw offset in each maneuver."""
 _STEERS = np.array([1.0, 1.0, 1.0, 1.0, 0.0])
 """Whether offset and antennae move in each maneuver."""
@@ -130,7 +130,7 @@ class Gait:
         """
         size = self.params.turn_offset if turn_offset is None else turn_offset
         moves = _STEERS[maneuver]
-        change = _STEER[maneuver] * size - self.offset
+        change = STEER[maneuver] * size - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * moves
         self.phase += DIRECTION[maneuver] * self._advance

@@ -2,9 +2,9 @@
 
 It walks by the gait that the model found fastest at no more cost of transport, and turns by the
 configured one. How fast both go follows from the quasi-static model (`antennate.robots.mechanics`),
-so escapes keep their mean size at every frequency and on every robot. They are times all the same:
-a single turn depends on the gait phase at which it begins (docs/science/geometry.md). The body wave
-goes over from one to the other at limited rates: no joint target jumps.
+so escapes keep their mean size, about, at other frequencies and on other robots. They are times all
+the same: a single turn depends on the gait phase at which it begins (docs/science/geometry.md). The
+body wave goes over from one to the other at limited rates: no joint target jumps.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.control.escape import SearchRule, Sizes
-from antennate.control.gait import targets
+from antennate.control.gait import DIRECTION, STEER, targets
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE
 from antennate.errors import ConfigError
 from antennate.mechanics.twist import Wave
@@ -31,9 +31,6 @@ NUMBER_RATE = 0.25
 """Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
 _SLOWEST, _LEAST_TURN = 0.02, 0.03
 """Least speed [m/s] and rate of turns [rad/s]: an escape would take half a minute (assumed)."""
-_DIRECTION = np.array([1.0, 1.0, 1.0, -1.0, 0.0])
-_STEER = np.array([0.0, -1.0, 1.0, 0.0, 0.0])
-_TURNS = np.array([False, True, True, False, False])
 
 
 @lru_cache
@@ -98,11 +95,11 @@ class TwoGaits:
     def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
         """Advance one control period and return the targets; HOLD keeps the command."""
         moves = (maneuver != int(Maneuver.HOLD))[:, None]
-        goal = self._goals[_TURNS[maneuver].astype(int)]
+        goal = self._goals[(STEER[maneuver] != 0.0).astype(int)]
         goal[:, 0] *= 1.0 - self._soften * self.bent
-        goal[:, 3] *= _STEER[maneuver]
+        goal[:, 3] *= STEER[maneuver]
         self.wave += moves * np.clip(goal - self.wave, -self._most, self._most)
-        self.phase += _DIRECTION[maneuver] * self._advance
+        self.phase += DIRECTION[maneuver] * self._advance
         self._sweep += moves[:, 0] * self._swing
         amplitude, number, lead, offset = self.wave.T[:, :, None]
         yaw = amplitude * np.sin(number * self._joint + lead - self.phase[:, None]) + offset
