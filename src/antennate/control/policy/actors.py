@@ -91,8 +91,8 @@ class _GaitRows:
         """As of an `Actor`."""
         void: Bools = np.logical_not(np.isfinite(answers).all(axis=1))
         self._void = np.where(rows, void, self._void)
-        taken = np.where(void[:, None], 0.0, answers)
-        self._answers = np.where(rows[:, None], taken, self._answers)
+        finite = np.where(void[:, None], 0.0, answers)
+        self._answers = np.where(rows[:, None], finite, self._answers)
 
     def goals(self) -> Floats | None:
         """As of an `Actor`."""

@@ -64,15 +64,15 @@ def optimise(robot: RobotSpec, gait: GaitParams, goal: Goal) -> GaitParams:
             grids[k] = np.unique(np.clip(grids[k], low[k], high[k]))
         best = _best(robot, gait, goal, before, grids)
     amplitude, number, lead, offset = best.tolist()
-    found = {
+    values = {
         **gait.model_dump(),
         "amplitude": amplitude,
         "wave_number": number,
         "body_phase": lead % (2.0 * math.pi),
     }
     if turning:
-        found["turn_offset"] = -offset
-    return GaitParams(**found)
+        values["turn_offset"] = -offset
+    return GaitParams(**values)
 
 
 def _largest(robot: RobotSpec, gait: GaitParams) -> float:
