@@ -204,7 +204,7 @@ def test_a_run_leaves_its_tables_and_figures(tmp_path):
         (["--heights", "0.05", "0.05"], "heights must differ"),
         (["--conditions", "fly"], "expected one of locked, level, lifted, rhythm, climb or edges"),
         (["--divisors", "0"], "--divisors: expected a number above 0, found 0.0"),
-        (["--robot.servos.xc430-w240.gain-divisor", "9"], "expected a parameter that climb reads"),
+        (["--robot.servos.xc430-w240.gain-divisor", "9"], "divisors says it"),
     ],
 )
 def test_bad_input_is_answered_in_one_line(words, said, capsys, tmp_path):

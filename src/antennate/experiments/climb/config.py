@@ -61,6 +61,20 @@ LEVEL = ("flat", BUMPY)
 """Grounds without an edge, on which every climb is a false one."""
 
 
+_LIMITS = ("robot.pitch.limit", "robot.elevation.limit")
+"""Limits of joints that these controllers keep."""
+_OF_OTHERS = tuple(
+    f"control.{path}"
+    for path in (
+        *("rule.strong", "rule.similar", "rule.hold_time", "gait.turn_offset"),
+        *("escape.reverse_time", "escape.turn_time", "escape.alternate", "escape.second_turn"),
+        "timed.walk_time",
+    )
+)
+"""Parameters that none of these controllers reads."""
+_DIVISOR = "robot.servos.xc430_w240.gain_divisor"
+
+
 @dataclass(frozen=True, slots=True)
 class Cell:
     """One cell of the table: who meets which ground.
@@ -91,8 +105,8 @@ class ClimbConfig(Params):
     """Everything that decides the outcome of `antennate climb`."""
 
     unread: ClassVar[tuple[str, ...]] = (
-        *HARDWARE_ALONE,
-        "robot.servos.xc430_w240.gain_divisor",
+        *(path for path in HARDWARE_ALONE if path not in _LIMITS),
+        *_OF_OTHERS,
     )
     trials: int = number(
         2, "1", "assumed: shows how it works in minutes; 25 tell something", ge=1, le=100_000
@@ -155,7 +169,7 @@ class ClimbConfig(Params):
         reasons = {**unused(self.robot), **unread_by_all(names, self.control, self.robot, knows)}
         if "locked" in self.conditions:
             reasons.pop("robot.pitch.stiffness", None)
-        return reasons
+        return reasons | {_DIVISOR: "divisors says it"}
 
     @model_validator(mode="after")
     def _agree(self) -> ClimbConfig:
