@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from recorded import act, leaves, recorded
+from recorded import act, leaves, meet_ground, recorded
 from servo_recordings import of_twin
 
 from antennate import experiments

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from antennate.experiments.climb import measures as climb
+from antennate.experiments.climb.physics import ClimbRow
 from antennate.experiments.force.experiment import MEASURES as FORCE
 from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
@@ -27,6 +29,7 @@ MEASURES = {
     ("results.md", "tunnel"): (*tunnel.CONTROLLER, *tunnel.PAIR),
     ("results.md", "gait"): MANEUVER,
     ("results.md", "geometry"): geometry.GAIT,
+    ("results.md", "climb"): climb.CONDITION,
     ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
     ("results.md", "touch"): (*PROFILE, *AVERAGING),
     ("results.md", "force"): FORCE,
@@ -34,6 +37,7 @@ MEASURES = {
 ROWS = {
     ("results.md", "tunnel"): TrialResult,
     ("results.md", "geometry"): Walked,
+    ("results.md", "climb"): ClimbRow,
     ("results.md", "wall"): WallTrial,
     ("results.md", "force"): TraverseRow,
     ("tracks.md", "tracks"): TrackRow,

@@ -143,7 +143,7 @@ class ClimbConfig(Params):
         60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
     )
     """Time after which a trial has failed."""
-    seed: int = number(0, "1", "assumed: any", ge=0)
+    seed: int = number(2711, "1", "assumed: any but 0, by which the controllers were tuned", ge=0)
     """Seed of all chance."""
     robot: RobotSpec = RobotSpec.named(ROBOT)
     """scuttle3d or another with pitch servos, or a TOML file of your own (default: scuttle3d)."""

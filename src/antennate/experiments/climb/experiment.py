@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from antennate.experiments.climb.config import ClimbConfig, cells
+from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig, cells, config_of
 from antennate.experiments.climb.measures import (
     COLUMNS,
     climbing,
@@ -21,6 +22,9 @@ from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trial
 from antennate.studies.pool import Workers
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Controller
+
+if TYPE_CHECKING:
+    from antennate.telemetry.film import Film
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,23 @@ def run(
     return ClimbOutcome(config, [row for row, _ in trials], paths, interrupted)
 
 
+def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
+    """A film of each condition at the middle height, with the first gain divisor.
+
+    It ends when the head is a body length behind the edge, as a trial of `tunnel` in that scene.
+    """
+    from antennate.experiments.tunnel.experiment import record
+
+    height = sorted(config.heights)[len(config.heights) // 2]
+    return {
+        cell.condition: partial(
+            record, config_of(config, cell), CONTROLLERS[cell.condition], trial, cell.condition
+        )
+        for cell in cells(config).values()
+        if (cell.part, cell.height, cell.divisor) == ("climbing", height, config.divisors[0])
+    }
+
+
 def none_valid(result: dict[str, Any]) -> bool:
     """Whether every trial of some condition is invalid."""
     summaries = [s for entry in result["climbing"] for s in entry["conditions"].values()]
@@ -104,6 +125,7 @@ CAPTIONS = {
 
 EXPERIMENT = Experiment.of_folder(
     *(__name__, ClimbConfig, run, tables, sentence),
+    films=films,
     failed=none_valid,
     shown=True,
     trials=TRIALS,
