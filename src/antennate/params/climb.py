@@ -138,5 +138,7 @@ class ClimbParams(Params):
     """Time to turn after that."""
     lift: float = number(0.35, "rad", "assumed: above it the head costs speed", ge=0, le=1)
     """Lift of the head of `lifted`."""
-    walk_time: float = number(4.0, "s", "fitted: antennate climb, best of the sweep", ge=0, le=60)
+    walk_time: float = number(
+        5.0, "s", "fitted: best of 3, 5 and 8 s at 10 cm (docs/science/climb.md)", ge=0, le=60
+    )
     """Time that `rhythm` walks between two climbs."""
