@@ -186,8 +186,8 @@ def test_names_are_plain_and_sensors_tell_the_state(name: str, tmp_path: Path) -
         data.joint("root").qpos[:3] = 0.3, -0.2, 0.5
         mujoco.mj_forward(model, data)
         for joint in robot.joint_names:
-            assert data.sensor(f"{joint}_angle").data[0] == hinges[joint]
-            assert data.sensor(f"{joint}_torque").data[0] == data.actuator(joint).force[0]
+            assert data.sensor("_".join((joint, "angle"))).data[0] == hinges[joint]
+            assert data.sensor("_".join((joint, "torque"))).data[0] == data.actuator(joint).force[0]
         assert data.sensor("head_position").data == pytest.approx([0.3, -0.2, 0.5])
         for prefix in ("antenna_l_", "antenna_r_")[: robot.antenna_count]:
             under = [hinges[f"{prefix}hinge{i}"] for i in range(robot.antenna.sensed_hinges)]
