@@ -207,6 +207,25 @@ def test_limits_of_goals_are_told_and_not_enforced() -> None:
     assert not model.actuator("leg_l2").ctrlrange.any()  # it turns without end
 
 
+def test_the_lone_robot_stands_on_the_floor_of_another_world() -> None:
+    """A plane with MuJoCo's default collision bits: the legs meet it, no more than the legs."""
+    robot = RobotSpec()
+    world = mujoco.MjSpec.from_string(
+        '<mujoco><option integrator="implicitfast" cone="elliptic"/><worldbody>'
+        '<geom name="ground" type="plane" size="5 5 0.1"/></worldbody></mujoco>'
+    )
+    part = mujoco.MjSpec.from_string(str(export_mjcf(robot).files["robot.xml"]))
+    world.attach(part, frame=world.worldbody.add_frame(pos=[1, 2, 0.01]), prefix="mine/")
+    model = world.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 1000)
+    assert data.body("mine/link0").xpos[:2] == pytest.approx([1, 2], abs=0.02)
+    height = robot.leg_radius + robot.leg_eccentricity
+    assert data.body("mine/link3").xpos[2] == pytest.approx(height, abs=2e-3)
+    touching = {model.geom(g).name for pair in data.contact.geom for g in pair}
+    assert touching == {"ground", *(f"mine/{leg}" for leg in robot.leg_names)}
+
+
 def test_a_scene_of_a_file_takes_its_meshes_along(tmp_path: Path) -> None:
     """A mesh is moved to its centre anew each time it is read; here that rounds otherwise."""
     (tmp_path / "m").mkdir()

@@ -32,8 +32,8 @@ Arrays of the model that are not those of the simulator to the bit, and by how m
 
 What the files hold
 -------------------
-Bodies    link0 is the head, behind it link1 and so on; leg_l0, leg_r0, ...; antenna_l_base,
-          antenna_l_hinge0 and so on to the tip, antenna_r_... likewise
+Bodies    link0 is the head, behind it link1 and so on; leg_l0, leg_r0, ...; of antennae, if there
+          are any, antenna_l_base, antenna_l_hinge0 and so on to the tip, antenna_r_... likewise
 Joints    as their bodies; between links yaw1, ... and pitch1, ...; the free joint is root
 Servos    actuators with the names of their joints; ctrl is the goal [rad]. The torque is
           gain (ctrl - angle), limited to that at standstill, less the joint's damping times its
@@ -42,7 +42,8 @@ Sensors   JOINT_angle [rad], JOINT_speed [rad/s], JOINT_torque [N·m] of each se
           antenna_l_angle0 [rad], ... of the hinges; antenna_l_touch0 [N], ... sum of the normal
           forces on a link; antenna_l_flex [rad], the sum of the hinges under the flex sensor;
           head_position, head_orientation, head_gyro, head_accelerometer at the site head
-Numerics  control_period [s]; gear_friction of each actuator, where one has any
+Numbers   numerics control_period [s], and gear_friction of each actuator where one has any
+Solver    <option>; a world to which robot.xml is attached keeps its own, and MuJoCo warns of that
 Contact   a geom touches another if the contype of one meets the conaffinity of the other;
           contype is {floor} of floors, {obstacle} of obstacles, {leg} of legs, {body} of the body,
           {antenna} of antennae. A floor of your own takes contype {floor} and conaffinity 0,
