@@ -106,6 +106,7 @@ def simulated(robot: RobotSpec, scene: str, seed: int, gait: GaitParams) -> tupl
         ("scuttle", "corridors", 3, "serpenoid"),
         ("scuttle", "wall", 0, "serpenoid"),
         ("hexapod", "flat", 0, "b11bl0"),
+        ("scuttle3d", "stairs", 2, "serpenoid"),
         ("own", "tunnel", 5, "serpenoid"),
     ],
 )

@@ -9,7 +9,14 @@ from antennate.params.base import meaning
 from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.export.urdf import BETWEEN_INERTIA, BETWEEN_MASS, LACKS
-from antennate.sim.parts import ANTENNA_BIT, BODY_BIT, FLOOR_BIT, LEG_BIT, OBSTACLE_BIT
+from antennate.sim.parts import (
+    ANTENNA_BIT,
+    BODY_BIT,
+    FLOOR_BIT,
+    GROUND_BIT,
+    LEG_BIT,
+    OBSTACLE_BIT,
+)
 
 _MJCF = """\
 {title}
@@ -45,9 +52,10 @@ Sensors   JOINT_angle [rad], JOINT_speed [rad/s], JOINT_torque [N·m] of each se
 Numbers   numerics control_period [s], and gear_friction of each actuator where one has any
 Solver    <option>; a world to which robot.xml is attached keeps its own, and MuJoCo warns of that
 Contact   a geom touches another if the contype of one meets the conaffinity of the other;
-          contype is {floor} of floors, {obstacle} of obstacles, {leg} of legs, {body} of the body,
-          {antenna} of antennae. A floor of your own takes contype {floor} and conaffinity 0,
-          a wall of your own contype {obstacle} and conaffinity {wall}
+          contype is {floor} of floors that legs alone touch, {ground} of ground that body and
+          antennae touch too, {obstacle} of obstacles, {leg} of legs, {body} of the body,
+          {antenna} of antennae. A floor of your own takes contype {floor} or {ground} and
+          conaffinity 0, a wall of your own contype {obstacle} and conaffinity {wall}
 
 What the simulator does beside them
 -----------------------------------
@@ -116,6 +124,7 @@ def mjcf_readme(
         goals=_lines(f"{name}: {_limit(angle)}, {speed:g} rad/s" for name, angle, speed in goals),
         chance=_lines(f"{n} = {f.default}: {meaning(VariationParams, n)}" for n, f in fields),
         floor=FLOOR_BIT,
+        ground=FLOOR_BIT | GROUND_BIT,
         obstacle=OBSTACLE_BIT,
         leg=LEG_BIT,
         body=BODY_BIT,
