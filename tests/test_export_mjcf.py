@@ -17,10 +17,11 @@ from antennate.cli import main
 from antennate.control.gait import Gait
 from antennate.errors import ConfigError
 from antennate.params.gaits import GaitParams
-from antennate.params.scene import VariationParams
+from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate.sim.export import mjcf
 from antennate.sim.export.folder import export_mjcf
+from antennate.sim.export.parts import lone_robot
 from antennate.sim.scenes.registry import SHIPPED
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import TrialConfig, scene_of, still_trial
@@ -137,6 +138,12 @@ def test_no_number_of_a_shipped_scene_is_rounded(scene: str) -> None:
     result = export_mjcf(RobotSpec(), scene, seed=13).result
     assert result["model_difference"] == {}
     assert result["walk_difference_m"] == 0.0
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_no_number_of_a_shipped_robot_is_rounded(name: str) -> None:
+    spec = lone_robot(PhysicsParams(), RobotSpec.named(name), PERIOD)
+    assert mjcf.to_mjcf(spec, "alone").difference == {}
 
 
 def test_a_digit_that_is_lost_is_noticed() -> None:

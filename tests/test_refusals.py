@@ -230,7 +230,7 @@ robot --export mjcf --scene tunnel --seed -4 :: --seed: expected a number of at 
 robot --export mjcf --seed 4 :: --seed: expected --scene beside it, found none
 robot --export mjcf --gait trot :: --gait: expected serpenoid, :: found 'trot'
 robot --export urdf --scene tunnel :: --scene: expected --export mjcf beside it, found none
-robot --export urdf --robot hexpod :: expected scuttle, hexapod or a TOML file (did you mean hexapod?)
+robot --export urdf --robot hexpod :: --robot: expected scuttle, :: (did you mean hexapod?), found
 robot --scene tunnel :: --scene: expected --export mjcf beside it, found none
 robot one two :: expected flags only, found 'two'
 doctor :: --esp32 PORT, --bus PORT or both

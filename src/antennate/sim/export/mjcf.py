@@ -186,16 +186,17 @@ def _name_servos(root: ElementTree.Element) -> None:
 def _restore(root: ElementTree.Element, model: mujoco.MjModel, again: mujoco.MjModel) -> None:
     """Put in what the writer leaves out of named parts.
 
-    That is a turn below 1e-16 rad, and a third size where two make the shape.
+    That is a turn below 1e-16 rad, a third size where two make the shape, and the sign of a zero.
     """
-    for tag, field in (("geom", "quat"), ("site", "size")):
+    for tag, field in (("geom", "quat"), ("body", "quat"), ("site", "size")):
         parts = {e.get("name", ""): e for e in root.iter(tag)}
         values, others = (getattr(each, f"{tag}_{field}") for each in (model, again))
         if values.shape != others.shape:
             continue
-        for i in np.flatnonzero((values != others).any(axis=1)).tolist():
+        differs = (values.view(np.int64) != others.view(np.int64)).any(axis=1)
+        for i in np.flatnonzero(differs).tolist():
             name = getattr(again, tag)(i).name
-            if name and (field == "size" or field not in parts[name].attrib):
+            if name in parts and (tag != "geom" or field not in parts[name].attrib):
                 parts[name].set(field, " ".join(f"{value:.{_DIGITS}g}" for value in values[i]))
 
 
