@@ -196,7 +196,7 @@ def _restore(root: ElementTree.Element, model: mujoco.MjModel, again: mujoco.MjM
         differs = (values.view(np.int64) != others.view(np.int64)).any(axis=1)
         for i in np.flatnonzero(differs).tolist():
             name = getattr(again, tag)(i).name
-            if name in parts and (tag != "geom" or field not in parts[name].attrib):
+            if name and (tag != "geom" or field not in parts[name].attrib):
                 parts[name].set(field, " ".join(f"{value:.{_DIGITS}g}" for value in values[i]))
 
 
