@@ -126,6 +126,8 @@ class ClimbParams(Params):
     """Height under which it walks on."""
     step_time: float = number(1.0, "s", "assumed: as long as it walks over it", ge=0, le=30)
     """Time for which it feels nothing new after so low a step."""
+    over_time: float = number(3.0, "s", "assumed: it walks into it within", ge=0, le=30)
+    """Time within which something new means that the step was not so low."""
     drop_time: float = number(4.0, "s", "assumed: its length at the usual speed", ge=0, le=30)
     """The same after a drop whose ground it has felt."""
     attempts: int = number(3, "1", "assumed: thrice the same place is a wall", ge=1, le=20)
