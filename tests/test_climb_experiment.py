@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,8 +63,10 @@ def test_a_trial_starts_alike_for_all_conditions():
         if cell.part == "climbing":
             one = config_of(config, cell)
             start = draw_trial(one, scene_of(one), 3, one.control.gait, one.control.period)
+            scene: Any = start.scene
             friction = start.chance.leg_friction(0)
-            starts.append([start.scene.edges[0].x, start.phase, *start.world.head, *friction])
+            assert friction is not None
+            starts.append([scene.edges[0].x, start.phase, *start.world.head, *friction])
     assert len(starts) == 12
     assert np.ptp(np.array(starts), axis=0).max() == 0.0
 
@@ -82,13 +85,14 @@ def test_a_robot_is_over_when_all_links_stand_behind_and_above(x, y, z, over):
     config = ClimbConfig(heights=(0.10,), conditions=("edges",))
     one = config_of(config, next(iter(cells(config).values())))
     start = draw_trial(one, scene_of(one), 0, one.control.gait, one.control.period)
-    world, robot, edge = start.world, one.robot, start.scene.edges[0].x
+    scene: Any = start.scene
+    world, robot, edge = start.world, one.robot, scene.edges[0].x
     head = edge + x + (robot.links - 1) * robot.link_pitch
     legs = np.zeros((robot.links, 2))
     world.place(head, y, 0.0, np.zeros(robot.yaw_count), legs, 0.10 + z)
     links = world.link_places()
     assert links[-1, 0] == pytest.approx(edge + x)
-    assert is_over(links, edge, start.scene.top, robot.link_pitch) is over
+    assert is_over(links, edge, scene.top, robot.link_pitch) is over
 
 
 def test_a_link_has_fallen_below_half_a_drop():
@@ -219,7 +223,7 @@ def test_bad_input_is_answered_in_one_line(words, said, capsys, tmp_path):
 def test_a_robot_of_its_own_begins_with_the_one_that_climbs():
     assert ClimbConfig.model_validate({"robot": {"mass": 2.5}}).robot.pitch_count == 5
     with pytest.raises(BadInputError, match="expected a robot with pitch joints"):
-        ClimbConfig(robot={"pitch": {"kind": "locked"}})
+        ClimbConfig(robot={"pitch": {"kind": "locked"}})  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.slow
