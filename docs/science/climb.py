@@ -58,7 +58,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
         conditions=tuple(n for n in CONTROLLERS if any(row.condition == n for row in climbs)),
         divisors=tuple(dict.fromkeys(row.divisor for row in climbs)),
         sensing=max((row.trial + 1 for row in felt), default=0),
-        seed=rows[0].seed,
+        seed=rows[0].seed - round(10_000 * (rows[0].height_m or 0.0)),
     )
     return ClimbOutcome(config, rows, {}, interrupted=False)
 

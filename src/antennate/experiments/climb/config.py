@@ -205,6 +205,14 @@ def cells(config: ClimbConfig) -> Mapping[str, Cell]:
     return {cell.name: cell for cell in (*climbs, *feels)}
 
 
+def seed_of(config: ClimbConfig, cell: Cell) -> int:
+    """Seed of the trials of a cell: the same for all who meet this height, and for no other one.
+
+    So trials of several heights are independent of one another, and can be pooled.
+    """
+    return config.seed + round(10_000 * (cell.height or 0.0))
+
+
 def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
     """What is simulated in a cell."""
     robot = config.robot
@@ -215,7 +223,9 @@ def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
     if cell.condition == "locked":
         changes["pitch"] = robot.pitch.model_copy(update={"kind": "locked"})
     ground = {} if cell.height is None else {"ground": {"height": cell.height}}
-    scene = from_values(TunnelConfig, {"scene": cell.scene, "seed": config.seed, **ground})
+    scene = from_values(
+        TunnelConfig, {"scene": cell.scene, "seed": seed_of(config, cell), **ground}
+    )
     return scene.model_copy(
         update={
             "robot": robot.model_copy(update=changes),

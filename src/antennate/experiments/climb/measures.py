@@ -58,6 +58,11 @@ PLAN = (
     Measure("high_cm", "95 %", "cm", form="+.1f"),
     Measure("within", "within -6 to +4 cm", "%", form=".0f", scale=100.0),
 )
+PROBE = (
+    Measure("felt_height_m", "height", "cm", scale=100.0, form=".1f"),
+    Measure("ahead_m", "ahead", "cm", scale=100.0, form=".1f"),
+    Measure("latency_s", "latency", "s"),
+)
 FALSE = (
     Measure("false_climbs", "false climbs", form="d"),
     Measure("per_1000_s", "  per 1000 s", form=".2f", interval="per_1000_s_95"),
@@ -160,7 +165,7 @@ def _spread(name: str, errors: Sequence[float]) -> dict[str, Any]:
 
 def sensing(config: ClimbConfig, rows: Sequence[ClimbRow]) -> list[dict[str, Any]]:
     """What `climb` felt, with each divisor."""
-    feels = [row for row in rows if row.part == "sensing" and row.outcome != "invalid"]
+    feels = [row for row in rows if row.part == "sensing"]
     return [
         _felt(divisor, [row for row in feels if row.divisor == divisor])
         for divisor in config.divisors
@@ -168,13 +173,16 @@ def sensing(config: ClimbConfig, rows: Sequence[ClimbRow]) -> list[dict[str, Any
     ]
 
 
-def _felt(divisor: float, rows: Sequence[ClimbRow]) -> dict[str, Any]:
+def _felt(divisor: float, every: Sequence[ClimbRow]) -> dict[str, Any]:
+    rows = [row for row in every if row.outcome != "invalid"]
     by_ground = {name: [row for row in rows if row.ground == name] for name in GROUND}
     verdicts = {name: Counter(row.verdict for row in some) for name, some in by_ground.items()}
     cliff = by_ground[CLIFF]
     stopped = sum(row.outcome == "stopped" for row in cliff)
     return {
         "divisor": divisor,
+        "invalid": len(every) - len(rows),
+        "first_reason": next((row.reason for row in every if row.outcome == "invalid"), None),
         "confusion": {
             name: {verdict: counts[verdict] for verdict in VERDICTS}
             for name, counts in verdicts.items()
@@ -251,22 +259,26 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             shown_tables.append(_plan(entry, where))
     for entry in result["sensing"]:
         where = f", gain divisor {entry['divisor']:g}"
-        shown_tables += [_confusion(entry, where), _rates(entry, where)]
+        shown_tables += [_confusion(entry, where), _probes(entry, where), _rates(entry, where)]
     return shown_tables
 
 
 def _success(entry: Mapping[str, Any], where: str, result: Mapping[str, Any]) -> Table:
     heights = [f"{100 * h:g} cm" for h in result["heights_m"]]
-    rows = [
-        (name, [share(s["successes"], s["trials"] - s["invalid"], s["wilson95"]) for s in some])
-        for name, some in entry["heights"].items()
-    ]
+    rows = [(name, [_briefly(row) for row in some]) for name, some in entry["heights"].items()]
     note = (
-        f"Wilson 95 % interval; within {result['time_limit_s']:g} s, seed {result['seed']}. All "
-        "conditions meet the same steps, starts and disturbances."
+        f"Successes of valid trials, and the Wilson 95 % interval [%]; within "
+        f"{result['time_limit_s']:g} s, seed {result['seed']}.\nAll conditions meet the same "
+        "steps, starts and disturbances."
     )
     about = "\n".join(f"{n}: {text}" for n, text in ABOUT.items() if n in entry["heights"])
     return Table(f"Climbed{where}", heights, rows, note, preface=about)
+
+
+def _briefly(row: Mapping[str, Any]) -> str:
+    """Successes and interval, so short that five heights fit into a terminal."""
+    valid = row["trials"] - row["invalid"]
+    return f"{row['successes']}/{valid} {shown(row['wilson95'], '.0f', 100.0, '-')}"
 
 
 def _costs(entry: Mapping[str, Any], where: str) -> Table:
@@ -300,21 +312,28 @@ def _plan(entry: Mapping[str, Any], where: str) -> Table:
 
 
 def _confusion(entry: Mapping[str, Any], where: str) -> Table:
-    rows = []
-    for name, counts in entry["confusion"].items():
-        felt = entry["felt"][name]
-        numbers = [felt["felt_height_m"], felt["ahead_m"], felt["latency_s"]]
-        probed = [shown(numbers[0], ".1f", 100.0), shown(numbers[1], ".1f", 100.0)]
-        rows.append((name, [*(str(counts[v]) for v in VERDICTS), *probed, shown(numbers[2])]))
-    heads = (*VERDICTS, "height [cm]", "ahead [cm]", "latency [s]")
-    error, cliff = entry["heights"], entry["cliff"]
+    rows = [
+        (name, [str(counts[verdict]) for verdict in VERDICTS])
+        for name, counts in entry["confusion"].items()
+    ]
+    cliff, invalid = entry["cliff"], entry["invalid"]
     note = (
-        f"The first thing that climb feels. Height of steps of 2 to 10 cm: {error['told']} of "
-        f"{error['steps']} told, bias {shown(error['bias_m'], '+.1f', 100.0)} cm, RMSE "
-        f"{shown(error['rmse_m'], '.1f', 100.0)} cm.\nStopped at a drop of 35 cm: "
+        "Valid trials by the first thing that climb feels.\nStopped at a drop of 35 cm: "
         f"{share(cliff['stopped'], cliff['trials'], cliff['wilson95'])}."
     )
-    return Table(f"What climb feels{where}", heads, rows, note)
+    note += f"\nInvalid: {invalid}; the first, {entry['first_reason']}." if invalid else ""
+    return Table(f"What climb takes the ground for{where}", VERDICTS, rows, note)
+
+
+def _probes(entry: Mapping[str, Any], where: str) -> Table:
+    error = entry["heights"]
+    note = (
+        f"Means. Height of steps of 2 to 10 cm: {error['told']} of {error['steps']} told, bias "
+        f"{shown(error['bias_m'], '+.1f', 100.0)} cm, RMSE {shown(error['rmse_m'], '.1f', 100.0)} "
+        "cm."
+    )
+    rows = [(name, [m.cell(felt) for m in PROBE]) for name, felt in entry["felt"].items()]
+    return Table(f"The first probe{where}", [m.title for m in PROBE], rows, note)
 
 
 def _rates(entry: Mapping[str, Any], where: str) -> Table:
@@ -331,4 +350,7 @@ def sentence(result: Mapping[str, Any]) -> str:
             for name, s in entry["conditions"].items()
         )
         parts.append(f"with gain divisor {entry['divisor']:g} {each}")
-    return f"Steps climbed, all heights (95 % interval): {'; '.join(parts)}."
+    lost = sum(s["invalid"] for e in result["climbing"] for s in e["conditions"].values())
+    lost += sum(entry["invalid"] for entry in result["sensing"])
+    why = f" Invalid trials: {lost}; trials.csv gives the reason of each." if lost else ""
+    return f"Steps climbed, all heights (95 % interval): {'; '.join(parts)}.{why}"

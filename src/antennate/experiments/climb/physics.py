@@ -12,7 +12,15 @@ import numpy as np
 from antennate.control.climbing.rule import Ground as Felt
 from antennate.control.climbing.rule import Stage
 from antennate.control.registry import ControllerMaker, make_controller
-from antennate.experiments.climb.config import CLIFF, LEVEL, Cell, ClimbConfig, cells, config_of
+from antennate.experiments.climb.config import (
+    CLIFF,
+    LEVEL,
+    Cell,
+    ClimbConfig,
+    cells,
+    config_of,
+    seed_of,
+)
 from antennate.experiments.climb.load import PitchLoad
 from antennate.experiments.tunnel.batch import BATCH, Watch, run_trials
 from antennate.sim.scenes.scene import SceneInstance
@@ -37,7 +45,7 @@ class ClimbRow:
     """One trial.
 
     Attributes:
-        seed: Seed of the run; with `trial` it decides all chance.
+        seed: Seed of the trials of this height; with `trial` it decides all chance.
         cell: Name of the cell: part, condition, ground and divisor.
         part: climbing or sensing.
         condition: Who.
@@ -60,8 +68,8 @@ class ClimbRow:
             STEP_UP, DROP, WALL or UNKNOWN; None for others.
         felt_height_m: Height by that probe [m], None if it is not finite.
         ahead_m: Distance of the edge ahead of the head when it felt it [m].
-        latency_s: Time from the first touch, or from when both antennae were past a drop, until it
-            felt it [s].
+        latency_s: Time from the first touch, or from when an antenna was past a drop, until it felt
+            it [s].
         plan_error_m: Place of the head by the plan minus its true one when the centre of a link
             crossed the first edge [m], as `0:-0.012 1:0.004`: links are counted from the head, and
             those that crossed it without a plan are left out.
@@ -169,7 +177,7 @@ class Touch:
 
     def _past(self, world: World) -> bool:
         x = world.data.geom_xpos[:, 0]
-        return min(float(x[side].max()) for side in self._sides) > self._edge
+        return max(float(x[side].max()) for side in self._sides) > self._edge
 
 
 class Verdict:
@@ -320,8 +328,7 @@ class ClimbMonitor:
         feels = self._cell.condition == "climb"
         height = felt.height if felt.felt_at is not None and math.isfinite(felt.height) else None
         return ClimbRow(
-            seed=self._config.seed,
-            **_columns(self._cell, self.trial),
+            **_columns(self._config, self._cell, self.trial),
             outcome=outcome,
             time_s=round(self.time_limit if outcome == "timeout" else world.t, 6),
             climb_time_s=_rounded(took),
@@ -360,8 +367,9 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else round(float(value), 6)
 
 
-def _columns(cell: Cell, trial: int) -> dict[str, Any]:
+def _columns(config: ClimbConfig, cell: Cell, trial: int) -> dict[str, Any]:
     return {
+        "seed": seed_of(config, cell),
         "cell": cell.name,
         "trial": trial,
         "part": cell.part,
@@ -374,9 +382,8 @@ def _columns(cell: Cell, trial: int) -> dict[str, Any]:
 
 def lost_row(config: ClimbConfig, name: str, trial: int, reason: str) -> ClimbRow:
     """The row of a trial of which there is nothing else."""
-    columns = _columns(cells(config)[name], trial)
-    limit = config.time_limit
-    return ClimbRow(config.seed, **columns, outcome="invalid", time_s=limit, reason=reason)
+    columns = _columns(config, cells(config)[name], trial)
+    return ClimbRow(**columns, outcome="invalid", time_s=config.time_limit, reason=reason)
 
 
 def carry_out(
