@@ -18,11 +18,11 @@ from antennate.experiments.climb.config import ClimbConfig, cells, config_of
 from antennate.experiments.climb.experiment import EXPERIMENT, every, run
 from antennate.experiments.climb.physics import (
     ClimbRow,
-    Verdict,
     carry_out,
     has_fallen,
     is_over,
 )
+from antennate.experiments.climb.sensing import Verdict
 from antennate.sim.trial import draw_trial, scene_of
 
 TINY = {
