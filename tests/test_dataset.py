@@ -165,19 +165,21 @@ def test_without_noise_the_closed_form_tells_a_gap() -> None:
         assert guess == pytest.approx(windows["gap_m"], rel=0.002)
 
 
-@pytest.mark.parametrize("place", [0.06, 0.08, 0.1])
-def test_without_noise_the_closed_form_tells_the_place(place: float) -> None:
+@pytest.mark.parametrize("depth", [0.1, 0.2])
+@pytest.mark.parametrize("place", [0.08, 0.1])
+def test_without_noise_the_closed_form_tells_the_place(place: float, depth: float) -> None:
+    """Statics against the engine, slowly: the damping of a hinge lags by 0.04 s, 6 mrad here."""
     config = DatasetConfig.model_validate({"robot": {"antenna": {"friction": 0.0}}})
     antenna = config.robot.antenna
     turn = HeadTurn(config, antenna, 0.15)
-    seen = turn.against(turn.post(place, 0.15, 0.0005))
+    seen = turn.against(turn.post(place, depth, 0.003))
     flex = abs(seen.flex)
     first = int(np.argmax(flex >= 0.05))
     guess = contact_places(
-        *(antenna, config.robot.link_pitch, float(flex[first])),
+        *(antenna, config.robot.link_pitch, antenna.radius + 0.003, float(flex[first])),
         *(seen.turn[[first]], seen.turn[[-1]], flex[[-1]]),
     )
-    assert guess[0] == pytest.approx(seen.place, abs=0.006)
+    assert guess[0] == pytest.approx(seen.place, abs=0.001)
     assert seen.place < place  # the antenna bends round the post
 
 

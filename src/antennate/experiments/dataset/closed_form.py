@@ -129,19 +129,25 @@ def _places(config: DatasetConfig, windows: Windows) -> Floats:
     turn = head_turn(config, "push", windows, left)
     flex, touch = chosen(left, seen.flex), chosen(left, seen.touch)
     begin, end = pushed(touch, turn)
-    return contact_places(
-        antenna, config.robot.link_pitch, config.touch_flex, begin, end, flex[:, -1]
-    )
+    lever, gap = config.robot.link_pitch, antenna.radius + config.push.post_radius
+    return contact_places(antenna, lever, gap, config.touch_flex, begin, end, flex[:, -1])
 
 
 def contact_places(
-    antenna: AntennaSpec, pitch: float, threshold: float, begin: Floats, end: Floats, flex: Floats
+    antenna: AntennaSpec,
+    pitch: float,
+    gap: float,
+    threshold: float,
+    begin: Floats,
+    end: Floats,
+    flex: Floats,
 ) -> Floats:
     """Place of a frictionless contact at the end of turns of the head [m], shape (n,).
 
     Args:
         antenna: The antenna, on the left.
         pitch: Distance of the yaw joint behind the antenna's base [m].
+        gap: Distance of the middle of the post from that of the antenna [m].
         threshold: Flex [rad] at which the turn is `begin`.
         begin: Turn of the head there [rad], shape (n,).
         end: Turn at the end [rad], shape (n,).
@@ -151,14 +157,14 @@ def contact_places(
         Places; NaN where no place fits.
     """
     stiffness = antenna.hinge_stiffness()
-    contacts = _contacts(stiffness, antenna.link_length, antenna.sensed_hinges)
+    contacts = _contacts(stiffness, antenna.link_length, antenna.sensed_hinges, gap)
     early = _first_order(antenna, pitch)
     error = np.full((len(_PLACES), len(flex)), np.nan)
     for i, points in enumerate(contacts):
         x, y = (np.interp(flex, _FLEXES, points[:, k], right=np.nan) for k in (0, 1))
-        # where the straight antenna pointed when it touched, seen from the yaw joint
-        touched = _turned(np.stack([x, y]), end, antenna, pitch)
-        error[i] = _off(touched, begin - threshold / early[i], antenna, pitch)
+        post = _turned(np.stack([x, y]), end, antenna, pitch)
+        # beside the straight antenna when it touched
+        error[i] = _off(post, begin - threshold / early[i], antenna, pitch) - gap
     return _root(_PLACES * antenna.length, error)
 
 
@@ -198,8 +204,8 @@ def _first_order(antenna: AntennaSpec, pitch: float) -> Floats:
 
 
 @cache
-def _contacts(stiffness: tuple[float, ...], link: float, sensed: int) -> Floats:
-    """Where a contact at each place lies once the antenna is bent by each flex.
+def _contacts(stiffness: tuple[float, ...], link: float, sensed: int, gap: float) -> Floats:
+    """Where a post that touches at each place lies once the antenna is bent by each flex.
 
     Returns:
         Points [m] in the frame of the antenna, (places, flexes, 2); NaN where no load bends so far.
@@ -218,6 +224,8 @@ def _contacts(stiffness: tuple[float, ...], link: float, sensed: int) -> Floats:
         number = min(int(place / link), len(stiffness) - 1)
         part = place / link - number
         contact = (1.0 - part) * joints[:, number] + part * joints[:, number + 1]
+        heading = rest.angles[:, : number + 1].sum(axis=1)
+        contact += gap * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         for k in (0, 1):
             points[i, :, k] = np.interp(_FLEXES, bend[:count], contact[:count, k], right=np.nan)
     return points
