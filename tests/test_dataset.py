@@ -265,6 +265,8 @@ def test_errors_are_means_over_episodes_with_their_interval() -> None:
     assert entry["mae_m_95"] == pytest.approx((3.0 - half, 3.0 + half), abs=1e-3)
     assert entry["gain_m"] == pytest.approx(1.0)
     assert entry["mape_percent"] == pytest.approx(30.0)
+    low, high = entry["gain_m_95"]
+    assert (low, high) == pytest.approx((1.0 - half, 1.0 + half), abs=1e-3)
     assert by_episode(np.array([1.0, 3.0, 5.0]), np.array([7, 7, 9])).tolist() == [2.0, 5.0]
 
 
@@ -283,6 +285,18 @@ def test_the_command_writes_a_run_and_says_what_it_found(
     assert list(result["tasks"]) == ["place"]
     assert set(result["tasks"]["place"]["tests"]["test"]) == set(BASELINES)
     assert (tmp_path / "run" / "push.parquet").exists()
+
+
+def test_out_of_reach_of_all_walls_there_is_a_card_and_nothing_is_learned() -> None:
+    far = SMALL["walk"] | {"distance": [0.5, 0.6], "angle": [-0.1, 0.1]}
+    outcome = run(DatasetConfig.model_validate(SMALL | {"kinds": ["walk"], "walk": far}))
+    result = outcome.result()
+    assert result["kinds"]["walk"]["windows"] == 0
+    assert result["kinds"]["walk"]["untouched"] == 20
+    assert EXPERIMENT.sentence(result) == "Too few windows to learn from."
+    assert [table.title[:5] for table in EXPERIMENT.tables(result)] == ["Windo", "dista", "angle"]
+    assert set(EXPERIMENT.figures(outcome)) == {"dataset"}
+    assert "0 windows" in card(outcome.config, outcome.by_kind)
 
 
 @pytest.mark.parametrize(

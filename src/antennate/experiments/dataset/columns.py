@@ -101,7 +101,7 @@ TASKS = (
 
 _KEYS = (
     Column("episode", "1", "key", "number of the episode", "int32"),
-    Column("window", "1", "key", "number of the window in its episode", "int16"),
+    Column("window", "1", "key", "number of the window among those of its episode", "int16"),
     Column("split", "1", "key", "train, validation, test, test_antenna or test_speed", "str"),
 )
 _COUNTS = tuple(

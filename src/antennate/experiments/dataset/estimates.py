@@ -5,8 +5,10 @@
 - `polynomial`: of second degree in the features, least squares with a penalty.
 - `neighbours`: mean label of the nearest training windows in the features.
 
-Penalty and number of neighbours are those of least error on the validation split. An interval is
-over episodes, Student's t: windows of one episode are alike.
+Penalty and number of neighbours are those of least error on the validation split; so is the best
+of the last three. Touch *tells* a task on a split of test if the best errs less than the mean, by
+an interval that lies above 0 as a whole. An interval is over episodes, Student's t: windows of one
+episode are alike.
 """
 
 from __future__ import annotations
@@ -157,18 +159,28 @@ def summary(config: DatasetConfig, by_kind: Mapping[Kind, Windows]) -> dict[str,
         windows = by_kind[task.kind]
         told, options = estimates(config, task, windows)
         tests = {name: score(task, windows, told, windows["split"] == name) for name in TESTS}
+        best = _best(task, windows, told)
         tasks[task.name] = {
             "label": task.label,
             "unit": task.unit,
             "chosen": options,
-            "best": _best(task, windows, told),
+            "best": best,
+            "told": {name: _told(task, test, best) for name, test in tests.items()},
             "tests": tests,
         }
     return tasks
 
 
+def _told(task: Task, test: Mapping[str, Any], best: str | None) -> bool | None:
+    """Whether the best baseline errs less than the mean, its whole interval; None if unknown."""
+    ends = None if best is None else test[best][f"gain_{task.unit}_95"]
+    return None if ends is None or math.isnan(ends[0]) else bool(ends[0] > 0.0)
+
+
 def _best(task: Task, windows: Windows, told: Mapping[str, Floats]) -> str | None:
     """The baseline of least error on the validation split, the mean of the labels apart."""
+    if "mean" not in told:
+        return None
     rows = windows["split"] == "validation"
     entries = score(task, windows, {n: t for n, t in told.items() if n != "mean"}, rows)
     able = {

@@ -9,7 +9,7 @@ from typing import Any
 
 from antennate.errors import SimulationError
 from antennate.experiments.dataset.card import files
-from antennate.experiments.dataset.columns import TASKS, Task, Windows, columns_of, joined
+from antennate.experiments.dataset.columns import TASKS, Windows, columns_of, joined
 from antennate.experiments.dataset.config import (
     FORMAT,
     HISTORY,
@@ -158,11 +158,11 @@ TITLES = {
 }
 
 
-def shown_error(task: Task | str, unit: str) -> Measure:
+def shown_error(name: str, unit: str) -> Measure:
     """How the error of a task is shown: in mm or degrees, with its interval."""
     if unit == "rad":
-        return Measure("mae_rad", f"{task}", "deg", form=".2f", scale=math.degrees(1.0))
-    return Measure("mae_m", f"{task}", "mm", form=".2f", scale=1e3)
+        return Measure("mae_rad", name, "deg", form=".2f", scale=math.degrees(1.0))
+    return Measure("mae_m", name, "mm", form=".2f", scale=1e3)
 
 
 def tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -180,21 +180,29 @@ def _table(result: Mapping[str, Any], name: str, entry: Mapping[str, Any]) -> Ta
         )
         for baseline in BASELINES
     ]
-    test = entry["tests"]["test"]
-    best = entry["best"]
-    notes = []
-    if best is not None and "mape_percent" in test.get(best, {}):
-        percent = Measure("mape_percent", form=".1f")
-        words = f"{best.replace('_', ' ')}: {percent.cell(test[best])} % of the truth on test"
-        notes.append(
-            words + f"; the mean: {percent.cell(test['mean'])} %." if "mean" in test else "."
-        )
+    test, notes = entry["tests"]["test"], [_verdict(entry)]
+    if "mape_percent" in test.get(entry["best"], {}):
+        percent = [
+            Measure("mape_percent", form=".1f").cell(test[b]) for b in (entry["best"], "mean")
+        ]
+        notes.append(f"On test it errs by {percent[0]} % of the truth, the mean by {percent[1]} %.")
     if name in result["published_percent"]:
         notes.append(f"CITRAS, a real antenna: {result['published_percent'][name]:g} %.")
     untold = {b: e["untold"] for b, e in test.items() if e["untold"]}
     notes += [f"{b.replace('_', ' ')}: {n} windows of test not told." for b, n in untold.items()]
     title = f"{name.replace('_', ' ')}: mean absolute error in {measure.unit} (95 %)"
     return Table(title, [TITLES[split] for split in TESTS], rows, "\n".join(notes))
+
+
+def _verdict(entry: Mapping[str, Any]) -> str:
+    """On which splits the best baseline errs less than the mean."""
+    if entry["best"] is None:
+        return "Too few windows to learn from."
+    words = {True: "yes", False: "no", None: "too few"}
+    told = ", ".join(f"{TITLES[split]}: {words[told]}" for split, told in entry["told"].items())
+    return (
+        f"Best on validation: {entry['best'].replace('_', ' ')}. Less error than the mean? {told}."
+    )
 
 
 def _cell(measure: Measure, test: Mapping[str, Any], baseline: str) -> str:
