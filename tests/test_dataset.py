@@ -308,6 +308,7 @@ def test_out_of_reach_of_all_walls_there_is_a_card_and_nothing_is_learned() -> N
         (["--trials", "5"], "expected a number of at least 10"),
         (["--kinds", "walk", "walk"], "kinds"),
         (["--gait.frequency", "0.9"], "gait.frequency: expected at most 1 Hz"),
+        (["--robot.antenna.roll", "0.5"], "robot.antenna.roll: expected 0"),
         (["--push.depth", "0.3", "0.1"], "push.depth: expected a range that rises"),
     ],
 )

@@ -203,6 +203,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
                 "yaw": {"servo": servo},
                 "antenna": {"sensor": sensor},
                 "legs": {"kind": kind, "servo": "xl430_w250"},
+                "elevation": {"kind": "pair"},
             },
             "physics": {"timestep": 0.0025, "contact_time": 0.005},
             "bench": {"timestep": 0.002, "contact_time": 0.004},

@@ -188,6 +188,11 @@ class DatasetConfig(Params):
         require_different("kinds", self.kinds)
         if not self.robot.antenna_count:
             raise ValueError("robot.antennae.kind: expected a pair of antennae, found none")
+        if self.robot.antenna.roll:
+            raise ValueError(
+                "robot.antenna.roll: expected 0, as the bench bends an antenna in its plane, found "
+                f"{self.robot.antenna.roll:g}"
+            )
         if self.profile == self.held_out_profile:
             raise ValueError(
                 f"held_out_profile: expected another one than profile, found {self.profile} twice"
