@@ -179,6 +179,22 @@ class DatasetConfig(Params):
         return unused(self.robot) | unread_lift(self.robot, "gait")
 
     @model_validator(mode="after")
+    def _ranges_rise(self) -> DatasetConfig:
+        ranges = {
+            "speeds": self.speeds,
+            "held_out_speeds": self.held_out_speeds,
+            "walk.distance": self.walk.distance,
+            "walk.angle": self.walk.angle,
+            "gap.distance": self.gap.distance,
+            "push.place": self.push.place,
+            "push.depth": self.push.depth,
+        }
+        for name, (low, high) in ranges.items():
+            if not low < high:
+                raise ValueError(f"{name}: expected a range that rises, found {low:g} and {high:g}")
+        return self
+
+    @model_validator(mode="after")
     def _agree(self) -> DatasetConfig:
         for name, physics in (("physics", self.physics), ("bench", self.bench)):
             try:
@@ -197,18 +213,6 @@ class DatasetConfig(Params):
             raise ValueError(
                 f"held_out_profile: expected another one than profile, found {self.profile} twice"
             )
-        ranges = {
-            "speeds": self.speeds,
-            "held_out_speeds": self.held_out_speeds,
-            "walk.distance": self.walk.distance,
-            "walk.angle": self.walk.angle,
-            "gap.distance": self.gap.distance,
-            "push.place": self.push.place,
-            "push.depth": self.push.depth,
-        }
-        for name, (low, high) in ranges.items():
-            if not low < high:
-                raise ValueError(f"{name}: expected a range that rises, found {low:g} and {high:g}")
         (low, high), (least, most) = self.speeds, self.held_out_speeds
         if least <= high and low <= most:
             raise ValueError(
