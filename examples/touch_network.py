@@ -1,4 +1,4 @@
-"""A small network that learns from a data set of touch, in NumPy: `touch_network.py RUN`."""
+"""A small network in NumPy that learns from a data set of touch: `touch_network.py RUN [TASK]`."""
 
 import sys
 
@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 from antennate.experiments.dataset.estimates import by_episode
 from antennate.studies.statistics import mean95
 
-STEPS, HIDDEN, ROUNDS, RATE = 20, 32, 2000, 3e-3
+STEPS, HIDDEN, ROUNDS, RATE = 20, 32, 1000, 3e-3
 """Means that a window becomes, size of the hidden layer, steps of Adam, and how large they are."""
 TASKS = {
     "distance": ("walk", "distance_m"),
@@ -53,9 +53,10 @@ def train(x, y, split, decay, rng):
     return best, least
 
 
-def main(folder):
+def main(folder, tasks):
     """Train and test a network for each task."""
-    for task, (kind, label) in TASKS.items():
+    for task in tasks:
+        kind, label = TASKS[task]
         x, y, split, episode = read(folder, kind, label)
         known = split == "train"
         x = (x - x[known].mean(0)) / (x[known].std(0) + 1e-6)
@@ -69,4 +70,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1], sys.argv[2:] or TASKS)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +78,7 @@ def test_held_out_antennae_and_speeds_are_in_their_own_split_alone() -> None:
             assert (low <= draw.factor <= high) == (split == "test_speed")
 
 
-def test_two_workers_write_the_same_bytes_and_more_episodes_keep_the_first(
+def test_two_workers_write_the_same_bytes_and_so_does_a_run_that_goes_on(
     tmp_path: Path,
 ) -> None:
     pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
@@ -86,10 +88,14 @@ def test_two_workers_write_the_same_bytes_and_more_episodes_keep_the_first(
     for name in ("gap.parquet", "push.parquet", "README.md", "result.json", "trials.csv"):
         one, two = ((tmp_path / folder / name).read_bytes() for folder in ("1", "2"))
         assert one == two
-    pandas = pytest.importorskip("pandas")
-    few = pandas.read_parquet(tmp_path / "1" / "push.parquet")
-    more = run(DatasetConfig.model_validate(SMALL | {"kinds": ["push"], "trials": 12}))
-    assert more.by_kind["push"]["place_m"][: len(few)].tolist() == few["place_m"].tolist()
+    more = config.model_copy(update={"trials": 12, "kinds": ("push",)})
+    fewer = more.model_copy(update={"trials": 10})
+    antennate.run(fewer, out=tmp_path / "grown")
+    antennate.run(more, out=tmp_path / "grown", resume=True)
+    antennate.run(more, out=tmp_path / "fresh")
+    for name in ("push.parquet", "README.md"):
+        grown, fresh = ((tmp_path / folder / name).read_bytes() for folder in ("grown", "fresh"))
+        assert grown == fresh
 
 
 def test_files_are_read_back_with_units_and_roles(outcome: Any, tmp_path: Path) -> None:
@@ -285,6 +291,21 @@ def test_the_command_writes_a_run_and_says_what_it_found(
     assert list(result["tasks"]) == ["place"]
     assert set(result["tasks"]["place"]["tests"]["test"]) == set(BASELINES)
     assert (tmp_path / "run" / "push.parquet").exists()
+
+
+def test_the_network_of_the_examples_learns_from_it(outcome: Any, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
+    data = EXPERIMENT.files(outcome)["push.parquet"]
+    assert isinstance(data, bytes)
+    (tmp_path / "push.parquet").write_bytes(data)
+    path = Path(__file__).parents[1] / "examples" / "touch_network.py"
+    words = [sys.executable, "-W", "error", str(path), str(tmp_path), "place"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=300)
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert [line[:2] for line in lines] == [
+        ["place", split] for split in ("test", "test_antenna", "test_speed")
+    ]
+    assert all(0.0 < float(line[2]) < 0.12 for line in lines)  # within the length of an antenna
 
 
 def test_out_of_reach_of_all_walls_there_is_a_card_and_nothing_is_learned() -> None:

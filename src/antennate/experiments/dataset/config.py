@@ -131,9 +131,7 @@ class DatasetConfig(Params):
     )
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
-    trials: int = number(
-        300, "1", "assumed: two minutes on two cores; ten thousand fit into memory", ge=10, le=10000
-    )
+    trials: int = number(300, "1", "assumed: two minutes on two cores", ge=10, le=10000)
     """Episodes of each kind."""
     kinds: tuple[Kind, ...] = number(KINDS, "1", "assumed: all of them", min_length=1)
     """Kinds of episodes: beside a wall, between two walls, against a post."""
