@@ -320,29 +320,6 @@ def test_out_of_reach_of_all_walls_there_is_a_card_and_nothing_is_learned() -> N
     assert "0 windows" in card(outcome.config, outcome.by_kind)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--held-out-profile", "descending"], "held_out_profile: expected another one than"),
-        (["--held-out-speeds", "1.0", "1.4"], "held_out_speeds: expected a range apart"),
-        (["--walk.windows", "9"], "walk.time: expected room for 9 windows"),
-        (["--trials", "5"], "expected a number of at least 10"),
-        (["--kinds", "walk", "walk"], "kinds"),
-        (["--gait.frequency", "0.9"], "gait.frequency: expected at most 1 Hz"),
-        (["--robot.antenna.roll", "0.5"], "robot.antenna.roll: expected 0"),
-        (["--push.depth", "0.3", "0.1"], "push.depth: expected a range that rises"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["dataset", *words]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert said in err
-    assert "found" in err
-
-
 def test_without_pyarrow_it_ends_before_it_begins(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
