@@ -194,6 +194,25 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {"rig": {"pushes": 2, "speeds": [0.3]}, "antenna": {"sensor": OTHER_SENSOR}},
         {"recording": "recording.csv"},
     ],
+    "dataset": [
+        {
+            "trials": 10,
+            "kinds": ["walk"] if sensor else ["walk", "gap", "push"],
+            "walk": {"time": 2.5, "windows": 2, "stride": 0.5},
+            "robot": {
+                "yaw": {"servo": servo},
+                "antenna": {"sensor": sensor},
+                "legs": {"kind": kind, "servo": "xl430_w250"},
+                "elevation": {"kind": "pair"},
+            },
+            "physics": {"timestep": 0.0025, "contact_time": 0.005},
+            "bench": {"timestep": 0.002, "contact_time": 0.004},
+        }
+        for servo, sensor, kind in (
+            ("xl330_m288", OTHER_SENSOR, "lifting"),
+            ("xc430_w240", {}, "rolling"),
+        )
+    ],
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
     "servo": [
         {"recording": ["servo.json"], "fit": True},

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from antennate.experiments.dataset.episodes import EpisodeRow
+from antennate.experiments.dataset.experiment import KIND
 from antennate.experiments.force.experiment import MEASURES as FORCE
 from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
@@ -30,12 +32,14 @@ MEASURES = {
     ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
     ("results.md", "touch"): (*PROFILE, *AVERAGING),
     ("results.md", "force"): FORCE,
+    ("results.md", "dataset"): KIND,
 }
 ROWS = {
     ("results.md", "tunnel"): TrialResult,
     ("results.md", "geometry"): Walked,
     ("results.md", "wall"): WallTrial,
     ("results.md", "force"): TraverseRow,
+    ("results.md", "dataset"): EpisodeRow,
     ("tracks.md", "tracks"): TrackRow,
 }
 

@@ -57,7 +57,7 @@ _GROUPS = {
 _FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
 _EXPERIMENTS = (
     *("tunnel", "gait", "geometry", "calibrate", "bench", "antenna", "study"),
-    *("reproduce", "tracks", "servo"),
+    *("dataset", "reproduce", "tracks", "servo"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}

@@ -289,7 +289,7 @@ class Experiment(Generic[Config, Found]):
     tables: Callable[[Mapping[str, Any]], Sequence[Table]]
     sentence: Callable[[Mapping[str, Any]], str]
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
-    files: Callable[[Found], Mapping[str, str]] = lambda outcome: {}
+    files: Callable[[Found], Mapping[str, str | bytes]] = lambda outcome: {}
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
