@@ -143,7 +143,7 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
 
         def take(item: tuple[TrialResult, Any], places: Any = places) -> None:
             place = places[item[0].trial]
-            emit(place, _episode(draws[place][0], item[0]))
+            emit(place, _row_of(draws[place][0], item[0]))
 
         run_trials(config, name, list(places), take, make=make)
 
@@ -154,7 +154,7 @@ def _timed(
     return Timed(make_controller(name, control, robot, batch), limit)
 
 
-def _episode(draw: Draw, row: TrialResult) -> Episode:
+def _row_of(draw: Draw, row: TrialResult) -> Episode:
     return Episode(
         *(draw.controller, draw.scene, draw.seed, draw.trial, row.outcome, row.time_s),
         limit_s=row.limit_s,

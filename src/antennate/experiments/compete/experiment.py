@@ -15,7 +15,7 @@ from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError
 from antennate.experiments.compete.checking import compared, read_rows
-from antennate.experiments.compete.config import CompeteConfig, settled
+from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
 from antennate.experiments.compete.page import readme, sentence, tables
 from antennate.experiments.compete.scenes import tunnel_config
@@ -47,7 +47,7 @@ class CompeteOutcome:
             "command": "compete",
             "seed": config.seed if self.theirs is None else None,
             "seeds": seeds,
-            "hidden": config.hidden,
+            "hidden": config.hidden and config.seed not in DEVELOPMENT,
             "trials": max((row.trial for row in self.rows), default=-1) + 1,
             "decision_limit_s": config.decision_limit,
             "tie": config.tie,

@@ -41,6 +41,8 @@ def ranks(result: Mapping[str, Any]) -> Figure:
         row = result["controllers"][name]
         if row["rank"] is not None:
             _interval(rank, i, row["rank"], row["rank_95"], colours[name])
+        else:
+            rank.text(1, i, "not ranked", va="center", fontsize=8, color=style.MUTED)
         if row["episodes"]:
             ends = [100.0 * end for end in row["wilson95"]]
             _interval(success, i, 100.0 * row["success_share"], ends, colours[name])
@@ -50,7 +52,8 @@ def ranks(result: Mapping[str, Any]) -> Figure:
         panel.grid(visible=False, axis="y")
     rank.xaxis.set_major_locator(MaxNLocator(integer=True))
     rank.set(xlabel="rank", title="Rank; 95 %, all together")
-    rank.set_xlim(0.7, max(2, len(names)) + 0.3)
+    ranked = sum(row["rank"] is not None for row in result["controllers"].values())
+    rank.set_xlim(0.7, max(2, ranked) + 0.3)
     success.set(xlabel="draws crossed [%]", title="Success; Wilson 95 %", xlim=(-2, 102))
     return figure
 
