@@ -46,7 +46,7 @@ def tables(result: Result) -> Sequence[Table]:
         Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
     ]
     if pairs := result["paired"]:
-        parts.append(_pair_table(pairs))
+        parts.append(_pair_table(pairs, short))
     if result["check"] is not None:
         parts.insert(0, _check_table(result["check"]))
     return parts
@@ -63,20 +63,21 @@ def _scene_lines(result: Result, names: Sequence[str]) -> list[tuple[str, list[s
     return lines
 
 
-def _pair_table(pairs: Mapping[str, Mapping[str, Any]]) -> Table:
+def _pair_table(pairs: Mapping[str, Mapping[str, Any]], short: Mapping[str, str]) -> Table:
     heads = [
         head
         for m in PAIR
         for head in ((m.title, m.ends.label.strip()) if m.interval else [m.title])
     ]
     lines = []
-    for name, pair in pairs.items():
+    for pair in pairs.values():
         cells = [
             cell
             for m in PAIR
             for cell in ((m.cell(pair), m.ends.cell(pair)) if m.interval else [m.cell(pair)])
         ]
-        lines.append((name.replace("-", " and ", 1) + (" (tie)" if pair["tie"] else ""), cells))
+        names = " and ".join(short[name] for name in pair["names"])
+        lines.append((names + (" (tie)" if pair["tie"] else ""), cells))
     note = (
         "McNemar's test is exact, Wilcoxon's takes Pratt's ranks; Holm's correction over all\n"
         "pairs. A tie is a difference that two kinds of processor make, too."

@@ -144,7 +144,7 @@ def _pairs(by_name: Mapping[str, Rows], tie: float) -> dict[tuple[str, str], dic
             del test["both_time_s"]
             apart = float(won[0].mean() - won[1].mean())
             test |= {"success_difference": apart, "tie": abs(apart) <= tie + 1e-12}
-            pairs[first, second] = {"episodes": len(both), **test}
+            pairs[first, second] = {"names": [first, second], "episodes": len(both), **test}
     for p in ("mcnemar_p", "wilcoxon_p"):
         raised = statistics.holm([1.0 if (v := pair[p]) is None else v for pair in pairs.values()])
         for pair, value in zip(pairs.values(), raised, strict=True):
