@@ -75,13 +75,17 @@ class JointCommand:
         leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, L, 2).
         antenna: Sweep angle of the antenna bases about their mounting angle [rad], positive
             towards the tail, shape (B, 2).
-        pitch: Pitch joint angles [rad], shape (B, P); empty where pitch is not actuated.
+        pitch: Pitch joint angles [rad], shape (B, P), positive where the part in front of the joint
+            rises; empty where pitch is not actuated.
+        elevation: Elevation of the antenna bases above the plane of the head [rad], shape (B, 2);
+            empty for a robot without elevation joints.
     """
 
     yaw: Floats
     leg: Floats
     antenna: Floats
     pitch: Floats = field(default_factory=lambda: _EMPTY)
+    elevation: Floats = field(default_factory=lambda: _EMPTY)
 
 
 def joint_angles(command: JointCommand, parts: Iterable[str], batch: int = 1) -> Floats:

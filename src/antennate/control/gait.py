@@ -60,7 +60,7 @@ def targets(
     lifting: bool = True,
     amplitude: Floats | None = None,
 ) -> JointCommand:
-    """Joint targets at a gait phase. Pitch joints stay at 0.
+    """Joint targets at a gait phase. Pitch joints and elevations stay at 0.
 
     Args:
         params: Wave and timing of the gait.
@@ -85,10 +85,13 @@ def targets(
     antenna = np.full((phase.shape[0], robot.antenna_count), params.antenna_mean)
     if sweep is not None and params.antenna_amplitude:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]
-    if not robot.pitch_count:
-        return JointCommand(yaw=yaw, leg=leg, antenna=antenna)
-    level = np.zeros((phase.shape[0], robot.pitch_count))
-    return JointCommand(yaw=yaw, leg=leg, antenna=antenna, pitch=level)
+    command = JointCommand(yaw=yaw, leg=leg, antenna=antenna)
+    vertical = {
+        "pitch": np.zeros((len(phase), robot.pitch_count)),
+        "elevation": np.zeros((len(phase), robot.elevation_count)),
+    }
+    parts = {name: angles for name, angles in vertical.items() if angles.shape[1]}
+    return replace(command, **parts) if parts else command
 
 
 class Gait:

@@ -20,14 +20,14 @@ from antennate.params.control import (
 )
 from antennate.params.gaits import LiftParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.robots.joints import BaseParams
+from antennate.robots.joints import BaseParams, ElevationParams
 from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
 
 HARDWARE_ALONE = (
     *(
         f"robot.{group}.{name}"
-        for group in ("yaw", "legs", "antennae", "pitch")
+        for group in ("yaw", "legs", "antennae", "pitch", "elevation")
         for name in ("ids", "directions", "zeros", "limit", "fastest")
         if (group, name) != ("yaw", "limit")
     ),
@@ -47,6 +47,7 @@ SIMULATION_ALONE = (
             "body_friction",
             "body_radius",
             "pitch.stiffness",
+            "elevation.mass",
             "legs.reach",
         )
     ),
@@ -74,6 +75,10 @@ def unused(robot: RobotSpec) -> dict[str, str]:
         reasons |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
     if robot.pitch.kind == "actuated":
         reasons["robot.pitch.stiffness"] = "only pitch joints of the kind locked have it"
+    if not robot.elevation_count:
+        names = (name for name in ElevationParams.model_fields if name != "kind")
+        paths = (f"robot.elevation.{name}" for name in names)
+        reasons |= dict.fromkeys(paths, "the antennae of the robot have no vertical joints")
     if not robot.antenna_count:
         bases = (f"robot.antennae.{name}" for name in BaseParams.model_fields if name != "kind")
         paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))

@@ -150,7 +150,7 @@ class DoctorConfig(RobotConfig):
 
     unread: ClassVar[tuple[str, ...]] = (
         *SIMULATION_ALONE,
-        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch")),
+        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch", "elevation")),
         "robot.release",
         *(path for path in paths_of(ControlParams, "control") if path not in _EXAMINED),
         *(path for path in paths_of(SupervisorParams, "limits") if path not in _EXAMINED),
@@ -240,7 +240,7 @@ class SetupConfig(Params):
     shared: ClassVar[bool] = True
     unread: ClassVar[tuple[str, ...]] = (
         *_UNREAD,
-        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch")),
+        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch", "elevation")),
         *(f"setup.{name}" for name in ("hold", "still", "turn", "horn_teeth")),
     )
     robot: RobotSpec = RobotSpec()

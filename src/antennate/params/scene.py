@@ -199,6 +199,27 @@ class CorridorsParams(Params):
         return self
 
 
+class GroundParams(Params):
+    """Sizes of ground that is not flat; each scene of it reads its own."""
+
+    height: float = number(0.10, "m", "assumed: 8 to 15 cm are to be climbed", gt=0.0, le=0.5)
+    """Height of a step, of each step of stairs, or of a ramp."""
+    width: float = number(0.10, "m", "assumed: a link pitch", gt=0.0, le=0.5)
+    """Width of a gap."""
+    depth: float = number(0.35, "m", "assumed: half the robot; it does not come out", gt=0.0, le=1)
+    """Depth of a gap."""
+    steps: int = number(3, "1", "assumed: enough to be on two edges at once", ge=1, le=20)
+    """Steps of stairs."""
+    tread: float = number(0.30, "m", "assumed: of usual stairs (DIN 18065: 29 cm)", gt=0.05, le=2)
+    """Depth of a step of stairs, from edge to edge."""
+    slope: float = number(15.0, "deg", "assumed: wheelchair ramps have 3 to 7 deg", gt=0, le=45)
+    """Slope of a ramp."""
+    block: float = number(0.02, "m", "assumed: above half the robot's clearance", gt=0.0, le=0.2)
+    """Height of the highest block of rubble; blocks are half as high to as high."""
+    density: float = number(60.0, "1/m²", "assumed: a fifth of the field is covered", ge=0, le=400)
+    """Blocks of rubble on a square metre."""
+
+
 class PhysicsParams(Params):
     """Numerics of the simulation, measured by benchmarks/numerics.py."""
 

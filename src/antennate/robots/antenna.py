@@ -213,6 +213,11 @@ class AntennaSpec(Params):
         math.radians(47.0), "rad", "assumed: tips lead and span the width", ge=0, lt=math.pi / 2
     )
     """Mounting angle from the heading, outwards."""
+    roll: float = number(
+        0.0, "rad", "paper: it bends in the plane of the robot", ge=0, le=0.5 * math.pi
+    )
+    """Turn of the plane in which it bends, about its own axis: 0 bends outwards, a right angle
+    upwards, between them both at once."""
     base_spacing: float = number(0.04, "m", "assumed: two XL330 (20 mm) side by side", gt=0)
     """Distance of the two bases."""
     friction: float = number(0.3, "1", "assumed: printed plastic on paper", ge=0, le=2)

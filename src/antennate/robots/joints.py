@@ -147,3 +147,25 @@ class BaseParams(JointParams):
     def largest(self) -> float:
         """Largest angle either way [rad]."""
         return self.limit
+
+
+class ElevationParams(JointParams):
+    """The joints that raise and lower the antennae, left before right; they carry the bases."""
+
+    kind: Literal["none", "pair"] = number("none", "1", "paper: antennae stay in the plane")
+    """Whether the antennae have them."""
+    servo: ServoName = number("xl330_m288", "1", "assumed: as the bases, which they carry")
+    """Model of the group's servos."""
+    fastest: float = number(4.5, "rad/s", "assumed: as the bases", gt=0)
+    """Fastest that goals move."""
+    limit: float = number(
+        _RIGHT_ANGLE, "rad", "assumed: straight up or straight down", gt=0, le=_RIGHT_ANGLE
+    )
+    """Largest angle either way from the plane of the head."""
+    mass: float = number(0.018, "kg", "datasheet: an XL330-M288, the base that it carries", gt=0)
+    """Mass that one of them raises beside its antenna."""
+
+    @property
+    def largest(self) -> float:
+        """Largest angle either way [rad]."""
+        return self.limit

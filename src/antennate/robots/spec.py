@@ -1,7 +1,8 @@
 """A robot as data: geometry, joints and servos, antennae. Every array shape follows from it.
 
 Links run head first, left before right. The joints of a robot stand in the order yaw, legs,
-antennae, and the pitch joints where servos move them: ids, angles and goals keep that order.
+antennae, then the pitch joints where servos move them, and the elevation of the antennae: ids,
+angles and goals keep that order.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.joints import (
     STRAIGHT,
     BaseParams,
+    ElevationParams,
     JointParams,
     LegParams,
     PitchParams,
@@ -30,8 +32,8 @@ from antennate.robots.joints import (
 from antennate.robots.servos import ServoName, ServosParams
 from antennate.types import SIDES
 
-GroupName = Literal["yaw", "legs", "antennae", "pitch"]
-ROBOTS = ("scuttle", "hexapod")
+GroupName = Literal["yaw", "legs", "antennae", "pitch", "elevation"]
+ROBOTS = ("scuttle", "scuttle3d", "hexapod")
 """Robots that are known by name; each is a file beside this one."""
 CLEARANCE = 0.002
 """Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
@@ -86,6 +88,7 @@ class RobotSpec(Params):
     pitch: PitchParams = PitchParams()
     legs: LegParams = LegParams()
     antennae: BaseParams = BaseParams()
+    elevation: ElevationParams = ElevationParams()
     servos: ServosParams = ServosParams()
     antenna: AntennaSpec = AntennaSpec()
 
@@ -136,6 +139,11 @@ class RobotSpec(Params):
         return len(SIDES) if self.antennae.kind == "pair" else 0
 
     @property
+    def elevation_count(self) -> int:
+        """Number of joints that raise and lower the antennae, 0 or 2."""
+        return self.antenna_count if self.elevation.kind == "pair" else 0
+
+    @property
     def hip(self) -> float:
         """Distance of a lifting leg's axis from the middle of the robot [m]."""
         reach = self.legs.reach
@@ -151,6 +159,7 @@ class RobotSpec(Params):
     def link_mass(self) -> float:
         """Mass of one link without its legs [kg]."""
         antennae = self.antenna_count * self.antenna.mass
+        antennae += self.elevation_count * self.elevation.mass
         return (self.mass - self.leg_count * self.leg_mass - antennae) / self.links
 
     @property
@@ -184,7 +193,13 @@ class RobotSpec(Params):
     def joint_names(self) -> tuple[str, ...]:
         """Names of all joints that servos move."""
         bases = tuple(prefix + BASE for prefix in ANTENNA_PREFIXES[: self.antenna_count])
-        return self.yaw_names + self.leg_names + bases + self.pitch_names[: self.pitch_count]
+        pitch = self.pitch_names[: self.pitch_count]
+        return self.yaw_names + self.leg_names + bases + pitch + self.elevation_names
+
+    @property
+    def elevation_names(self) -> tuple[str, ...]:
+        """Names of the joints that raise and lower the antennae, left before right."""
+        return tuple(prefix + "elevation" for prefix in ANTENNA_PREFIXES[: self.elevation_count])
 
     @property
     def groups(self) -> tuple[tuple[GroupName, JointParams, int], ...]:
@@ -194,6 +209,7 @@ class RobotSpec(Params):
             ("legs", self.legs, self.leg_count),
             ("antennae", self.antennae, self.antenna_count),
             ("pitch", self.pitch, self.pitch_count),
+            ("elevation", self.elevation, self.elevation_count),
         )
 
     def places(self, name: GroupName) -> slice:
@@ -203,7 +219,8 @@ class RobotSpec(Params):
             if known == name:
                 return slice(first, first + count)
             first += count
-        raise ConfigError(f"name: expected yaw, legs, antennae or pitch, found {shown(name)}")
+        known_names = ", ".join(name for name, _, _ in self.groups)
+        raise ConfigError(f"name: expected one of {known_names}, found {shown(name)}")
 
     def command_shapes(self, batch: int = 1) -> dict[str, tuple[int, ...]]:
         """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""
@@ -212,7 +229,9 @@ class RobotSpec(Params):
             "leg": (batch, self.links, len(SIDES)),
             "antenna": (batch, self.antenna_count),
         }
-        return shapes | ({"pitch": (batch, self.pitch_count)} if self.pitch_count else {})
+        shapes |= {"pitch": (batch, self.pitch_count)} if self.pitch_count else {}
+        elevation = {"elevation": (batch, self.elevation_count)} if self.elevation_count else {}
+        return shapes | elevation
 
     @property
     def ids(self) -> tuple[int, ...]:

@@ -68,7 +68,7 @@ def attach_antenna(
     place = checks.array("position", position, (3,), "m")
     contype = checks.whole("contype", contype, most=_MOST_BITS)
     conaffinity = checks.whole("conaffinity", conaffinity, most=_MOST_BITS)
-    part = build_antenna(antenna)
+    part = build_antenna(antenna, side=side)
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
             geom.contype, geom.conaffinity = contype, conaffinity

@@ -9,8 +9,9 @@ behind the one before. A link is a spine along x and a cross-beam along y that h
 servos. The foot of a leg is a crowned ring; that of a rolling leg sits off its axle.
 
 Two geoms collide if the `contype` of one meets the `conaffinity` of the other. The robot never
-touches itself; only legs touch the floor; everything of the robot touches obstacles. In a scene,
-geoms with the engine's default bits (1 and 1) become obstacles, planes the floor.
+touches itself; only legs touch the floor; everything of the robot touches obstacles and ground,
+which is a floor with steps and holes. In a scene, geoms with the engine's default bits (1 and 1)
+become obstacles, planes the floor.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ OBSTACLE_BIT = 2
 LEG_BIT = 4
 BODY_BIT = 8
 ANTENNA_BIT = 16
+GROUND_BIT = 32
+GROUND_FRICTION = 0.3
+"""Friction of ground against all but legs, which have their own (assumed: as the body)."""
 
 
 Side = Literal["left", "right"]
@@ -58,14 +62,19 @@ def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, 
     return (c, 0.0, 0.0, s) if side == "left" else (0.0, c, -s, 0.0)
 
 
-def build_antenna(params: AntennaSpec, servo: ServoParams | None = None) -> mujoco.MjSpec:
+def build_antenna(
+    params: AntennaSpec, servo: ServoParams | None = None, side: Side = "left"
+) -> mujoco.MjSpec:
     """The part as an uncompiled spec: bodies `base`, `hinge0` and so on, actuator `base`.
 
     Args:
         params: The antenna.
         servo: Model of the servo that turns its base; an XL330-M288 if absent.
+        side: The right one is mounted upside down, so that it bends upwards the other way.
     """
     spec, drive = mujoco.MjSpec(), params.base(servo)
+    up = math.sin(params.roll) if side == "left" else -math.sin(params.roll)
+    axis = [0.0, 0.0 - up, math.cos(params.roll)]
     spec.compiler.degree = False
     base = spec.worldbody.add_body(name=BASE)
     base.add_joint(
@@ -87,7 +96,7 @@ def build_antenna(params: AntennaSpec, servo: ServoParams | None = None) -> mujo
         parent.add_joint(
             name=name,
             type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=[0, 0, 1],
+            axis=axis,
             stiffness=k,
             damping=params.damping_time * k,
             armature=params.armature,
@@ -103,7 +112,7 @@ def build_antenna(params: AntennaSpec, servo: ServoParams | None = None) -> mujo
             friction=[params.friction, 0, 0],
             condim=3,
             contype=ANTENNA_BIT,
-            conaffinity=OBSTACLE_BIT,
+            conaffinity=OBSTACLE_BIT | GROUND_BIT,
         )
         where = [params.link_length, 0.0, 0.0]
     base.add_geom(
@@ -116,7 +125,7 @@ def build_antenna(params: AntennaSpec, servo: ServoParams | None = None) -> mujo
     return spec
 
 
-_YAW, _PITCH = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
+_YAW, _PITCH, _ELEVATION = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 
 
 def axle_height(params: RobotSpec) -> float:
@@ -199,7 +208,7 @@ def _add_link_shape(link: mujoco.MjsBody, params: RobotSpec) -> None:
             friction=[params.body_friction, 0, 0],
             condim=3,
             contype=BODY_BIT,
-            conaffinity=OBSTACLE_BIT,
+            conaffinity=OBSTACLE_BIT | GROUND_BIT,
         )
 
 
@@ -223,7 +232,7 @@ def _add_leg(
         priority=1,
         condim=3,
         contype=LEG_BIT,
-        conaffinity=FLOOR_BIT | OBSTACLE_BIT | LEG_BIT,
+        conaffinity=FLOOR_BIT | OBSTACLE_BIT | LEG_BIT | GROUND_BIT,
     )
     _add_servo(spec, name, servo)
 
@@ -231,10 +240,45 @@ def _add_leg(
 def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
     servo = params.servos.of(params.antennae.servo)
-    for prefix, sign in zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True):
+    for i, (prefix, sign) in enumerate(zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True)):
         side = "left" if sign > 0 else "right"
         turn = mounting_quaternion(params.antenna.base_angle, side)
-        frame = head.add_frame(
-            pos=[params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0], quat=turn
-        )
-        spec.attach(build_antenna(params.antenna, servo), frame=frame, prefix=prefix)
+        place = [params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0]
+        part = build_antenna(params.antenna, servo, side)
+        if params.elevation_count:
+            carrier = _add_elevation(spec, head, params.elevation_names[i], place, sign, params)
+            frame = carrier.add_frame(quat=mounting_quaternion(0.0, side))
+        else:
+            frame = head.add_frame(pos=place, quat=turn)
+        spec.attach(part, frame=frame, prefix=prefix)
+
+
+def _add_elevation(
+    spec: mujoco.MjSpec,
+    head: mujoco.MjsBody,
+    name: str,
+    place: Sequence[float],
+    sign: float,
+    params: RobotSpec,
+) -> mujoco.MjsBody:
+    """The body that carries an antenna's base and turns it up; x is the antenna's direction."""
+    servo = params.servos.of(params.elevation.servo)
+    half = sign * params.antenna.base_angle / 2
+    body = head.add_body(name=name, pos=place, quat=[math.cos(half), 0.0, 0.0, math.sin(half)])
+    body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=_ELEVATION,
+        damping=servo.damping,
+        armature=servo.armature,
+        **STOPS,
+    )
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[params.body_radius / 2, 0, 0],
+        mass=params.elevation.mass,
+        contype=0,
+        conaffinity=0,
+    )
+    _add_servo(spec, name, servo)
+    return body

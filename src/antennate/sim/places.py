@@ -55,7 +55,8 @@ class Places:
         self.bent: Ints = bent
         self.hinges: Ints = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, :sensed]
         pitch = coordinates(list(robot.pitch_names))
-        self.bounded: Ints = np.concatenate([self.yaw, pitch, bent])
+        elevation = coordinates(list(robot.elevation_names))
+        self.bounded: Ints = np.concatenate([self.yaw, pitch, bent, elevation])
         self.drives: Ints = np.array([model.actuator(prefix + n).id for n in names])
         self.driven: Ints = coordinates(names)
         self.turning: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names])
@@ -70,7 +71,7 @@ class Places:
 
 
 class Gears:
-    """The joints of a robot in a model, but its antennae.
+    """The joints of a robot in a model, but those of its antennae.
 
     Args:
         model: The model, whose joints get that friction.
@@ -88,7 +89,7 @@ class Gears:
         self._model = model
         share: dict[str, float] = {}
         for group, joints, _ in robot.groups:
-            if group != "antennae":
+            if group not in ("antennae", "elevation"):
                 loaded = robot.servos.of(joints.servo).load_friction
                 share |= dict.fromkeys(robot.joint_names[robot.places(group)], loaded)
         names = [name for name in share if share[name] > 0.0]
@@ -215,7 +216,7 @@ DISTANCE_LIMIT = 100.0
 ANGLE_LIMIT = 6.3
 """Yaw, pitch and antenna joints cannot turn farther [rad]; legs turn without end."""
 HEIGHT_LIMIT = 0.3
-"""A head above or below this left the world [m]."""
+"""A head higher than this above the highest ground left the world [m], or one below the lowest."""
 
 
 def sound(heads: Floats, bounded: Floats, speeds: Floats) -> Bools:
@@ -233,13 +234,16 @@ def sound(heads: Floats, bounded: Floats, speeds: Floats) -> Bools:
         )
 
 
-def broken(head: Floats, bounded: Floats, speeds: Floats) -> str:
+def broken(
+    head: Floats, bounded: Floats, speeds: Floats, height_limit: float = HEIGHT_LIMIT
+) -> str:
     """What is beyond its bound in a state; empty if nothing is.
 
     Args:
         head: Position of the head [m], shape (3,).
         bounded: Joints that do not turn without end [rad], shape (n,).
         speeds: All coordinates [m/s or rad/s], shape (nv,).
+        height_limit: Height that the head cannot have [m].
     """
     far, height = float(abs(head[:2]).max()), float(head[2])
     angle, speed = float(abs(bounded).max(initial=0.0)), float(abs(speeds).max())
@@ -247,6 +251,6 @@ def broken(head: Floats, bounded: Floats, speeds: Floats) -> str:
         (far < DISTANCE_LIMIT, f"the head is {far:.3g} m away"),
         (angle < ANGLE_LIMIT, f"a joint is at {angle:.3g} rad"),
         (speed < SPEED_LIMIT, f"a coordinate moves at {speed:.3g} m/s or rad/s"),
-        (0.0 < height < HEIGHT_LIMIT, f"the head is at a height of {height:.3g} m"),
+        (0.0 < height < height_limit, f"the head is at a height of {height:.3g} m"),
     )
     return next((trouble for sound, trouble in checks if not sound), "")

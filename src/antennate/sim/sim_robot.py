@@ -16,7 +16,7 @@ from antennate.errors import ConfigError, SimulationError
 from antennate.params.scene import VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
-from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, HEIGHT_LIMIT, SPEED_LIMIT
+from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, SPEED_LIMIT
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, joint_angles
 
@@ -77,7 +77,7 @@ class States:
         self._scale[row, 1 + model.nq : size] = 1.0 / SPEED_LIMIT
         coordinates = self._scale[row, 1 : 1 + model.nq]
         coordinates[places.root : places.root + 2] = 1.0 / DISTANCE_LIMIT
-        coordinates[places.root + 2] = 1.0 / HEIGHT_LIMIT
+        coordinates[places.root + 2] = 1.0 / world.height_limit
         coordinates[places.bounded] = 1.0 / ANGLE_LIMIT
         first = row * self._all.shape[1] + 1
         self._heights[row] = first + places.root + 2

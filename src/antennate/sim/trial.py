@@ -19,10 +19,17 @@ from antennate.messages import shortened
 from antennate.params.base import Params, changes, from_values, number, paths_of
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
-from antennate.params.scene import CorridorsParams, PhysicsParams, TunnelParams, VariationParams
+from antennate.params.scene import (
+    CorridorsParams,
+    GroundParams,
+    PhysicsParams,
+    TunnelParams,
+    VariationParams,
+)
 from antennate.robots.antenna import require_own_curve
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.geometry import crossing
+from antennate.sim.scenes.ground import READS
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
@@ -43,10 +50,11 @@ class TrialConfig(Params):
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
     scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
-    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, a MJCF
-    file.xml, MODULE:CLASS or file.py:CLASS."""
+    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, step_up,
+    step_down, stairs, gap, ramp, rubble, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
+    ground: GroundParams = GroundParams()
     robot: RobotSpec = RobotSpec()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
@@ -62,7 +70,15 @@ class TrialConfig(Params):
         return {
             **unused(self.robot),
             **dict.fromkeys(ranges, f"it belongs to the scene {CORRIDORS!r}"),
+            **{f"ground.{name}": why for name, why in self._unread_ground()},
         }
+
+    def _unread_ground(self) -> Iterator[tuple[str, str]]:
+        """Sizes of ground that the scene does not have, and whose they are."""
+        for name in GroundParams.model_fields:
+            scenes = [scene for scene, read in READS.items() if name in read]
+            if self.scene not in scenes:
+                yield name, f"it belongs to the scenes {', '.join(scenes)}"
 
     @model_validator(mode="after")
     def _scene_and_robot_agree(self) -> TrialConfig:
@@ -87,7 +103,7 @@ def scene_of(config: TrialConfig) -> Scene:
         ConfigError: There is no such scene.
         SceneError: The file cannot be used, or the constructor failed.
     """
-    return make_scene(config.scene, config.tunnel, config.corridors)
+    return make_scene(config.scene, config.tunnel, config.corridors, config.ground)
 
 
 def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
@@ -323,7 +339,7 @@ def require_room(world: World) -> None:
 
 def make_world(physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance) -> World:
     """Compile the robot in a scene."""
-    return World(compile_world(physics, robot, scene), robot)
+    return World(compile_world(physics, robot, scene), robot, getattr(scene, "top", 0.0))
 
 
 def place_at_start(
@@ -352,6 +368,7 @@ def place_at_start(
         ahead + heading,
         command.yaw[0],
         command.leg[0],
+        getattr(scene, "ground", 0.0),
     )
 
 

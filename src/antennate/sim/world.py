@@ -17,8 +17,16 @@ from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.engine_setup import drop_if_asked
-from antennate.sim.parts import FLOOR_BIT, OBSTACLE_BIT, axle_height, build_robot
+from antennate.sim.parts import (
+    FLOOR_BIT,
+    GROUND_BIT,
+    GROUND_FRICTION,
+    OBSTACLE_BIT,
+    axle_height,
+    build_robot,
+)
 from antennate.sim.places import (
+    HEIGHT_LIMIT,
     ROBOT_AND_OBSTACLE,
     Contacts,
     Gears,
@@ -70,6 +78,8 @@ def compile_world(
     else:
         scene.build(spec)
         _meet_robot(spec)
+    if robot.elevation_count:
+        _feel_floor(spec)
     frame = spec.worldbody.add_frame(pos=[0, 0, axle_height(robot)])
     spec.attach(build_robot(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
@@ -96,6 +106,14 @@ def _meet_robot(spec: mujoco.MjSpec) -> None:
             geom.conaffinity = 0 if is_floor else OBSTACLE_BIT | FLOOR_BIT
 
 
+def _feel_floor(spec: mujoco.MjSpec) -> None:
+    """Let antennae that can be lowered, and the body, touch the floor."""
+    for geom in spec.geoms:
+        if geom.contype & FLOOR_BIT:
+            geom.contype |= GROUND_BIT
+            geom.friction[0] = GROUND_FRICTION
+
+
 class World:
     """One model with its state, and the robot's parts by index.
 
@@ -108,10 +126,13 @@ class World:
         head: Position of the head link [m], shape (3,), a view of the state.
         servo_drives: Gain and limits of the servos' drives.
         t: Time since the world was made [s].
+        height_limit: Height that no head can have [m].
     """
 
-    def __init__(self, model: mujoco.MjModel, robot: RobotSpec) -> None:
+    def __init__(self, model: mujoco.MjModel, robot: RobotSpec, top: float = 0.0) -> None:
+        """Make it of a model, whose highest ground is at `top` [m]."""
         self.robot = robot
+        self.height_limit = top + HEIGHT_LIMIT
         self.model = model
         self.data = mujoco.MjData(model)
         self.places = places = Places(model, robot, PREFIX)
@@ -134,10 +155,29 @@ class World:
         """Time since the world was made [s]."""
         return float(self.data.time)
 
-    def place(self, x: float, y: float, heading: float, yaw: Floats, leg: Floats) -> None:
-        """Put the head at x, y [m] with a heading [rad], joints at yaw (Y,), leg (L, 2) [rad]."""
+    def place(
+        self,
+        x: float,
+        y: float,
+        heading: float,
+        yaw: Floats,
+        leg: Floats,
+        ground: float = 0.0,
+    ) -> None:
+        """Put the robot somewhere, level.
+
+        Args:
+            x: Of the head [m].
+            y: Of the head [m].
+            heading: Of the head [rad].
+            yaw: Yaw joints [rad], shape (Y,).
+            leg: Legs [rad], shape (L, 2).
+            ground: Height of the ground under the robot [m].
+        """
         q = self.data.qpos
         q[self.root : self.root + 2] = x, y
+        if ground:
+            q[self.root + 2] += ground
         q[self.root + 3 : self.root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
         q[self.places.yaw] = yaw
         q[self.places.legs] = leg.ravel()
@@ -243,7 +283,7 @@ class World:
         warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
         troubles = (
             f"engine warning {', '.join(warned)}" if warned else "",
-            broken(self.head, data.qpos[self.places.bounded], data.qvel),
+            broken(self.head, data.qpos[self.places.bounded], data.qvel, self.height_limit),
             "" if data.time > self._before else f"time stood still at {data.time:.6g} s",
         )
         for trouble in filter(None, troubles):
@@ -264,6 +304,10 @@ class World:
     def links(self) -> Floats:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         return self.data.xpos[self.places.links, :2]
+
+    def link_places(self) -> Floats:
+        """Positions of the links, head first [m], shape (L, 3)."""
+        return self.data.xpos[self.places.links].copy()
 
     def bends(self) -> Floats:
         """Angles of all hinges of the antennae, one antenna after the other [rad], shape (n,)."""

@@ -237,7 +237,7 @@ def angles_of(command: JointCommand, joints: int | None = None) -> tuple[float, 
         command: The command; it may be anything.
         joints: Number of joints; all angles are NaN if the command has others.
     """
-    parts = (numbers_of(command, name) for name in ("yaw", "leg", "antenna", "pitch"))
+    parts = (numbers_of(command, name) for name in ("yaw", "leg", "antenna", "pitch", "elevation"))
     angles = tuple(angle for part in parts for angle in part)
     return angles if joints in (None, len(angles)) else (math.nan,) * joints
 

@@ -40,6 +40,7 @@ class TimeSeries:
         leg: Commanded leg angles [rad], shape (n, L, 2), left before right.
         antenna: Commanded angles of the antenna bases [rad], shape (n, 2), or (n, 0) without.
         pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
+        elevation: Commanded elevations of the antennae [rad], shape (n, 2), (n, 0) without them.
         head: Position of the head in the world [m], shape (n, 2).
         meta: What the series is of, such as controller, robot and seed.
     """
@@ -53,6 +54,7 @@ class TimeSeries:
     leg: Floats
     antenna: Floats
     pitch: Floats
+    elevation: Floats
     head: Floats
     meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
 
@@ -143,7 +145,7 @@ class TimeSeriesRecorder:
         for source, names in (
             (frame, ("t", "counts")),
             (self._controller, ("level", "contact", "maneuver")),
-            (command, ("yaw", "leg", "antenna", "pitch")),
+            (command, ("yaw", "leg", "antenna", "pitch", "elevation")),
         ):
             for name in names:
                 batch = getattr(source, name)

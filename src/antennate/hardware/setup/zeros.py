@@ -37,6 +37,7 @@ _SENSES: Mapping[GroupName, str] = {
     "legs": "turn it as a wheel rolls forward",
     "antennae": "turn it towards the tail",
     "pitch": "lift the part behind it",
+    "elevation": "lift the antenna",
 }
 _LIFTING = "lift it"
 _QUIT = ("q", "quit")

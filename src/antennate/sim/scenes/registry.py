@@ -10,9 +10,10 @@ from pathlib import Path
 
 from antennate.errors import AntennateError, ConfigError, SceneError, raised
 from antennate.lookup import Registry
-from antennate.params.scene import CorridorsParams, CylinderParams, TunnelParams
+from antennate.params.scene import CorridorsParams, CylinderParams, GroundParams, TunnelParams
 from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.geometry import Arm, Room
+from antennate.sim.scenes.ground import KINDS, GroundScene
 from antennate.sim.scenes.mjcf import MjcfScene, require_compiles
 from antennate.sim.scenes.scene import TIME_LIMIT, FlatScene, Scene
 from antennate.sim.scenes.tunnel import TunnelScene
@@ -47,6 +48,7 @@ _SHIPPED: dict[str, Callable[[], Scene]] = {
     CORRIDORS: CorridorsScene,
     "wall": WallScene,
     **HARD,
+    **{name: functools.partial(GroundScene, name) for name in KINDS},
 }
 SHIPPED = tuple(_SHIPPED)
 """Scenes that need no file and no code of others."""
@@ -68,7 +70,10 @@ def check_name(name: str) -> str:
 
 
 def make_scene(
-    name: str, tunnel: TunnelParams | None = None, corridors: CorridorsParams | None = None
+    name: str,
+    tunnel: TunnelParams | None = None,
+    corridors: CorridorsParams | None = None,
+    ground: GroundParams | None = None,
 ) -> Scene:
     """The scene of a name.
 
@@ -78,6 +83,7 @@ def make_scene(
             `antennate.scenes`. Its constructor is called without arguments.
         tunnel: Parameters of `tunnel`; no other scene takes them.
         corridors: Parameters of `corridors`, likewise.
+        ground: Sizes of the scenes of ground that is not flat, likewise.
 
     Raises:
         ConfigError: There is no such scene.
@@ -87,6 +93,8 @@ def make_scene(
         return TunnelScene(tunnel)
     if name == CORRIDORS:
         return CorridorsScene(corridors)
+    if name in KINDS:
+        return GroundScene(name, ground)
     if _is_file(name):
         if parent_process() is None:  # the process that started this worker has tried it
             require_compiles(Path(name))

@@ -28,7 +28,9 @@ class SceneInstance(Protocol):
     """One drawn scene. Positions are in plan, x and y [m]; the floor at the start is at z = 0.
 
     It may have more: `succeeded(head)`, see `exit`; `route`, corner points from the start to the
-    exit [m], shape (n, 2); `time_limit`, after which a trial has failed [s].
+    exit [m], shape (n, 2); `time_limit`, after which a trial has failed [s]; `top`, height of its
+    highest ground [m]; `ground`, that of the ground under the robot at the start [m]. The lowest
+    ground is at 0.
     """
 
     @property
