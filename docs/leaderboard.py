@@ -29,11 +29,11 @@ WHOLE = 100
 def result_of(rows: Sequence[Episode]) -> dict[str, Any]:
     """The standing of these rows, with what a page says of the run."""
     config = CompeteConfig()
-    seed = rows[0].seed
+    seeds = list(dict.fromkeys(row.seed for row in rows))
     return {
         **standings(rows, config.tie),
-        "seed": seed,
-        "hidden": seed not in DEVELOPMENT,
+        "seeds": seeds,
+        "hidden": not set(seeds) & set(DEVELOPMENT),
         "check": None,
     }
 
@@ -41,7 +41,6 @@ def result_of(rows: Sequence[Episode]) -> dict[str, Any]:
 def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
     """What stands between the marks."""
     counts = [c["episodes"] for cells in result["scenes"].values() for c in cells.values()]
-    seeds = ", ".join(str(seed) for seed in dict.fromkeys(row.seed for row in rows))
     kinds = {
         name: ", ".join(sorted({getattr(row, name) for row in rows}))
         for name in ("version", "engine", "processor")
@@ -51,13 +50,13 @@ def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
     parts = []
     if least < WHOLE:
         parts.append(
-            f"**Preliminary**: {draws} draws of each scene and controller, where a board has "
+            f"**Preliminary**: {draws} draw{'s' * (most > 1)} of each scene and controller, where a board has "
             f"{WHOLE}. Ranks whose intervals overlap are not told apart."
         )
     parts += [
         sentence(result),
         markdown(result),
-        f"{len(rows)} episodes with the seed {seeds}, antennate {kinds['version']}, MuJoCo "
+        f"{len(rows)} episodes of antennate {kinds['version']}, MuJoCo "
         f"{kinds['engine']}, {kinds['processor']}. Every row is in `docs/leaderboard.csv`.",
     ]
     return "\n\n".join(parts)

@@ -33,7 +33,7 @@ def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episo
 
 def judged(*groups: list[Episode], **more: Any) -> dict[str, Any]:
     rows = [row for group in groups for row in group]
-    more = {"seed": 1, "hidden": True, "decision_limit_s": 0.05, "check": None, **more}
+    more = {"seeds": [1], "hidden": True, "decision_limit_s": 0.05, "check": None, **more}
     return {**standings(rows, 0.01), **more}
 
 

@@ -121,10 +121,12 @@ def sentence(result: Result) -> str:
         f"{rows[name]['successes']} of {rows[name]['episodes']})"
         for name in ranked
     ]
-    seed = f"{'hidden ' if result['hidden'] else 'public '}seed {result['seed']}"
+    seeds = result["seeds"]
+    kind = f"{'hidden' if result['hidden'] else 'public'} seed{'s' * (len(seeds) > 1)}"
     ranks = ", ".join(told) or "none, as none lives on its readings"
     return (
-        f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {seed}: {ranks}."
+        f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
+        f"{', '.join(map(str, seeds))}: {ranks}."
     )
 
 
