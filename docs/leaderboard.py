@@ -50,8 +50,8 @@ def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
     parts = []
     if least < WHOLE:
         parts.append(
-            f"**Preliminary**: {draws} draw{'s' * (most > 1)} of each scene and controller, where a board has "
-            f"{WHOLE}. Ranks whose intervals overlap are not told apart."
+            f"**Preliminary**: {draws} draw{'s' * (most > 1)} of each scene and controller, where "
+            f"a board has {WHOLE}. Ranks whose intervals overlap are not told apart."
         )
     parts += [
         sentence(result),
