@@ -134,7 +134,7 @@ class Body:
         lower = np.maximum(self.rise - self._params.sink_rate * self._period, 0.0)
         self.rise = np.where(rows[:, None] & self.behind, lower, self.rise)
 
-    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
