@@ -68,8 +68,7 @@ def markdown(table: Table) -> str:
     lines: list[Sequence[str]] = [("", *table.columns), ("---",) * (len(table.columns) + 1)]
     lines += [(name.strip(), *cells) for name, cells in table.rows]
     body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    note = "\n".join(filter(None, (table.preface.replace("\n", "; "), table.note)))
-    return f"**{table.title}**\n\n{body}\n\n{note}\n"
+    return f"**{table.title}**\n\n{body}\n\n{table.note}\n"
 
 
 if __name__ == "__main__":
