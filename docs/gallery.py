@@ -31,6 +31,10 @@ FIGURES = {
     "geometry_front.png": "front.png",
     "geometry_torus.png": "torus.png",
     "geometry_twists.png": "twists.png",
+    "climb_success.png": "success.png",
+    "climb_side.png": "side.png",
+    "climb_plan.png": "plan.png",
+    "climb_felt.png": "felt.png",
 }
 """Names in the run where they are not those of the picture."""
 SCRIPTS = {
@@ -44,6 +48,7 @@ FEW = {
     "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
     "geometry": "--gaits 4 --wave-numbers 1 --leads 5 --front-waves 1 --turns 2 --repeats 2",
+    "climb": "--trials 1 --heights 0.05 --conditions climb --time-limit 30 --sensing 1",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",

@@ -5,6 +5,7 @@ Checks of the configuration itself, and writing it down, do not count.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -12,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antennate.control.climbing.controllers import climb
+from antennate.control.climbing.rule import Stage
 from antennate.control.registry import make_controller
 from antennate.params.base import Params
 from antennate.params.control import ControlParams
@@ -72,3 +75,30 @@ def press(controller: Controller, control: ControlParams) -> None:
         pressed = 1.0 < tick * control.period < 35.0
         counts = np.array([[1400.0 if pressed else 1870.0, 1410.0 if pressed else 1870.0]])
         controller.step(AntennaFrame(t=np.array([tick * control.period]), counts=counts))
+
+
+def meet_ground(control: ControlParams, robot: RobotSpec) -> None:
+    """Let `climb` meet low and high steps, drops with and without a floor, and walk on behind."""
+    straight, floor, bent = 1870.0, 1745.0, 1500.0
+    controller = climb(control, robot, 1)
+    controller.reset(np.zeros(1, dtype=np.int64))
+    rule: Any = controller.rule
+    visits, before = Counter[int](), -1
+    for tick in range(ticks := round(300.0 / control.period)):
+        stage = int(rule.stage[0])
+        visits[stage] += stage != before
+        before, even = stage, visits[stage] % 2 == 0
+        level = tick < 0.5 * ticks  # later it is stopped by what it climbs
+        even &= level
+        counts = {
+            Stage.WALK: straight if even or (level and controller.body.climbs[0]) else bent,
+            Stage.PROBE_UP: straight if visits[stage] == 1 else bent,
+            Stage.PROBE_DOWN: straight if even else bent,
+            Stage.CHECK: bent if visits[stage] == 2 else floor,
+        }.get(Stage(stage), floor)
+        t = np.array([tick * control.period])
+        controller.step(AntennaFrame(t=t, counts=np.full((1, 2), counts)))
+    rule.stage[0] = Stage.RETREAT  # as after a climb that failed
+    controller.step(AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), floor)))
+    for name in ("lifted", "rhythm"):
+        act(name, control, robot)

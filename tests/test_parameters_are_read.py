@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from recorded import act, leaves, recorded
+from recorded import act, leaves, meet_ground, recorded
 from servo_recordings import of_twin
 
 from antennate import experiments
@@ -150,6 +150,24 @@ TINY: dict[str, list[dict[str, Any]]] = {
             ("xc430_w240", {}, "rolling", "locked"),
         )
     ],
+    "climb": [
+        {
+            "trials": 1,
+            "heights": [0.05],
+            "divisors": [256.0],
+            "time_limit": 0.1,
+            "robot": {
+                "yaw": {"servo": servo},
+                "legs": {"kind": kind, "servo": "xl430_w250"},
+                "antenna": {"sensor": sensor},
+            },
+            "control": {"rate": 25.0, "conditioning": RISING if sensor else {}},
+        }
+        for servo, sensor, kind in (
+            ("xl330_m288", OTHER_SENSOR, "lifting"),
+            ("xc430_w240", {}, "rolling"),
+        )
+    ],
     "wall": [
         {
             "trials": 1,
@@ -275,6 +293,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
             if name == "tunnel" and config.control.rate < 50.0:
                 for one in config.controllers:
                     act(one, config.control, config.robot)
+            if name == "climb":
+                meet_ground(config.control, config.robot)
         read |= found
     every = set(leaves(experiment.config))
     assert every - read == set(experiment.config.unread) & every

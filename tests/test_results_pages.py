@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from antennate.experiments.climb import measures as climb
+from antennate.experiments.climb.physics import ClimbRow
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.standings import CONTROLLER, PAIR
 from antennate.experiments.dataset.episodes import EpisodeRow
@@ -32,6 +34,7 @@ MEASURES = {
     ("results.md", "compete"): (*CONTROLLER, *PAIR),
     ("results.md", "gait"): MANEUVER,
     ("results.md", "geometry"): geometry.GAIT,
+    ("results.md", "climb"): climb.CONDITION,
     ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
     ("results.md", "touch"): (*PROFILE, *AVERAGING),
     ("results.md", "force"): FORCE,
@@ -41,6 +44,7 @@ ROWS = {
     ("results.md", "tunnel"): TrialResult,
     ("results.md", "compete"): Episode,
     ("results.md", "geometry"): Walked,
+    ("results.md", "climb"): ClimbRow,
     ("results.md", "wall"): WallTrial,
     ("results.md", "force"): TraverseRow,
     ("results.md", "dataset"): EpisodeRow,

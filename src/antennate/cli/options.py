@@ -101,9 +101,10 @@ class Option:
 
     @property
     def meaning(self) -> str:
-        """What the field means, with its unit; of a named group its choice."""
+        """What the field means, with its unit; of a named group its choice, unless it says more."""
         kind = group_of(fields_of(self.model)[self.path[-1]].annotation)
-        return getattr(kind, "choice", "") or meaning(self.model, self.path[-1])
+        own = meaning(self.model, self.path[-1])
+        return own or getattr(kind, "choice", "")
 
     @property
     def values(self) -> list[str]:

@@ -305,6 +305,11 @@ class RuleController:
         """Gait phase [rad], shape (B,)."""
         return self.gait.phase
 
+    @property
+    def rule(self) -> Rule:
+        """Its rule, for whoever watches it."""
+        return self._rule
+
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Forget everything about some rows and start their gait at `phase` [rad]."""
         self._mean.reset(rows)

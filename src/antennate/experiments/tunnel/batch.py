@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 
@@ -15,14 +15,12 @@ from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readi
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.tunnel.physics import (
-    Outcome,
     TrialMonitor,
-    TrialPath,
     TrialResult,
     TunnelConfig,
 )
 from antennate.sim.knowledge import Truths, require_route
-from antennate.sim.scenes.scene import TIME_LIMIT, Scene
+from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
     LOOK_EVERY,
@@ -45,11 +43,39 @@ BATCH = 24
 SHOWN_TRIALS = 5
 """Trials of which the figure draws the paths; those of the others are not kept, as they take time.
 """
-Emit = Callable[[tuple[TrialResult, TrialPath | None]], None]
+Emit = Callable[[tuple[Any, Any]], None]
+"""Takes what a trial came to: a `TrialResult` and a `TrialPath` or None, unless watched otherwise.
+"""
 Watch = Callable[[World, AntennaFrame, Controller], Sequence[str]]
 """Takes world, frame and controller of the first row after each tick; returns events to log."""
 
 
+class Monitor(Protocol):
+    """What watches one trial and says how it ends, as `TrialMonitor` does."""
+
+    trial: int
+    scene: SceneInstance
+    time_limit: float
+
+    def bend(self, world: Any) -> None:
+        """Look at the world after every tick."""
+        ...
+
+    def look(self, world: Any, t: float, maneuver: int) -> str | None:
+        """Look every LOOK_EVERY ticks and at the time limit; the outcome once there is one."""
+        ...
+
+    def result(self, world: Any, outcome: Any, reason: str, ticks: Ints) -> Any:
+        """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
+        ...
+
+    def path(self, world: Any) -> Any:
+        """What figures draw of the trial; asked of the first SHOWN_TRIALS."""
+        ...
+
+
+MakeMonitor = Callable[[int, int, SceneInstance, float], Monitor]
+"""Takes row, trial, its scene and its time limit [s]."""
 Bodies = Union[SimRobot, "WarpRobot"]
 """Robots in rows that trials are put into, on the CPU or in a batch on a device."""
 Donors = dict[int, Floats]
@@ -70,6 +96,7 @@ def run_trials(
     bodies: MakeBodies | None = None,
     donors: Donors | None = None,
     read: Donors | None = None,
+    monitor: MakeMonitor | None = None,
 ) -> None:
     """Run trials of one condition; emit each as it ends, and keep its log if there is a folder.
 
@@ -92,9 +119,17 @@ def run_trials(
         donors: Counts that yoked trials are given, by trial, (ticks, 2); if not given, they are
             read in trials that are run for it, so many at once.
         read: Takes what the robot of each trial reads, likewise.
+        monitor: Makes what watches a trial and makes its row; a `TrialMonitor` if not given. A
+            trial whose scene cannot be drawn has a `TrialResult` all the same.
     """
     again = functools.partial(
-        *(run_trials, config, condition), emit=emit, logs=logs, make=make, bodies=bodies, read=read
+        *(run_trials, config, condition),
+        emit=emit,
+        logs=logs,
+        make=make,
+        bodies=bodies,
+        read=read,
+        monitor=monitor,
     )
     if parts_of(condition)[1] == YOKED and donors is None:
         for first in range(0, len(trials), batch):
@@ -104,7 +139,7 @@ def run_trials(
         return
     size = min(batch, len(trials))
     made = (bodies or cpu_bodies(config))(size)
-    rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read)
+    rows = _Rows(config, condition, trials, emit, size, logs, watch, made, donors, read, monitor)
     try:
         rows.run(make)
     except Restart:
@@ -160,6 +195,7 @@ class _Rows:
         made: tuple[Scene, Bodies],
         donors: Donors | None,
         read: Donors | None,
+        monitor: MakeMonitor | None = None,
     ) -> None:
         self._controller, self._readings = parts_of(name)
         self._donors, self._read, self._counts = donors or {}, read, list[Floats]()
@@ -167,7 +203,8 @@ class _Rows:
         self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
         self._waiting = list(trials)
         self._scene, self._robot = made
-        self._monitors: dict[int, TrialMonitor] = {}
+        self._monitors: dict[int, Monitor] = {}
+        self._watches = monitor or self._usual
         self._every: Ints = np.arange(batch)
         self._known: tuple[Kind, ...] = ()
         self._truths: Truths | None = None
@@ -249,15 +286,17 @@ class _Rows:
         limit = time_limit_of(start.scene, config.time_limit)
         self._robot.load(row, start.world, start.chance)
         self._begun[row], self._maneuvers[row] = self._ticks, 0
-        before = self._robot.world(row).outlines()[1] if trial < SHOWN_TRIALS else []
-        self._monitors[row] = TrialMonitor(
-            config.seed, trial, self._name, start.scene, before, limit
-        )
+        self._monitors[row] = self._watches(row, trial, start.scene, limit)
         try:
             require_room(start.world)
         except SceneError as error:
             self._blocked[row] = str(error)
         return start.phase
+
+    def _usual(self, row: int, trial: int, scene: SceneInstance, limit: float) -> TrialMonitor:
+        """What watches a trial unless another is given."""
+        before = self._robot.world(row).outlines()[1] if trial < SHOWN_TRIALS else []
+        return TrialMonitor(self._config.seed, trial, self._name, scene, before, limit)
 
     def _reset(
         self,
@@ -351,7 +390,7 @@ class _Rows:
                 ended.append(row)
         return ended
 
-    def end(self, row: int, outcome: Outcome, reason: str = "") -> None:
+    def end(self, row: int, outcome: str, reason: str = "") -> None:
         """Emit the trial of a row, and empty the row."""
         if (log := self._logs.pop(row, None)) is not None:
             log.close()

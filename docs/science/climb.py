@@ -1,0 +1,76 @@
+"""Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
+
+They are made of docs/science/climb.csv, the trials.csv of the run that the page names; with --check
+the page is only compared.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
+from antennate.experiments.climb.experiment import ClimbOutcome
+from antennate.experiments.climb.figure import success
+from antennate.experiments.climb.measures import sentence, tables
+from antennate.experiments.climb.physics import ClimbRow
+from antennate.figures import render
+from antennate.studies.formats import from_csv
+from antennate.studies.measures import Table
+
+HERE = Path(__file__).parent
+ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
+REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
+
+
+def main() -> None:
+    """Write the region of the page between its marks, and draw the figure."""
+    text = "The long run has not been made yet.\n"
+    if ROWS.exists():
+        outcome = outcome_of(ROWS)
+        result = outcome.result()
+        text = f"{sentence(result)}\n\n![Success over the height of the step](climb.png)\n\n"
+        text += "\n".join(map(markdown, tables(result)))
+        if "--check" not in sys.argv[1:]:
+            FIGURE.write_bytes(render(success(result["climbing"]))["png"])
+    page = PAGE.read_text()
+    new = REGION.sub(lambda found: f"{found[1]}\n{text}\n{found[2]}", page)
+    if "--check" in sys.argv[1:] and new != page:
+        sys.exit("docs/science/climb.md is out of date: run `uv run python docs/science/climb.py`")
+    PAGE.write_text(new)
+
+
+def outcome_of(path: Path) -> ClimbOutcome:
+    """The run of which a table of trials is."""
+    rows = [
+        ClimbRow(
+            **{**row, "reason": row["reason"] or "", "plan_error_m": row["plan_error_m"] or ""}
+        )
+        for row in from_csv(path.read_text())
+    ]
+    climbs = [row for row in rows if row.part == "climbing"]
+    felt = [row for row in rows if row.part == "sensing"]
+    config = ClimbConfig(
+        trials=max(row.trial for row in climbs) + 1,
+        heights=tuple(dict.fromkeys(row.height_m for row in climbs if row.height_m)),
+        conditions=tuple(n for n in CONTROLLERS if any(row.condition == n for row in climbs)),
+        divisors=tuple(dict.fromkeys(row.divisor for row in climbs)),
+        sensing=max((row.trial + 1 for row in felt), default=0),
+        seed=rows[0].seed - round(10_000 * (rows[0].height_m or 0.0)),
+    )
+    return ClimbOutcome(config, rows, {}, interrupted=False)
+
+
+def markdown(table: Table) -> str:
+    """A table of a result as one of the page."""
+    lines: list[Sequence[str]] = [("", *table.columns), ("---",) * (len(table.columns) + 1)]
+    lines += [(name.strip(), *cells) for name, cells in table.rows]
+    body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    note = "\n".join(filter(None, (table.preface.replace("\n", "; "), table.note)))
+    return f"**{table.title}**\n\n{body}\n\n{note}\n"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,238 @@
+"""What `antennate climb` is told, and the cells of its table: who meets which ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from antennate.control.climbing.body import require_pitch
+from antennate.control.readers import HARDWARE_ALONE, unread_by_all, unused
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.params.base import (
+    Params,
+    from_values,
+    number,
+    put_over,
+    require_different,
+    require_whole_steps,
+)
+from antennate.params.control import ControlParams
+from antennate.params.scene import PhysicsParams, VariationParams
+from antennate.robots.spec import RobotSpec
+
+ROBOT = "scuttle3d"
+Condition = Literal["locked", "level", "lifted", "rhythm", "climb", "edges"]
+"""Who climbs."""
+CONTROLLERS: Mapping[Condition, str] = {
+    "locked": "open",
+    "level": "open",
+    "lifted": "lifted",
+    "rhythm": "rhythm",
+    "climb": "climb",
+    "edges": "edges",
+}
+"""Controller of each condition; `locked` has another robot."""
+ABOUT: Mapping[Condition, str] = {
+    "locked": "the pitch joints are locked; walks forward",
+    "level": "the pitch servos stay at 0; walks forward",
+    "lifted": "blind: walks with its head up",
+    "rhythm": "blind: climbs by the clock",
+    "climb": "feels steps with lowered antennae, and climbs",
+    "edges": "climbs at edges that only a simulation can tell it",
+}
+GROUND: Mapping[str, tuple[str, float | None]] = {
+    "flat": ("flat", None),
+    **{f"step of {h} cm": ("step_up", h / 100) for h in (2, 3, 4, 6, 8, 10, 12, 15)},
+    "drop of 8 cm": ("step_down", 0.08),
+    "drop of 35 cm": ("step_down", 0.35),
+    "wall of 35 cm": ("step_up", 0.35),
+    "wall of 50 cm": ("step_up", 0.50),
+    "rubble of 2 cm": ("rubble", None),
+}
+"""Scene and height of the grounds that are felt [m]."""
+CLIFF = "drop of 35 cm"
+"""A drop whose ground is out of reach: it is to be stopped at."""
+BUMPY = "rubble of 2 cm"
+LEVEL = ("flat", BUMPY)
+"""Grounds without an edge, on which every climb is a false one."""
+
+
+_LIMITS = ("robot.pitch.limit", "robot.elevation.limit")
+"""Limits of joints that these controllers keep."""
+_OF_OTHERS = tuple(
+    f"control.{path}"
+    for path in (
+        *("rule.strong", "rule.similar", "rule.hold_time", "gait.turn_offset"),
+        *("escape.reverse_time", "escape.turn_time", "escape.alternate", "escape.second_turn"),
+        "timed.walk_time",
+    )
+)
+"""Parameters that none of these controllers reads."""
+_DIVISOR = "robot.servos.xc430_w240.gain_divisor"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell of the table: who meets which ground.
+
+    Attributes:
+        part: `climbing` or `sensing`.
+        condition: Who.
+        ground: Name of the ground, a key of GROUND; the height in words where it is climbed.
+        scene: Name of its scene.
+        height: Height of its edge [m], None without one.
+        divisor: Gain divisor of the body's servos.
+    """
+
+    part: str
+    condition: Condition
+    ground: str
+    scene: str
+    height: float | None
+    divisor: float
+
+    @property
+    def name(self) -> str:
+        """Its name in the table."""
+        return f"{self.part}: {self.condition}, {self.ground}, 1/{self.divisor:g}"
+
+
+class ClimbConfig(Params):
+    """Everything that decides the outcome of `antennate climb`."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        *(path for path in HARDWARE_ALONE if path not in _LIMITS),
+        *_OF_OTHERS,
+    )
+    trials: int = number(
+        2, "1", "assumed: shows how it works in minutes; 25 tell something", ge=1, le=100_000
+    )
+    """Trials of each condition, height and divisor."""
+    heights: tuple[Annotated[float, Field(gt=0, le=0.5)], ...] = number(
+        (0.05, 0.08, 0.10, 0.12, 0.15),
+        "m",
+        "assumed: 8 to 15 cm are to be climbed",
+        min_length=1,
+        max_length=50,
+    )
+    """Heights of the steps."""
+    conditions: tuple[Condition, ...] = number(
+        ("locked", "level", "lifted", "rhythm", "climb", "edges"),
+        "1",
+        "assumed: without pitch, blind, by touch, and told where the edge is",
+        min_length=1,
+    )
+    """Who climbs."""
+    divisors: tuple[Annotated[float, Field(gt=0, le=10_000)], ...] = number(
+        (256.0, 128.0),
+        "1",
+        "assumed: nobody has measured which; what is found has to hold with both",
+        min_length=1,
+        max_length=10,
+    )
+    """Gain divisors of the XC430-W240 of the body."""
+    sensing: int = number(
+        1, "1", "assumed: shows how it works; 25 tell something", ge=0, le=100_000
+    )
+    """Trials of each ground that `climb` feels; 0 for none."""
+    time_limit: float = number(
+        60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
+    )
+    """Time after which a trial has failed."""
+    seed: int = number(2711, "1", "assumed: any but 0, by which the controllers were tuned", ge=0)
+    """Seed of all chance."""
+    robot: RobotSpec = RobotSpec.named(ROBOT)
+    """scuttle3d or another with pitch servos, or a TOML file of your own (default: scuttle3d)."""
+    control: ControlParams = ControlParams()
+    variation: VariationParams = VariationParams()
+    physics: PhysicsParams = PhysicsParams()
+
+    @field_validator("robot", mode="before")
+    @classmethod
+    def _over_base(cls, robot: Any) -> Any:
+        """What is not given is that of the robot that climbs."""
+        if isinstance(robot, Mapping):
+            return put_over(RobotSpec.named(ROBOT).model_dump(mode="json"), dict(robot))
+        return robot
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What this robot does not have, and what none of the controllers reads."""
+        used = {CONTROLLERS[name] for name in self.conditions} | (
+            {"climb"} if self.sensing else set()
+        )
+        names = [name for name in dict.fromkeys(CONTROLLERS.values()) if name in used]
+        knows = ("edges",) if "edges" in used else ()
+        reasons = {**unused(self.robot), **unread_by_all(names, self.control, self.robot, knows)}
+        if "locked" in self.conditions:
+            reasons.pop("robot.pitch.stiffness", None)
+        return reasons | {_DIVISOR: "divisors says it"}
+
+    @model_validator(mode="after")
+    def _agree(self) -> ClimbConfig:
+        for name in ("heights", "conditions", "divisors"):
+            require_different(name, getattr(self, name))
+        require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
+        try:
+            require_pitch(self.robot)
+        except ConfigError as error:
+            raise ValueError(f"robot: {error}") from None
+        if (highest := max(self.heights)) > self.robot.length:
+            raise ValueError(
+                f"heights: expected at most the length of the robot, {self.robot.length:g} m, "
+                f"found {highest:g}"
+            )
+        return self
+
+
+def cells(config: ClimbConfig) -> Mapping[str, Cell]:
+    """All cells by name, in the order of the table."""
+    climbs = [
+        Cell("climbing", condition, f"{100 * height:g} cm", "step_up", height, divisor)
+        for divisor in config.divisors
+        for condition in config.conditions
+        for height in config.heights
+    ]
+    feels = [
+        Cell("sensing", "climb", ground, scene, height, divisor)
+        for divisor in config.divisors
+        for ground, (scene, height) in GROUND.items()
+        if config.sensing
+    ]
+    return {cell.name: cell for cell in (*climbs, *feels)}
+
+
+def seed_of(config: ClimbConfig, cell: Cell) -> int:
+    """Seed of the trials of a cell: the same for all who meet this height, and for no other one.
+
+    So trials of several heights are independent of one another, and can be pooled.
+    """
+    return config.seed + round(10_000 * (cell.height or 0.0))
+
+
+def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
+    """What is simulated in a cell."""
+    robot = config.robot
+    servo = robot.servos.xc430_w240.model_copy(update={"gain_divisor": cell.divisor})
+    changes: dict[str, Any] = {
+        "servos": robot.servos.model_copy(update={"xc430_w240": servo}),
+    }
+    if cell.condition == "locked":
+        changes["pitch"] = robot.pitch.model_copy(update={"kind": "locked"})
+    ground = {} if cell.height is None else {"ground": {"height": cell.height}}
+    scene = from_values(
+        TunnelConfig, {"scene": cell.scene, "seed": seed_of(config, cell), **ground}
+    )
+    return scene.model_copy(
+        update={
+            "robot": robot.model_copy(update=changes),
+            "control": config.control,
+            "variation": config.variation,
+            "physics": config.physics,
+            "controllers": (CONTROLLERS[cell.condition],),
+            "time_limit": config.time_limit,
+        }
+    )

@@ -1,0 +1,172 @@
+"""Figures of `antennate climb`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from antennate import figures as style
+from antennate.experiments.climb.config import Condition
+from antennate.experiments.climb.experiment import ClimbOutcome
+from antennate.experiments.climb.measures import PLAN_BAND, VERDICTS
+from antennate.experiments.climb.physics import ClimbPath
+
+_LOOKS: Mapping[Condition, tuple[str, str]] = {
+    "locked": ("#8C8C8C", "s"),
+    "level": (style.SERIES[4], "D"),
+    "lifted": (style.SERIES[1], "v"),
+    "rhythm": (style.SERIES[3], "^"),
+    "climb": (style.SERIES[0], "o"),
+    "edges": (style.INK, "*"),
+}
+"""Colour and marker of each condition."""
+_MOMENTS = 6
+_APART = 0.006
+"""Between two conditions at one height, so that intervals stand beside one another [m]."""
+
+
+def figures(outcome: ClimbOutcome) -> dict[str, Figure]:
+    """The figures of a run; one climb and the plan only where `climb` climbs."""
+    result = outcome.result()
+    drawn = {"success": success(result["climbing"])}
+    path = example(outcome)
+    if path is not None:
+        drawn["side"] = side(path)
+    if result["climbing"][0]["plan"]:
+        drawn["plan"] = plan(result["climbing"])
+    if result["sensing"]:
+        drawn["felt"] = felt(result["sensing"])
+    return drawn
+
+
+def example(outcome: ClimbOutcome) -> ClimbPath | None:
+    """The climb that is drawn: of `climb`, first divisor, the step nearest to 10 cm it is over."""
+    first = outcome.config.divisors[0]
+    rows = [
+        row
+        for row in outcome.rows
+        if (row.part, row.condition, row.divisor) == ("climbing", "climb", first)
+        and row.cell in outcome.paths
+        and row.trial == 0
+        and row.height_m is not None
+    ]
+    rows.sort(key=lambda row: (row.outcome != "success", abs((row.height_m or 0.0) - 0.10)))
+    return outcome.paths[rows[0].cell] if rows else None
+
+
+@style.styled
+def success(entries: Sequence[Mapping[str, Any]]) -> Figure:
+    """Success over height, a panel for each divisor."""
+    figure = style.canvas(style.WIDTH, 0.9 + 2.5 * len(entries))
+    panels = figure.subplots(len(entries), 1, squeeze=False, sharex=True)[:, 0]
+    for panel, entry in zip(panels, entries, strict=True):
+        _draw_success(panel, entry["heights"])
+        panel.set(ylabel="success [%]", title=f"gain divisor {entry['divisor']:g}")
+        panel.set_ylim(-4, 104)
+    panels[-1].set_xlabel("height of the step [cm]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def _draw_success(panel: Axes, heights: Mapping[Any, Sequence[Mapping[str, Any]]]) -> None:
+    for i, (name, rows) in enumerate(heights.items()):
+        colour, marker = _LOOKS[name]
+        known = [row for row in rows if row["wilson95"] is not None]
+        shift = _APART * (i - (len(heights) - 1) / 2) / 3
+        x = [100 * (row["height_m"] + shift) for row in known]
+        y = np.array([100 * row["success_share"] for row in known])
+        ends = 100 * np.array([row["wilson95"] for row in known]).reshape(-1, 2).T
+        panel.errorbar(
+            x,
+            y,
+            yerr=[y - ends[0], ends[1] - y],
+            color=colour,
+            marker=marker,
+            markersize=5,
+            linewidth=1.2,
+            elinewidth=0.8,
+            label=name,
+        )
+    marks = sorted({100 * row["height_m"] for rows in heights.values() for row in rows})
+    panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
+
+
+@style.styled
+def side(path: ClimbPath) -> Figure:
+    """One climb from the side, its moments below one another."""
+    figure = style.canvas(style.WIDTH, 5.6)
+    panels = figure.subplots(_MOMENTS, 1, sharex=True, sharey=True)
+    x = path.links[:, :, 0] - path.edge
+    near = np.flatnonzero((x[:, 0] > -0.2) & (x[:, -1] < 0.25))
+    first, last = (int(near[0]), int(near[-1])) if len(near) else (0, len(x) - 1)
+    left, right = float(x[first : last + 1].min()) - 0.06, float(x[first : last + 1].max()) + 0.06
+    for panel, moment in zip(panels, np.linspace(first, last, _MOMENTS).round(), strict=True):
+        at = int(moment)
+        panel.fill_between([left, 0.0], -0.03, 0.0, color=style.FAINT, linewidth=0)
+        panel.fill_between([0.0, right], -0.03, path.height, color=style.FAINT, linewidth=0)
+        panel.plot(x[at], path.links[at, :, 2], "-o", color=style.SERIES[0], markersize=4)
+        panel.plot(x[at, 0], path.links[at, 0, 2], "o", color=style.INK, markersize=5)
+        if np.isfinite(path.plan[at]):
+            panel.axvline(
+                path.plan[at], color=style.SERIES[1], linewidth=1.2, linestyle=(0, (4, 2))
+            )
+        panel.set_title(f"{path.t[at]:.1f} s", fontsize=8, pad=2)
+        panel.set(xlim=(left, right), ylim=(-0.03, path.height + 0.22))
+        panel.set_aspect("equal", adjustable="box")
+        panel.grid(visible=False)
+    panels[-1].set_xlabel("along the way, from the edge [m]; dashed: the head by the plan")
+    panels[_MOMENTS // 2].set_ylabel("height [m]")
+    return figure
+
+
+@style.styled
+def plan(entries: Sequence[Mapping[str, Any]]) -> Figure:
+    """Error of the plan by link."""
+    figure = style.canvas(style.WIDTH, 3.4)
+    panel = figure.subplots()
+    low, high = (100 * end for end in PLAN_BAND)
+    panel.axhspan(low, high, color=style.FAINT, alpha=0.6, zorder=0, label="aim for 90 %")
+    for i, entry in enumerate(entries):
+        rows = [row for row in entry["plan"] if row["crossings"]]
+        places = np.arange(len(rows)) + 0.16 * (i - (len(entries) - 1) / 2)
+        middle = np.array([row["middle_cm"] for row in rows])
+        ends = [middle - [r["low_cm"] for r in rows], [r["high_cm"] for r in rows] - middle]
+        panel.errorbar(
+            places,
+            middle,
+            yerr=ends,
+            fmt="os"[i % 2],
+            color=style.SERIES[i % len(style.SERIES)],
+            markersize=5,
+            label=f"divisor {entry['divisor']:g}",
+        )
+        panel.set_xticks(np.arange(len(rows)), [row["link"] for row in rows])
+    panel.set(ylabel="plan less truth [cm]", xlabel="crosses the edge with its centre")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+@style.styled
+def felt(entries: Sequence[Mapping[str, Any]]) -> Figure:
+    """The confusion table, a panel for each divisor."""
+    grounds = list(entries[0]["confusion"])
+    figure = style.canvas(style.WIDTH, 0.5 + (0.6 + 0.22 * len(grounds)) * len(entries))
+    panels = figure.subplots(len(entries), 1, squeeze=False)[:, 0]
+    for panel, entry in zip(panels, entries, strict=True):
+        counts = np.array([[row[v] for v in VERDICTS] for row in entry["confusion"].values()])
+        shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+        panel.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+        for (i, j), number in np.ndenumerate(counts):
+            colour = "white" if shares[i, j] > 0.6 else style.INK
+            if number:
+                panel.text(j, i, str(number), ha="center", va="center", fontsize=7, color=colour)
+        panel.set_xticks(range(len(VERDICTS)), [v.replace("_", " ").lower() for v in VERDICTS])
+        panel.set_yticks(range(len(grounds)), grounds)
+        panel.grid(visible=False)
+        panel.set_title(f"felt as, trials with gain divisor {entry['divisor']:g}")
+    return figure

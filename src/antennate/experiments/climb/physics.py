@@ -1,0 +1,368 @@
+"""One trial of `antennate climb`: what is watched, when it ends, and its row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antennate.control.registry import ControllerMaker, make_controller
+from antennate.experiments.climb.config import (
+    CLIFF,
+    LEVEL,
+    Cell,
+    ClimbConfig,
+    cells,
+    config_of,
+    seed_of,
+)
+from antennate.experiments.climb.load import PitchLoad
+from antennate.experiments.climb.sensing import Touch, Verdict
+from antennate.experiments.tunnel.batch import BATCH, Watch, run_trials
+from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.world import World
+from antennate.types import Controller, Floats, Ints
+
+HALF_WIDTH = 2.5
+"""Farther to the side, or behind the start, a robot has left [m]: the ground ends at 3 m."""
+AFTER = 15.0
+"""Time for which a robot at a cliff is watched on after it felt it [s]: it backs off and turns in
+7 s, and could still fall."""
+DRAWN = 1
+"""Trials of each cell whose course is kept for the figure."""
+_EVERY = 0.2
+"""Between two postures that are kept [s]."""
+_STRIDE = 2.0
+"""Between two places by which the way is summed up [s]: more than a gait cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbRow:
+    """One trial.
+
+    Attributes:
+        seed: Seed of the trials of this height; with `trial` it decides all chance.
+        cell: Name of the cell: part, condition, ground and divisor.
+        part: climbing or sensing.
+        condition: Who.
+        ground: Name of the ground.
+        height_m: Height of its edge [m], None without one.
+        divisor: Gain divisor of the body's servos.
+        outcome: success, timeout, overturned, left, fell, stopped (at a cliff), felt (the trial was
+            there for a verdict, and ended with it) or invalid.
+        time_s: Time to the end [s]; the limit for a timeout.
+        climb_time_s: Time from a link pitch before the first edge on [s], None if it never came
+            there; `speed_m_s` is how fast the middle of the robot got on in it.
+        torque_rms_n_m: RMS torque of the pitch motor with the largest one, while it climbs.
+        torque_peak_n_m: Largest torque of any of them.
+        above_half: Share of that time in which any of them gives more than half its stall torque.
+        saturated: Share of that time in which the drive of any of them is at its limit.
+        current_rms_a: RMS current of the one with the largest, on the torque-speed line [A].
+        climbs: Climbs begun.
+        walked_m: Way of the middle of the robot [m].
+        verdict: What `climb` took the first thing for that it felt: FLOOR (it felt nothing),
+            STEP_UP, DROP, WALL or UNKNOWN; None for others.
+        felt_height_m: Height by that probe [m], None if it is not finite.
+        ahead_m: Distance of the edge ahead of the head when it felt it [m].
+        latency_s: Time from the first touch, or from when an antenna was past a drop, until it felt
+            it [s].
+        plan_error_m: Place of the head by the plan minus its true one when the centre of a link
+            crossed the first edge [m], as `0:-0.012 1:0.004`: links are counted from the head, and
+            those that crossed it without a plan are left out.
+        reason: Why a trial is invalid; empty otherwise.
+    """
+
+    seed: int
+    cell: str
+    trial: int
+    part: str
+    condition: str
+    ground: str
+    height_m: float | None
+    divisor: float
+    outcome: str
+    time_s: float
+    climb_time_s: float | None = None
+    speed_m_s: float | None = None
+    torque_rms_n_m: float | None = None
+    torque_peak_n_m: float | None = None
+    above_half: float | None = None
+    saturated: float | None = None
+    current_rms_a: float | None = None
+    climbs: int = 0
+    walked_m: float = 0.0
+    verdict: str | None = None
+    felt_height_m: float | None = None
+    ahead_m: float | None = None
+    latency_s: float | None = None
+    plan_error_m: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbPath:
+    """A course from the side.
+
+    Attributes:
+        t: Times [s], shape (n,).
+        links: Places of the links, head first [m], shape (n, L, 3).
+        plan: Distance of the head past the first edge by the plan [m], NaN without one, shape (n,).
+        edge: Where the first edge is along x [m], NaN without one.
+        height: Its height [m].
+    """
+
+    t: Floats
+    links: Floats
+    plan: Floats
+    edge: float
+    height: float
+
+
+def is_over(links: Floats, edge: float, top: float, pitch: float) -> bool:
+    """Whether all links stand behind and above an edge.
+
+    Args:
+        links: Places of the links [m], shape (L, 3).
+        edge: Where the last edge is along x [m].
+        top: Height of the ground behind it [m].
+        pitch: Distance by which each link has to be past it [m].
+    """
+    past = links[:, 0].min() > edge + pitch
+    return bool(past and abs(links[:, 1]).max() < HALF_WIDTH and links[:, 2].min() > top)
+
+
+def has_left(links: Floats) -> bool:
+    """Whether a robot is beside or behind the ground of its trial; places of shape (L, 3) [m]."""
+    return bool(abs(links[:, 1]).max() > HALF_WIDTH or links[:, 0].min() < -HALF_WIDTH)
+
+
+def has_fallen(links: Floats, ground: float, drop: float) -> bool:
+    """Whether any link is more than half a drop below the ground where it began [m]."""
+    return bool(links[:, 2].min() < ground - 0.5 * drop)
+
+
+class ClimbMonitor:
+    """Watches one trial.
+
+    Args:
+        config: The run.
+        cell: Its cell.
+        row: Row of the batch.
+        trial: Its number.
+        scene: Its scene.
+        time_limit: Time after which it has failed [s].
+        controller: controller() gives the one that walks all rows.
+    """
+
+    def __init__(
+        self,
+        config: ClimbConfig,
+        cell: Cell,
+        row: int,
+        trial: int,
+        scene: SceneInstance,
+        time_limit: float,
+        controller: Callable[[], Any],
+    ) -> None:
+        self.trial, self.scene, self.time_limit = trial, scene, time_limit
+        self._config, self._cell, self._row, self._controller = config, cell, row, controller
+        edges = getattr(scene, "edges", ())
+        self._edge = edges[0] if edges else None
+        self._pitch = config.robot.link_pitch
+        self._verdict = Verdict()
+        self._touch: Touch | None = None
+        self._load: PitchLoad | None = None
+        self._ahead: float | None = None
+        self._errors: dict[int, float | None] = {}
+        self._climbs, self._climbing = 0, False
+        self._began: tuple[float, float] | None = None
+        self._way, self._last = 0.0, (-math.inf, np.zeros(2))
+        self._course: list[tuple[float, Floats, float]] = []
+
+    def bend(self, world: World) -> None:
+        """Look at the world after every tick."""
+        control = self._controller()
+        body, rule = getattr(control, "body", None), getattr(control, "rule", None)
+        head = world.link_places()[:, 0]
+        if body is not None:
+            self._count(bool(np.isfinite(body.progress[self._row]).any()))
+        if rule is not None and hasattr(rule, "stage"):
+            self._feel(world, rule)
+        if self._edge is None:
+            return
+        self._cross(head - self._edge.x, body)
+        if self._began is None and head[0] > self._edge.x - self._pitch:
+            self._began = (world.t, float(head.mean()))
+        if self._began is not None and world.robot.pitch_count:
+            self._load = self._load or PitchLoad(world)
+            self._load.add(world)
+
+    def _count(self, climbing: bool) -> None:
+        self._climbs += climbing and not self._climbing
+        self._climbing = climbing
+
+    def _feel(self, world: World, rule: Any) -> None:
+        """Follow the first thing that is felt."""
+        if self._touch is None and self._edge is not None:
+            self._touch = Touch(world, self._edge.x, self._edge.rise > 0.0)
+        if self._touch is not None:
+            self._touch.look(world)
+        at = self._row
+        before = self._verdict.felt_at
+        stage, ground = int(rule.stage[at]), int(rule.ground[at])
+        self._verdict.look(stage, ground, float(rule.height[at]), world.t)
+        if before is None and self._verdict.felt_at is not None and self._edge is not None:
+            self._ahead = self._edge.x - float(world.head[0])
+
+    def _cross(self, past: Floats, body: Any) -> None:
+        """Note how wrong the plan is when the centre of a link crosses the edge."""
+        for link in np.flatnonzero(past >= 0.0).tolist():
+            if link not in self._errors:
+                plan = self._plan(past[0], body)
+                self._errors[link] = None if math.isnan(plan) else plan - float(past[0])
+
+    def _plan(self, past: float, body: Any) -> float:
+        """Where the head is past the edge by the nearest of all plans [m], NaN without one."""
+        plans = np.array([]) if body is None else body.progress[self._row]
+        plans = plans[np.isfinite(plans)]
+        return float(plans[abs(plans - past).argmin()]) if len(plans) else math.nan
+
+    def look(self, world: World, t: float, maneuver: int) -> str | None:
+        """Look every LOOK_EVERY ticks and at the time limit; the outcome once there is one."""
+        links = world.link_places()
+        middle = links[:, :2].mean(axis=0)
+        if t - self._last[0] >= _STRIDE:
+            if self._last[0] >= 0.0:
+                self._way += float(np.hypot(*(middle - self._last[1])))
+            self._last = (t, middle)
+        if self.trial < DRAWN and (not self._course or t - self._course[-1][0] > _EVERY - 1e-6):
+            edge = math.nan if self._edge is None else self._edge.x
+            plan = self._plan(links[0, 0] - edge, getattr(self._controller(), "body", None))
+            self._course.append((t, links, plan))
+        return self._end(world, links, t) or ("timeout" if t >= self.time_limit else None)
+
+    def _end(self, world: World, links: Floats, t: float) -> str | None:
+        if world.overturned:
+            return "overturned"
+        if has_left(links):
+            return "left"
+        scene: Any = self.scene
+        if self._cell.part == "climbing":
+            over = is_over(links, scene.edges[-1].x, scene.top, self._pitch)
+            return "success" if over else None
+        if self._cell.ground in LEVEL:
+            past = links[-1, 0] > scene.length if self._cell.scene == "rubble" else False
+            return "felt" if past or t >= self.time_limit else None
+        if self._cell.scene == "step_down" and has_fallen(links, scene.ground, scene.ground):
+            return "fell"
+        told, felt_at = self._verdict.told, self._verdict.felt_at
+        if self._cell.ground == CLIFF:
+            return "stopped" if told and felt_at is not None and t > felt_at + AFTER else None
+        return "felt" if told or links[0, 0] > scene.edges[0].x + self._pitch else None
+
+    def result(self, world: World, outcome: str, reason: str, ticks: Ints) -> ClimbRow:
+        """The row of a trial that ended so."""
+        felt = self._verdict
+        links = world.link_places()
+        took = None if self._began is None else max(world.t - self._began[0], 1e-9)
+        onset = self._touch.since if self._touch is not None else None
+        feels = self._cell.condition == "climb"
+        height = felt.height if felt.felt_at is not None and math.isfinite(felt.height) else None
+        return ClimbRow(
+            **_columns(self._config, self._cell, self.trial),
+            outcome=outcome,
+            time_s=round(self.time_limit if outcome == "timeout" else world.t, 6),
+            climb_time_s=_rounded(took),
+            speed_m_s=_rounded(
+                None
+                if took is None or self._began is None
+                else (float(links[:, 0].mean()) - self._began[1]) / took
+            ),
+            **({} if self._load is None else self._load.columns()),
+            climbs=self._climbs,
+            walked_m=round(self._way, 6),
+            verdict=felt.ground.name if feels else None,
+            felt_height_m=_rounded(height),
+            ahead_m=_rounded(self._ahead),
+            latency_s=_rounded(
+                None if onset is None or felt.felt_at is None else felt.felt_at - onset
+            ),
+            plan_error_m=" ".join(
+                f"{link}:{error:.4f}" for link, error in self._errors.items() if error is not None
+            ),
+            reason=reason,
+        )
+
+    def path(self, world: World) -> ClimbPath | None:
+        """The course of the first trials of a cell that is climbed."""
+        if self.trial >= DRAWN or self._cell.part != "climbing" or not self._course:
+            return None
+        t, links, plan = zip(*self._course, strict=True)
+        scene: Any = self.scene
+        return ClimbPath(
+            np.array(t), np.array(links), np.array(plan), scene.edges[0].x, scene.edges[0].rise
+        )
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(float(value), 6)
+
+
+def _columns(config: ClimbConfig, cell: Cell, trial: int) -> dict[str, Any]:
+    return {
+        "seed": seed_of(config, cell),
+        "cell": cell.name,
+        "trial": trial,
+        "part": cell.part,
+        "condition": cell.condition,
+        "ground": cell.ground,
+        "height_m": cell.height,
+        "divisor": cell.divisor,
+    }
+
+
+def lost_row(config: ClimbConfig, name: str, trial: int, reason: str) -> ClimbRow:
+    """The row of a trial of which there is nothing else."""
+    columns = _columns(config, cells(config)[name], trial)
+    return ClimbRow(**columns, outcome="invalid", time_s=config.time_limit, reason=reason)
+
+
+def carry_out(
+    config: ClimbConfig,
+    name: str,
+    trials: Sequence[int],
+    emit: Callable[[tuple[ClimbRow, ClimbPath | None]], None],
+    watch: Watch | None = None,
+    make: ControllerMaker = make_controller,
+) -> None:
+    """Run trials of one cell in lockstep, and emit each as it ends."""
+    cell = cells(config)[name]
+    made: list[Controller] = []
+
+    def keep(kind: Any, control: Any = None, robot: Any = None, batch: int = 1) -> Controller:
+        made.append(make(kind, control, robot, batch))
+        return made[-1]
+
+    def monitor(row: int, trial: int, scene: SceneInstance, limit: float) -> ClimbMonitor:
+        return ClimbMonitor(config, cell, row, trial, scene, limit, lambda: made[-1])
+
+    def take(item: tuple[Any, Any]) -> None:
+        row, path = item
+        if not isinstance(row, ClimbRow):
+            row, path = lost_row(config, name, row.trial, row.reason), None
+        emit((row, path))
+
+    simulated = config_of(config, cell)
+    run_trials(
+        simulated,
+        simulated.controllers[0],
+        trials,
+        take,
+        BATCH,
+        watch=watch,
+        make=keep,
+        monitor=monitor,
+    )

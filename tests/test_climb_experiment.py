@@ -1,0 +1,236 @@
+"""`antennate climb`: its criterion, its measures, bad input, and the same rows on any workers."""
+
+import csv
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from antennate import experiments
+from antennate.cli import main
+from antennate.control.climbing.rule import Ground, Stage
+from antennate.errors import BadInputError
+from antennate.experiments.climb import measures
+from antennate.experiments.climb.config import ClimbConfig, cells, config_of
+from antennate.experiments.climb.experiment import EXPERIMENT, every, run
+from antennate.experiments.climb.physics import (
+    ClimbRow,
+    carry_out,
+    has_fallen,
+    is_over,
+)
+from antennate.experiments.climb.sensing import Verdict
+from antennate.sim.trial import draw_trial, scene_of
+
+TINY = {
+    "trials": 1,
+    "heights": (0.05, 0.08),
+    "conditions": ("locked", "edges"),
+    "divisors": (128.0,),
+    "sensing": 0,
+    "time_limit": 0.3,
+}
+
+
+def row(condition: str, outcome: str, trial: int = 0, **more) -> ClimbRow:
+    """A climb of a step of 5 cm by hand."""
+    columns = {"part": "climbing", "ground": "5 cm", "height_m": 0.05, "divisor": 256.0, **more}
+    time = {"time_s": 20.0, **columns}
+    return ClimbRow(0, f"{condition}", trial, condition=condition, outcome=outcome, **time)
+
+
+def test_it_is_registered_with_all_its_cells():
+    assert experiments.load("climb") is EXPERIMENT
+    config = ClimbConfig()
+    table = cells(config)
+    climbs = [cell for cell in table.values() if cell.part == "climbing"]
+    assert len(climbs) == 6 * 5 * 2
+    assert len(every(config)) == 2 * len(climbs) + len(table) - len(climbs)
+    robots = {cell.condition: config_of(config, cell).robot for cell in climbs}
+    assert [n for n, robot in robots.items() if not robot.pitch_count] == ["locked"]
+    divisors = {config_of(config, c).robot.servos.xc430_w240.gain_divisor for c in climbs}
+    assert divisors == {256.0, 128.0}
+
+
+def test_a_trial_starts_alike_for_all_conditions():
+    """Scene, start, noise and slips depend on seed and number alone."""
+    config = ClimbConfig(heights=(0.08,))
+    starts = []
+    for cell in cells(config).values():
+        if cell.part == "climbing":
+            one = config_of(config, cell)
+            start = draw_trial(one, scene_of(one), 3, one.control.gait, one.control.period)
+            scene: Any = start.scene
+            friction = start.chance.leg_friction(0)
+            assert friction is not None
+            starts.append([scene.edges[0].x, start.phase, *start.world.head, *friction])
+    assert len(starts) == 12
+    assert np.ptp(np.array(starts), axis=0).max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "z", "over"),
+    [
+        (0.13, 0.0, 0.0, True),  # the tail, a little more than a link past the edge
+        (0.11, 0.0, 0.0, False),
+        (0.13, 2.6, 0.0, False),  # beside the ground
+        (0.13, 0.0, -0.1, False),  # as far, on the floor
+    ],
+)
+def test_a_robot_is_over_when_all_links_stand_behind_and_above(x, y, z, over):
+    """The criterion, on a robot that is placed on a step of 10 cm."""
+    config = ClimbConfig(heights=(0.10,), conditions=("edges",))
+    one = config_of(config, next(iter(cells(config).values())))
+    start = draw_trial(one, scene_of(one), 0, one.control.gait, one.control.period)
+    scene: Any = start.scene
+    world, robot, edge = start.world, one.robot, scene.edges[0].x
+    head = edge + x + (robot.links - 1) * robot.link_pitch
+    legs = np.zeros((robot.links, 2))
+    world.place(head, y, 0.0, np.zeros(robot.yaw_count), legs, 0.10 + z)
+    links = world.link_places()
+    assert links[-1, 0] == pytest.approx(edge + x)
+    assert is_over(links, edge, scene.top, robot.link_pitch) is over
+
+
+def test_a_link_has_fallen_below_half_a_drop():
+    links = np.array([[0.1, 0.0, 0.19], [0.0, 0.0, 0.38]])
+    assert not has_fallen(links, 0.35, 0.35)
+    assert has_fallen(links - [0.0, 0.0, 0.02], 0.35, 0.35)
+
+
+def test_a_verdict_is_that_of_the_first_probe():
+    """Stages and grounds as the rule goes through them; a wall is told after the check."""
+    verdict = Verdict()
+    for stage, ground, t in [
+        (Stage.WALK, Ground.FLOOR, 0.0),
+        (Stage.PROBE_UP, Ground.FLOOR, 1.0),
+        (Stage.LIFT, Ground.STEP_UP, 2.0),
+        (Stage.CHECK, Ground.STEP_UP, 3.0),
+    ]:
+        verdict.look(stage, ground, 0.09, t)
+    assert (verdict.felt_at, verdict.told) == (1.0, False)
+    verdict.look(Stage.STEER, Ground.WALL, math.inf, 4.0)
+    verdict.look(Stage.PROBE_DOWN, Ground.DROP, -0.1, 5.0)
+    assert (verdict.ground, verdict.height, verdict.told) == (Ground.WALL, math.inf, True)
+
+
+def test_measures_of_rows_by_hand():
+    config = ClimbConfig(heights=(0.05,), conditions=("level", "climb"), divisors=(256.0,))
+    rows = [
+        row("level", "timeout", 0, time_s=60.0),
+        row("level", "success", 1),
+        row("level", "left", 2),
+        row("level", "invalid", 3, reason="why"),
+        row("climb", "success", 0, plan_error_m="0:-0.05 1:0.01", climbs=1),
+        row("climb", "success", 1, plan_error_m="0:-0.07", climbs=3),
+        row("climb", "success", 2),
+        row("climb", "overturned", 3),
+    ]
+    (entry,) = measures.climbing(config, rows)
+    level, climb = entry["conditions"]["level"], entry["conditions"]["climb"]
+    assert (level["trials"], level["invalid"], level["successes"]) == (4, 1, 1)
+    assert level["success_share"] == pytest.approx(1 / 3)
+    assert level["first_reason"] == "why"
+    assert (climb["successes"], climb["overturned"], climb["climbs"]) == (3, 1, 1.0)
+    known = stats.binomtest(3, 4).proportion_ci(method="wilson")
+    assert climb["wilson95"] == pytest.approx((known.low, known.high))
+    pair = entry["pairs"]["level"]
+    assert (pair["trials"], pair["only_climb"], pair["only_other"]) == (3, 2, 0)
+    assert pair["mcnemar_p"] == pytest.approx(0.5)  # two coins that fall alike
+    head, link1, together = entry["plan"]
+    assert (head["crossings"], link1["crossings"], together["crossings"]) == (2, 1, 3)
+    assert head["middle_cm"] == pytest.approx(-6.0)
+    assert together["within"] == pytest.approx(2 / 3)
+
+
+def test_what_is_felt_is_counted_by_hand():
+    def felt(ground, verdict, outcome="felt", **more):
+        values = {"part": "sensing", "ground": ground, "verdict": verdict, **more}
+        return row("climb", outcome, **values)
+
+    rows = [
+        felt("step of 4 cm", "STEP_UP", height_m=0.04, felt_height_m=0.06),
+        felt("step of 8 cm", "STEP_UP", height_m=0.08, felt_height_m=0.08),
+        felt("step of 8 cm", "FLOOR", height_m=0.08),
+        felt("step of 15 cm", "STEP_UP", height_m=0.15, felt_height_m=0.30),
+        felt("drop of 35 cm", "DROP", "stopped", height_m=0.35),
+        felt("drop of 35 cm", "FLOOR", "fell", height_m=0.35),
+        felt("flat", "STEP_UP", height_m=None, climbs=2, time_s=500.0, walked_m=20.0),
+    ]
+    (entry,) = measures.sensing(ClimbConfig(divisors=(256.0,)), rows)
+    assert entry["confusion"]["step of 8 cm"] == {
+        **dict.fromkeys(measures.VERDICTS, 0),
+        "STEP_UP": 1,
+        "FLOOR": 1,
+    }
+    heights = entry["heights"]
+    assert (heights["steps"], heights["told"]) == (3, 2)
+    assert heights["rmse_m"] == pytest.approx(0.02 / math.sqrt(2))
+    assert (entry["cliff"]["stopped"], entry["cliff"]["trials"]) == (1, 2)
+    flat = entry["false_climbs"]["flat"]
+    assert (flat["per_1000_s"], flat["per_m"]) == pytest.approx((4.0, 0.1))
+    low, high = flat["per_1000_s_95"]
+    assert stats.poisson.sf(1, 0.5 * low) == pytest.approx(0.025)  # two or more, as seldom
+    assert stats.poisson.cdf(2, 0.5 * high) == pytest.approx(0.025)
+
+
+def test_rows_are_the_same_on_two_workers():
+    config = ClimbConfig(**TINY)
+    one, two = run(config, 1), run(config, 2)
+    assert one.rows == two.rows
+    assert [r.outcome for r in one.rows] == ["timeout"] * 4
+    assert one.result() == two.result()
+
+
+def test_a_run_leaves_its_tables_and_figures(tmp_path):
+    out = tmp_path / "run"
+    words = ["climb", "--trials", "1", "--heights", "0.05", "--conditions", "climb", "level"]
+    words += ["--divisors", "256", "--time-limit", "0.3", "--sensing", "1", "--workers", "1"]
+    assert main([*words, "--out", str(out)]) == 0
+    with (out / "trials.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 + 14
+    result = json.loads((out / "result.json").read_text())
+    assert result["climbing"][0]["conditions"]["climb"]["timeouts"] == 1
+    names = {path.stem for path in (out / "figures").iterdir()}
+    assert names == {"success", "side", "plan", "felt"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--robot", "scuttle"], "expected a robot with pitch joints and antennae that rise"),
+        (["--heights", "0.6"], "--heights: expected a number of at most 0.5, found 0.6"),
+        (["--robot.links", "3", "--heights", "0.4"], "expected at most the length of the robot"),
+        (["--heights", "0.05", "0.05"], "heights must differ"),
+        (["--conditions", "fly"], "expected one of locked, level, lifted, rhythm, climb or edges"),
+        (["--divisors", "0"], "--divisors: expected a number above 0, found 0.0"),
+        (["--robot.servos.xc430-w240.gain-divisor", "9"], "divisors says it"),
+    ],
+)
+def test_bad_input_is_answered_in_one_line(words, said, capsys, tmp_path):
+    out = tmp_path / "run"
+    assert main(["climb", *words, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+def test_a_robot_of_its_own_begins_with_the_one_that_climbs():
+    assert ClimbConfig.model_validate({"robot": {"mass": 2.5}}).robot.pitch_count == 5
+    with pytest.raises(BadInputError, match="expected a robot with pitch joints"):
+        ClimbConfig(robot={"pitch": {"kind": "locked"}})  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.slow
+def test_a_step_of_5_cm_is_climbed_by_who_knows_where_it_is():
+    config = ClimbConfig(heights=(0.05,), conditions=("edges",), trials=2, sensing=0)
+    for name in cells(config):
+        ended = []
+        carry_out(config, name, [0, 1], ended.append)
+        assert [r.outcome for r, _ in ended] == ["success", "success"]
+        assert all(r.torque_peak_n_m > r.torque_rms_n_m > 0.0 for r, _ in ended)
