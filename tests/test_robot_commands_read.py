@@ -61,7 +61,9 @@ SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 BRIEF = {"patience": 1.0}
 """Torque is refused before a silent bus; it is asked for so long."""
 PITCH = {"kind": "actuated", "servo": "xl430_w250"}
-LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH}
+LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH, "elevation": {"kind": "pair"}}
+GROUND = ("stairs", "gap", "ramp", "rubble")
+"""Scenes that read all sizes of ground between them."""
 HEXAPOD = RobotSpec.named("hexapod").model_dump()
 """Without antennae."""
 
@@ -341,6 +343,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "scene": "corridors",
                 "corridors": {"pieces": [2, 2], "room_share": 0.5, "arm_share": 0.5},
             },
+            *({"duration": 0.05, "scene": scene} for scene in GROUND),
         ],
     ),
 }

@@ -150,6 +150,12 @@ class WarpRow:
         """The robot of this row."""
         return self.world.robot
 
+    @property
+    def overturned(self) -> bool:
+        """Whether the undersides of most links point up."""
+        self._follow()
+        return self.world.overturned
+
     def links(self) -> Floats:
         """Plan positions of the links, head first [m], shape (L, 2)."""
         self._follow()
