@@ -264,7 +264,7 @@ def sentences(result: Mapping[str, Any]) -> str:
     held = result["worst_state"] == State.HOLD.name and result.get("worst_s", 0.0) >= _LONG
     causes = f"{result['refusal']}; {result['why']}" if held or failed(result) else ""
     held = result.get("held")  # results of older versions have none
-    last = [f"Torque went off with links in the air: {held}."] if held else []
+    last = [f"Before torque went off: {held}."] if held else []
     return "\n".join([_sentence(result), *late_sentence(result), *what_to_do(causes), *last])
 
 
