@@ -183,7 +183,7 @@ def test_zeros_and_directions_are_asked_for_by_their_sense() -> None:
         return lambda: servo.place(servo.position + 200 * sign)
 
     senses = {"pitch5": "lift the part behind it", "elevation": "lift the antenna"}
-    steps = [
+    steps: list[tuple[str, Callable[[], object] | None, str | None]] = [
         (
             rf": {name}: .*{senses.get(name, senses['elevation'] if 'elev' in name else '')}",
             turned(name, sign),

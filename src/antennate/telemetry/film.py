@@ -46,8 +46,8 @@ _CONTACTS = {
 }
 _NEARER = 0.55
 """Distance from the side over that from above: its height needs no room in the picture."""
-_LOW = 4.0
-"""Elevation of the camera at the side [deg]: edges of steps are lines, the ground is still seen."""
+_LOW = 14.0
+"""Elevation of the camera at the side [deg]: above the next step, 0.2 m higher, yet low."""
 _MANEUVERS = {int(m): (MANEUVER_NAMES[m], MANEUVER_COLOURS[m]) for m in Maneuver}
 
 
