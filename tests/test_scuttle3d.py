@@ -29,6 +29,7 @@ from antennate.hardware.safety.causes import State
 from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing
 from antennate.params.hardware import SetupParams
+from antennate.params.scene import GRAVITY
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.reader import LogReader
 from antennate.twin.config import TwinConfig
@@ -143,6 +144,15 @@ def test_a_joint_that_does_not_follow_is_named(name: str) -> None:
     assert report.worst == State.FAULT
     assert name in report.why
     assert report.on == []
+
+
+@pytest.mark.parametrize(("links", "share"), [(1, 0.14), (2, 0.54), (3, 1.22)])
+def test_links_in_the_air_take_their_share_of_the_stall_torque(links: int, share: float) -> None:
+    """Weights at half a pitch, one and a half and so on; figures of docs/robots.md."""
+    mass = ROBOT.link_mass + 2 * ROBOT.leg_mass
+    torque = mass * GRAVITY * sum((i + 0.5) * ROBOT.link_pitch for i in range(links))
+    stall = ROBOT.servos.of(ROBOT.pitch.servo).stall_torque
+    assert torque / stall == pytest.approx(share, abs=0.01)
 
 
 @pytest.mark.parametrize(("name", "servo"), [("pitch", 20), ("elevation", 25)])
