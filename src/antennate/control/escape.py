@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from antennate.control.conditioning import RepetitionDetector
-from antennate.control.knowledge import KNOWABLE, Kind, Knowledge, aligned, right_by, stuck_by
+from antennate.control.knowledge import Kind, Knowledge, aligned, right_by, stuck_by
 from antennate.params.control import ControlParams, EscapeParams, SearchParams
 from antennate.types import LEFT, RIGHT, Bools, Floats, Ints, Maneuver
 
@@ -42,7 +42,7 @@ class Escape:
         knowledge: What a simulation knows of the rows; nothing on a robot.
     """
 
-    knows = KNOWABLE
+    knows: tuple[Kind, ...] = ("side", "jam", "facing", "free", "map")
 
     def __init__(self, params: EscapeParams, batch: int, period: float) -> None:
         self.params = params

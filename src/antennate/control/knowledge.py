@@ -15,9 +15,13 @@ import numpy as np
 from antennate.errors import ConfigError
 from antennate.types import Bools, Floats, Ints, Maneuver
 
-Kind = Literal["side", "jam", "facing", "free", "map"]
+Kind = Literal["side", "jam", "facing", "free", "map", "edges"]
 """A piece of knowledge."""
 KNOWABLE: tuple[Kind, ...] = get_args(Kind)
+
+
+EDGES = 4
+"""Edges that a robot can be on at once, at most: its length over the depth of a step, and more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,8 @@ class Knowledge:
         free: Whether nothing is within reach ahead of the head, shape (B,).
         map: Angle from the head's direction to a point ahead on the route [rad], positive to the
             left, within -pi and pi, shape (B,).
+        edges: Distance of the head past each edge where the ground rises and where the body is or
+            will be next [m], shape (B, EDGES), NaN where there is none.
     """
 
     side: Ints | None = None
@@ -39,6 +45,7 @@ class Knowledge:
     facing: Bools | None = None
     free: Bools | None = None
     map: Floats | None = None
+    edges: Floats | None = None
 
 
 ALIGNED = math.radians(10.0)

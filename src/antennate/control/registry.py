@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
 from antennate.control import blind, controllers, geometric
+from antennate.control.climbing import controllers as climbing
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, raised
 from antennate.lookup import Registry
@@ -29,10 +30,16 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "schedule": blind.schedule,
     "zigzag": blind.zigzag,
     "random": blind.RandomController,
+    "climb": climbing.climb,
+    "lifted": climbing.lifted,
+    "rhythm": climbing.rhythm,
 }
 USUAL = ("open", "timed", "paper", "closed")
 """Those of ours that are run if none is named; the others are further controls without touch."""
-PRIVILEGED: dict[str, ControllerFactory] = {"map": controllers.by_map}
+PRIVILEGED: dict[str, ControllerFactory] = {
+    "map": controllers.by_map,
+    "edges": climbing.edges,
+}
 """Controllers that need what only a simulation knows."""
 
 ABOUT = {
@@ -45,6 +52,10 @@ ABOUT = {
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",
+    "climb": "feels steps and drops with lowered antennae, climbs steps, steers by walls as closed",
+    "lifted": "blind: walks with its head up, so that it gets on to low steps",
+    "rhythm": "blind: climbs by the clock, as climb does where it feels a step",
+    "edges": "climbs at edges that only a simulation can tell it, to show what knowing is worth",
     "map": "walks along the route, which only a simulation can tell it, to show what that is worth",
 }
 """What ours do, for who meets them for the first time."""

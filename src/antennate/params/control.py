@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from antennate.params.base import Params, number
+from antennate.params.climb import ClimbParams
 from antennate.params.gaits import GaitParams
 
 _Angle = Annotated[float, Field(gt=0, le=math.pi)]
@@ -317,6 +318,7 @@ class ControlParams(Params):
     schedule: ScheduleParams = ScheduleParams()
     zigzag: ZigzagParams = ZigzagParams()
     random: RandomParams = RandomParams()
+    climb: ClimbParams = ClimbParams()
 
     @property
     def period(self) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from antennate.control.knowledge import Kind, Knowledge
+from antennate.control.knowledge import EDGES, Kind, Knowledge
 from antennate.errors import SceneError, raised
 from antennate.messages import shortened
 from antennate.sim.engine import mujoco
@@ -70,11 +70,14 @@ class Truths:
         self._side: Ints = np.zeros(batch, np.int64)
         self._jam, self._facing, self._free = np.zeros((3, batch), dtype=bool)
         self._map: Floats = np.full(batch, math.nan)
+        self._edges: Floats = np.full((batch, EDGES), math.nan)
+        self._rises: dict[int, Floats] = {}
 
     def begin(self, row: int, scene: SceneInstance) -> None:
         """A trial begins in a row."""
         self._routes[row], self._ticks[row] = _route_of(scene), 0
         self._walked[row], self._headings[row] = [], []
+        self._rises[row] = np.array([e.x for e in getattr(scene, "edges", ()) if e.rise > 0.0])
 
     def look(self, row: int, world: Any, maneuver: int) -> None:
         """Look at a row before a tick of its trial.
@@ -99,6 +102,7 @@ class Truths:
         self._jam[row] = self._is_jammed(row, head, maneuver)
         if "free" in self._kinds:
             self._free[row] = is_free(world)
+        self._edges[row] = edges_near(self._rises[row], float(head[0]), world.robot.length)
         route = self._routes[row]
         if route is not None:
             self._map[row] = angle_ahead(route, head, heading)
@@ -112,6 +116,19 @@ class Truths:
         walked = [*self._walked[row], head][-self._looks - 1 :]
         self._walked[row] = walked
         return len(walked) > self._looks and math.dist(walked[0], head) < JAM_GAIN
+
+
+def edges_near(edges: Floats, x: float, length: float) -> Floats:
+    """Distance of a head at x past the edges that its body is on, or will be next [m], (EDGES,).
+
+    Args:
+        edges: Where the ground rises along x [m], shape (n,).
+        x: Of the head [m].
+        length: Of the robot; farther behind, an edge is left out [m].
+    """
+    past = np.sort(x - edges)
+    near = past[(past < 1.5 * length) & (past > -length)][-EDGES:]
+    return np.concatenate([near, np.full(EDGES - len(near), math.nan)])
 
 
 def mean_direction(headings: Sequence[float]) -> float:

@@ -23,10 +23,10 @@ from antennate.types import Floats
 START = (0.35, 0.95)
 """Distance of the first edge from the head at the start, nearest and farthest [m] (assumed: the
 antennae do not touch it yet, and a whole body length more)."""
-HALF_WIDTH = 1.2
-"""Half the width of all ground [m] (assumed: a robot that turns away stays on it)."""
-BEHIND = 1.2
-"""Ground behind the head at the start [m] (assumed: the robot, and as much to back off)."""
+HALF_WIDTH = 3.0
+"""Half the width of all ground [m] (assumed: nobody walks round it)."""
+BEHIND = 3.0
+"""Ground behind the head at the start [m] (assumed: room to back off)."""
 BEYOND = 1.5
 """Ground behind the last edge [m] (assumed: twice the robot)."""
 

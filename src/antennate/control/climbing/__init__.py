@@ -1,0 +1,1 @@
+"""Leaving the plane: what antennae feel of the ground, and how the body is raised over it."""

@@ -1,0 +1,176 @@
+"""The vertical part of the command: a body whose links follow a line over edges.
+
+The robot has a plan for each edge: where its head is past the edge. The line rises before the edge
+and comes down to the step behind it; each link takes the slope of the line where the plan says that
+it is, so that the lift travels down the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from antennate.control.gait import Gait
+from antennate.control.knowledge import EDGES
+from antennate.errors import ConfigError
+from antennate.params.climb import ClimbParams
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Bools, Floats, Ints, JointCommand
+
+_STEEPEST = 0.8
+"""Sine of the steepest slope of a link: 53 degrees (ramps over 50 fail)."""
+_MOST_SAG = 0.4
+"""Most that a target is changed against its load [rad]."""
+_LEVEL = 0.06
+"""How far behind an edge the line begins to come down [m]: half a link."""
+
+
+def line(params: ClimbParams, u: Floats, rise: Floats | float) -> Floats:
+    """Height of the centre line at distances u past an edge of a rise [m], the same shape."""
+    top = rise + params.over
+    up = np.clip((u + params.before + params.ramp) / params.ramp, 0.0, 1.0)
+    down = np.clip((u - _LEVEL) / params.settle, 0.0, 1.0)
+    return top * _smooth(up) - params.over * _smooth(down)
+
+
+def _smooth(x: Floats) -> Floats:
+    return x * x * (3.0 - 2.0 * x)
+
+
+def pitch_angles(params: ClimbParams, robot: RobotSpec, progress: Floats, rise: Floats) -> Floats:
+    """Pitch joints of a body that follows its line over edges [rad], shape (B, P).
+
+    Args:
+        params: The line.
+        robot: The robot.
+        progress: Distance of the head past each edge [m], shape (B, K); NaN where there is none.
+        rise: Height for which it is raised at each edge [m], shape (B, K).
+    """
+    ends = progress[:, :, None] + robot.link_pitch * (0.5 - np.arange(robot.links + 1))
+    heights = np.nansum(np.where(np.isnan(ends), 0.0, line(params, ends, rise[:, :, None])), axis=1)
+    rise = (heights[:, :-1] - heights[:, 1:]) / robot.link_pitch
+    slopes = np.arcsin(np.clip(rise, -_STEEPEST, _STEEPEST))
+    return slopes[:, :-1] - slopes[:, 1:]
+
+
+class Body:
+    """The vertical part of the command of B robots, and the gait beside it.
+
+    Attributes:
+        phase: Gait phase [rad], shape (B,).
+        progress: Distance of the head past each edge, by the plan [m], shape (B, K), NaN for none.
+        rise: Height for which it is raised at each edge [m], shape (B, K).
+        elevation: Where the antennae are to be raised to, from the plane of the tail, however the
+            head is raised [rad], shape (B,).
+        sweep: Where the bases are to be turned to [rad], shape (B,).
+        nod: Lift of the head beside all plans, negative down [rad], shape (B,).
+        held: Rows whose pitch joints are brought to their targets in spite of their load, (B,).
+        measured: Pitch joints as their servos reported them [rad], shape (B, P); NaN if unknown.
+    """
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        self._params, self._robot, self._period = control.climb, robot, control.period
+        self._gait = Gait(control.gait, robot, batch, control.period)
+        self.phase: Floats = self._gait.phase
+        self.progress: Floats = np.full((batch, EDGES), np.nan)
+        self.rise: Floats = np.full((batch, EDGES), control.climb.rise)
+        self.elevation: Floats = np.zeros(batch)
+        self.sweep: Floats = np.zeros(batch)
+        self.nod: Floats = np.zeros(batch)
+        self.held: Bools = np.zeros(batch, dtype=bool)
+        self.measured: Floats = np.full((batch, robot.pitch_count), np.nan)
+        self._sag: Floats = np.zeros((batch, robot.pitch_count))
+        self._now: Floats = np.zeros((batch, robot.pitch_count + 2))
+
+    @property
+    def climbs(self) -> Bools:
+        """Rows with a plan, shape (B,)."""
+        return np.isfinite(self.progress).any(axis=1)
+
+    @property
+    def head_is_up(self) -> Bools:
+        """Rows whose head is on its way over an edge, by the plan, shape (B,)."""
+        return (self.progress < _LEVEL + self._params.settle).any(axis=1)
+
+    @property
+    def nose_is_up(self) -> Bools:
+        """Rows whose head has yet to come down behind an edge, by the plan, shape (B,)."""
+        return (self.progress < _LEVEL).any(axis=1)
+
+    @property
+    def behind(self) -> Bools:
+        """Edges that the head has passed, by the plan, shape (B, K)."""
+        return self.progress >= _LEVEL + self._params.settle
+
+    @property
+    def raised(self) -> Floats:
+        """Elevation of the antennae as it is commanded now [rad], shape (B,)."""
+        return self._now[:, -2]
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start some rows anew, level."""
+        self._gait.reset(rows, phase)
+        self.progress[rows] = np.nan
+        self.nod[rows] = 0.0
+        self._now[rows] = 0.0
+        self._sag[rows], self.held[rows] = 0.0, False
+
+    def begin(self, rows: Bools) -> None:
+        """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one."""
+        for row in np.flatnonzero(rows & np.isnan(self.progress).any(axis=1)):
+            free = int(np.flatnonzero(np.isnan(self.progress[row]))[0])
+            self.progress[row, free] = -self._params.ahead
+            self.rise[row, free] = self._params.rise
+
+    def advance(self, rows: Bools) -> None:
+        """Let the plans of some rows, shape (B,), go on; those that the tail has passed end."""
+        self.progress[rows] += self._params.pace * self._period
+        self.progress[self.progress > self._robot.length + self._params.settle] = np.nan
+
+    def sink(self, rows: Bools) -> None:
+        """Bring the lines behind the head of some rows, shape (B,), nearer to the floor."""
+        lower = np.maximum(self.rise - self._params.sink_rate * self._period, 0.0)
+        self.rise = np.where(rows[:, None] & self.behind, lower, self.rise)
+
+    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+        """As of `Moves`: the targets of maneuver and plans."""
+        command = self._gait.step(maneuver, turn_offset)
+        pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
+        pitch[:, 0] += self.nod
+        wanted = np.column_stack([pitch, self.elevation, self.sweep])
+        most = np.full(wanted.shape[1], self._params.rate * self._period)
+        self._now += np.clip(wanted - self._now, -most, most)
+        self._carry(wanted[:, :-2])
+        limit, most = self._robot.pitch.largest, self._robot.elevation.largest
+        joints = np.clip(self._now[:, :-2] + self._sag, -limit, limit)
+        lowered = np.clip(self._now[:, -2] - self._now[:, :-2].sum(axis=1), -most, most)
+        return replace(
+            command,
+            antenna=np.repeat(self._now[:, -1:], 2, axis=1),
+            pitch=joints,
+            elevation=np.repeat(lowered[:, None], 2, axis=1),
+        )
+
+    def _carry(self, wanted: Floats) -> None:
+        """Integrate what the load takes off the pitch joints of held rows; let go of the others."""
+        least = self._params.carry_rate * self._period
+        lack = np.nan_to_num(wanted - self.measured)
+        back = np.clip(-self._sag, -least, least)
+        change = np.where(self.held[:, None], self._params.carry_gain * self._period * lack, back)
+        self._sag = np.clip(self._sag + change, -_MOST_SAG, _MOST_SAG)
+
+
+def require_pitch(robot: RobotSpec) -> None:
+    """Check that a robot can leave the plane.
+
+    Raises:
+        ConfigError: It cannot raise its antennae or its links.
+    """
+    if not robot.pitch_count or not robot.elevation_count:
+        lacking = "pitch joints" if not robot.pitch_count else "antennae that rise"
+        raise ConfigError(
+            f"expected a robot with pitch joints and antennae that rise, such as scuttle3d, found "
+            f"one without {lacking}"
+        )

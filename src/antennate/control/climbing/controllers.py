@@ -1,0 +1,159 @@
+"""Controllers that leave the plane: `climb`, and what it has to beat.
+
+- `climb` feels steps and drops with lowered antennae and climbs steps;
+- `lifted` always holds its head up, and feels nothing;
+- `rhythm` climbs by the clock, and feels nothing;
+- `edges` climbs at edges that a simulation tells it: what knowing them is worth.
+
+All of them walk by the same gait and raise the body by the same line.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from antennate.control.climbing.body import Body, require_pitch
+from antennate.control.climbing.rule import ClimbRule
+from antennate.control.controllers import Rule, RuleController
+from antennate.control.knowledge import Kind, Knowledge
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import (
+    AntennaFrame,
+    Bools,
+    Contact,
+    Floats,
+    Ints,
+    JointCommand,
+    Maneuver,
+)
+
+
+class MakeRule(Protocol):
+    """Makes a rule that commands a body."""
+
+    def __call__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> Rule:
+        """Of B rows."""
+        ...
+
+
+class ClimbingController(RuleController):
+    """A rule that decides maneuvers and commands the vertical part of the command.
+
+    Args:
+        make: Makes the rule.
+        control: All numbers of the control.
+        robot: The robot.
+        batch: Number of robots B.
+
+    Raises:
+        ConfigError: The robot cannot raise its antennae or its links.
+    """
+
+    def __init__(
+        self, make: MakeRule, control: ControlParams, robot: RobotSpec, batch: int
+    ) -> None:
+        require_pitch(robot)
+        self.body = Body(control, robot, batch)
+        rule = make(control, robot, batch, self.body)
+        super().__init__(rule, control, robot, batch, self.body)
+        self._pitch = robot.places("pitch")
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """As of a `Controller`."""
+        if frame.positions.size:
+            self.body.measured = frame.positions[:, self._pitch]
+        return super().step(frame)
+
+
+class _LiftedRule:
+    """FORWARD with the head up."""
+
+    turn_offset = 0.0
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
+        self._body, self._lift = body, control.climb.lift
+
+    def reset(self, rows: Ints | Bools) -> None:
+        pass
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        self._body.nod[:] = self._lift
+        return _forward(contact)
+
+
+class _RhythmRule:
+    """Walks for a time, then climbs as `climb` does where it feels a step, again and again."""
+
+    turn_offset = 0.0
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
+        self._p, self._body, self._period = control.climb, body, control.period
+        self._walked: Floats = np.zeros(batch)
+
+    def reset(self, rows: Ints | Bools) -> None:
+        self._walked[rows] = 0.0
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        body, p = self._body, self._p
+        known = _forward(contact) == int(Maneuver.FORWARD)
+        begins = known & ~body.climbs & (self._walked >= p.walk_time)
+        body.begin(begins)
+        lifting = body.climbs & (self._walked < p.walk_time + p.lift_time)
+        body.advance(known & body.climbs & ~lifting)
+        self._walked = np.where(known, self._walked + self._period, self._walked)
+        self._walked = np.where(
+            body.climbs | begins | (self._walked < p.walk_time), self._walked, 0
+        )
+        body.elevation[:] = p.feel.highest / 2
+        return np.where(known & ~lifting, int(Maneuver.FORWARD), int(Maneuver.HOLD))
+
+
+class _EdgesRule:
+    """FORWARD; a simulation tells where the edges are."""
+
+    turn_offset = 0.0
+    knows: tuple[Kind, ...] = ("edges",)
+    needs: tuple[Kind, ...] = knows
+
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
+        self._body = body
+        body.elevation[:] = control.climb.feel.highest / 2
+
+    def reset(self, rows: Ints | Bools) -> None:
+        pass
+
+    def know(self, knowledge: Knowledge) -> None:
+        if knowledge.edges is not None:
+            self._body.progress = knowledge.edges
+
+    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        return _forward(contact)
+
+
+def _forward(contact: Ints) -> Ints:
+    """FORWARD, unless a reading cannot be used."""
+    unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
+    return np.where(unknown, int(Maneuver.HOLD), int(Maneuver.FORWARD))
+
+
+def climb(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingController:
+    """`climb`: feels steps and drops, climbs steps, and steers like `closed` by walls."""
+    return ClimbingController(ClimbRule, control, robot, batch)
+
+
+def lifted(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingController:
+    """`lifted`: walks with its head up."""
+    return ClimbingController(_LiftedRule, control, robot, batch)
+
+
+def rhythm(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingController:
+    """`rhythm`: climbs by the clock."""
+    return ClimbingController(_RhythmRule, control, robot, batch)
+
+
+def edges(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingController:
+    """`edges`: climbs where a simulation says that there are edges."""
+    return ClimbingController(_EdgesRule, control, robot, batch)

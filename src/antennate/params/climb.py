@@ -1,0 +1,132 @@
+"""Parameters of `climb`: what its antennae feel of the ground, and how it climbs."""
+
+from __future__ import annotations
+
+import math
+
+from antennate.params.base import Params, number
+
+
+class FeelParams(Params):
+    """How lowered antennae feel the ground. Flex is a share of the calibrated range, 0 straight."""
+
+    elevation: float = number(
+        math.radians(-20.0),
+        "rad",
+        "fitted: antennate climb; the floor then bends them by 0.21 to 0.38",
+        ge=-1.5,
+        le=1.5,
+    )
+    """Elevation of antennae that feel for the ground."""
+    missing: float = number(
+        0.14, "1", "fitted: antennate climb; over a drop 0.06, on the floor 0.21", ge=0, le=1
+    )
+    """Flex under which there is no ground."""
+    touch: float = number(
+        0.5, "1", "fitted: antennate climb; the floor gives 0.38 at most", ge=0, le=2
+    )
+    """Flex above which something stands ahead."""
+    touch_time: float = number(
+        0.02, "s", "assumed: the mean over averaging_time is smooth", ge=0, le=5
+    )
+    """How long something is to be felt."""
+    missing_time: float = number(
+        0.15, "s", "fitted: antennate climb; the bases are past the edge then, to probe it", ge=0
+    )
+    """How long ground is to be missed."""
+    settle_time: float = number(0.5, "s", "assumed: the antennae come down in it", ge=0, le=5)
+    """Time after which lowered antennae tell something."""
+    sweep_rate: float = number(1.0, "rad/s", "assumed: within the servo's speed", gt=0, le=5)
+    """Speed of a probe: both antennae are raised, or lowered."""
+    highest: float = number(math.radians(77.0), "rad", "assumed: nearly upright", ge=0, le=1.57)
+    """Elevation at which a probe upwards ends."""
+    lowest: float = number(math.radians(-75.0), "rad", "assumed: nearly down", ge=-1.57, le=0)
+    """Elevation at which a probe downwards ends."""
+    bow: float = number(
+        -0.5, "rad", "assumed: one link down; it reaches 14 cm below the ground", ge=-1, le=0
+    )
+    """Pitch of the head in a probe downwards."""
+    clear: float = number(
+        0.3, "1", "fitted: antennate climb; an antenna that slips over an edge falls below", ge=0
+    )
+    """Flex under which a probe upwards has passed the edge."""
+    inwards: float = number(
+        math.radians(-30.0), "rad", "assumed: straight ahead, where it reaches highest", ge=-0.8
+    )
+    """Sweep of the bases in a probe."""
+    check: float = number(
+        0.1, "rad", "fitted: antennate climb; above a step of 15 cm, below walls of 20 cm", ge=-1
+    )
+    """Elevation of the antennae before a raised head, from the plane of the tail."""
+    plane_sweep: float = number(
+        math.radians(17.0), "rad", "assumed: 47 deg, as antennae that stay in the plane", ge=-0.8
+    )
+    """Sweep of the bases while it steers by level antennae."""
+    plane_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=60)
+    """Nothing felt for so long while it steers, and it feels for the ground again."""
+
+
+class ClimbParams(Params):
+    """How the body is raised over an edge.
+
+    The centre line rises over `ramp`, ends `before` the edge, is `over` higher than the step and
+    settles to it behind the edge. Each link takes the slope of the line where the plan says that it
+    is: the lift travels down the body. The plan advances with `pace`, which is slower than the legs
+    walk: a robot that is ahead of its plan is held by the edge until the plan comes after it.
+    """
+
+    feel: FeelParams = FeelParams()
+    rise: float = number(0.15, "m", "assumed: the highest that is to be climbed", gt=0, le=0.3)
+    """Step for which it is raised, whatever the height."""
+    ramp: float = number(0.20, "m", "fitted: antennate climb, true position", gt=0.05, le=1)
+    """Length over which the line rises."""
+    before: float = number(0.05, "m", "fitted: antennate climb, true position", ge=0, le=0.3)
+    """How far before the edge it has risen."""
+    over: float = number(0.04, "m", "fitted: antennate climb, true position", ge=0, le=0.1)
+    """How much higher than the step it is there."""
+    settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
+    """Length over which it comes down to the step."""
+    pace: float = number(
+        0.05, "m/s", "fitted: antennate climb; 0.03 is as sure, 0.12 loses the edge", gt=0, le=0.5
+    )
+    """Speed of the plan along the way."""
+    ahead: float = number(
+        0.10,
+        "m",
+        "fitted: antennate climb; felt at 0.14, less what it walks on at once",
+        gt=0,
+        le=1,
+    )
+    """Distance of the edge from the middle of the head when it is felt."""
+    approach_time: float = number(
+        1.0, "s", "fitted: antennate climb; the robot comes up to the edge in it", ge=0, le=10
+    )
+    """Time that it walks with its head raised before the plan goes on."""
+    sink_rate: float = number(0.05, "m/s", "assumed: 10 cm in the time of a link", gt=0, le=1)
+    """Speed at which it comes down behind an edge until the antennae feel the floor."""
+    lift_time: float = number(1.5, "s", "assumed: the head is up before it walks", ge=0, le=10)
+    """Time to stand while the head is raised."""
+    carry_gain: float = number(3.0, "1/s", "assumed: a third of a second", ge=0, le=20)
+    """Rate at which a raised head is brought to its target in spite of its load."""
+    rate: float = number(2.0, "rad/s", "assumed: less than half the servo's speed", gt=0, le=6)
+    """Largest speed of a pitch joint."""
+    carry_rate: float = number(0.5, "rad/s", "assumed: as slow as a link comes down", gt=0, le=6)
+    """Speed at which a joint gives up what it added against its load."""
+    lowest: float = number(0.03, "m", "assumed: legs walk over it by themselves", ge=0, le=0.2)
+    """Height under which it walks on."""
+    step_time: float = number(1.0, "s", "assumed: as long as it walks over it", ge=0, le=30)
+    """Time for which it feels nothing new after so low a step."""
+    drop_time: float = number(4.0, "s", "assumed: its length at the usual speed", ge=0, le=30)
+    """The same after a drop whose ground it has felt."""
+    attempts: int = number(3, "1", "assumed: thrice the same place is a wall", ge=1, le=20)
+    """Climbs one after the other that make a wall."""
+    retreat_time: float = number(1.0, "s", "assumed: a link and a half", gt=0, le=30)
+    """Time to back off from a step that was not climbed."""
+    back_time: float = number(3.0, "s", "assumed: as search.reverse_time and a little", gt=0, le=30)
+    """Time to back off from ground that is missing."""
+    turn_time: float = number(4.0, "s", "assumed: about 90 deg", gt=0, le=30)
+    """Time to turn after that."""
+    lift: float = number(0.35, "rad", "assumed: above it the head costs speed", ge=0, le=1)
+    """Lift of the head of `lifted`."""
+    walk_time: float = number(4.0, "s", "fitted: antennate climb, best of the sweep", ge=0, le=60)
+    """Time that `rhythm` walks between two climbs."""
