@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,10 +30,13 @@ from antennate.hardware.joints import CommandError, Joints
 from antennate.hardware.safety.causes import State
 from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing
+from antennate.params.control import ControlParams
 from antennate.params.hardware import SetupParams
 from antennate.params.scene import GRAVITY
 from antennate.robots.spec import RobotSpec
+from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
+from antennate.telemetry.view.player import LogScene
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
 from antennate.types import AntennaFrame, JointCommand
@@ -202,6 +207,23 @@ def test_zeros_and_directions_are_asked_for_by_their_sense() -> None:
         for name, sign in zip(ROBOT.joint_names, signs, strict=True)
     ]
     assert zeroing.directions(Script(steps)) == signs
+
+
+@pytest.mark.parametrize(("pitch", "heights"), [((0.35, 0, 0, 0, 0), 1), ((0, 0.2, 0, 0, 0), 2)])
+def test_of_joints_alone_the_robot_is_drawn_on_its_tail_with_its_head_raised(
+    pitch: tuple[float, ...], heights: int
+) -> None:
+    """Links on a line of the slope of the joint: 0.06 m to the first middle, then 0.12 m each."""
+    scene = LogScene(Header(controller="open", params=ControlParams(), robot=ROBOT), None)
+    angles = np.zeros(26)
+    angles[PITCH] = pitch
+    tick: Any = SimpleNamespace(positions=tuple(angles.tolist()))
+    for _ in range(2):  # what was drawn before changes nothing
+        scene.place_joints(tick)
+    z = scene.world.link_places()[:, 2]
+    axle = ROBOT.leg_radius + ROBOT.leg_eccentricity
+    rise = [ROBOT.link_pitch * (0.5 + i) * math.sin(max(pitch)) for i in range(heights)]
+    assert z - axle == pytest.approx([*reversed(rise), *[0.0] * (6 - heights)], abs=1e-9)
 
 
 def test_a_log_names_its_joints_and_is_replayed(
