@@ -104,6 +104,12 @@ class Gait:
         period: Control period [s].
         legs: Whether it moves the legs. False leaves them at 0, for a controller that moves them
             itself and takes the wave of the yaw joints and the antennae alone.
+
+    Attributes:
+        phase: Gait phase [rad], shape (B,), unwrapped.
+        offset: Yaw offset [rad], shape (B,).
+        sweep: Phase of the antenna bases [rad], shape (B,).
+        amplitude: Amplitude of the yaw joints [rad], shape (B,); that of the gait if None.
     """
 
     def __init__(
@@ -114,6 +120,7 @@ class Gait:
         self.phase: Floats = np.zeros(batch)
         self.offset: Floats = np.zeros(batch)
         self.sweep: Floats = np.zeros(batch)
+        self.amplitude: Floats | None = None
         self._advance = 2.0 * math.pi * params.frequency * period
         self._slew = params.offset_rate * period
         self._swing = 2.0 * math.pi * params.antenna_frequency * period
@@ -138,5 +145,12 @@ class Gait:
         self.offset += change * moves
         self.phase += DIRECTION[maneuver] * self._advance
         self.sweep += moves * self._swing
-        command = targets(self.params, self._robot, self.phase, self.offset, self.sweep)
+        command = targets(
+            self.params,
+            self._robot,
+            self.phase,
+            self.offset,
+            self.sweep,
+            amplitude=self.amplitude,
+        )
         return command if self._legs else replace(command, leg=np.zeros_like(command.leg))

@@ -33,7 +33,11 @@ class FeelParams(Params):
     missing_time: float = number(
         0.15, "s", "fitted: antennate climb; the bases are past the edge then, to probe it", ge=0
     )
-    """How long ground is to be missed."""
+    """How long both antennae are to miss the ground."""
+    aslant_time: float = number(
+        0.35, "s", "fitted: antennate climb; the base is past an edge that is met aslant", ge=0
+    )
+    """How long one antenna is to miss it."""
     settle_time: float = number(0.5, "s", "assumed: the antennae come down in it", ge=0, le=5)
     """Time after which lowered antennae tell something."""
     sweep_rate: float = number(1.0, "rad/s", "assumed: within the servo's speed", gt=0, le=5)
@@ -78,14 +82,20 @@ class ClimbParams(Params):
     feel: FeelParams = FeelParams()
     rise: float = number(0.15, "m", "assumed: the highest that is to be climbed", gt=0, le=0.3)
     """Step for which it is raised, whatever the height."""
-    ramp: float = number(0.20, "m", "fitted: antennate climb, true position", gt=0.05, le=1)
+    ramp: float = number(0.24, "m", "fitted: antennate climb, true position", gt=0.05, le=1)
     """Length over which the line rises."""
-    before: float = number(0.05, "m", "fitted: antennate climb, true position", ge=0, le=0.3)
+    before: float = number(0.03, "m", "fitted: antennate climb, true position", ge=0, le=0.3)
     """How far before the edge it has risen."""
-    over: float = number(0.04, "m", "fitted: antennate climb, true position", ge=0, le=0.1)
+    over: float = number(0.03, "m", "fitted: antennate climb, true position", ge=0, le=0.1)
     """How much higher than the step it is there."""
     settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
     """Length over which it comes down to the step."""
+    amplitude: float = number(
+        math.radians(20.0), "rad", "fitted: antennate climb; bent less, links rise higher", ge=0
+    )
+    """Amplitude of the yaw joints while it climbs, at most that of the gait."""
+    amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
+    """Largest change of that amplitude."""
     pace: float = number(
         0.05, "m/s", "fitted: antennate climb; 0.03 is as sure, 0.12 loses the edge", gt=0, le=0.5
     )
@@ -124,7 +134,7 @@ class ClimbParams(Params):
     """Time to back off from a step that was not climbed."""
     back_time: float = number(3.0, "s", "assumed: as search.reverse_time and a little", gt=0, le=30)
     """Time to back off from ground that is missing."""
-    turn_time: float = number(4.0, "s", "assumed: about 90 deg", gt=0, le=30)
+    turn_time: float = number(6.5, "s", "assumed: it then walks away from the edge", gt=0, le=30)
     """Time to turn after that."""
     lift: float = number(0.35, "rad", "assumed: above it the head costs speed", ge=0, le=1)
     """Lift of the head of `lifted`."""

@@ -74,6 +74,9 @@ class Body:
         self._params, self._robot, self._period = control.climb, robot, control.period
         self._gait = Gait(control.gait, robot, batch, control.period)
         self.phase: Floats = self._gait.phase
+        self._gait.amplitude = np.full(batch, control.gait.amplitude)
+        self._amplitude: Floats = self._gait.amplitude
+        self._usual = control.gait.amplitude
         self.progress: Floats = np.full((batch, EDGES), np.nan)
         self.rise: Floats = np.full((batch, EDGES), control.climb.rise)
         self.elevation: Floats = np.zeros(batch)
@@ -87,7 +90,7 @@ class Body:
     @property
     def climbs(self) -> Bools:
         """Rows with a plan, shape (B,)."""
-        return np.isfinite(self.progress).any(axis=1)
+        return (self.progress > -np.inf).any(axis=1)
 
     @property
     def head_is_up(self) -> Bools:
@@ -112,6 +115,7 @@ class Body:
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Start some rows anew, level."""
         self._gait.reset(rows, phase)
+        self._amplitude[rows] = self._usual
         self.progress[rows] = np.nan
         self.nod[rows] = 0.0
         self._now[rows] = 0.0
@@ -136,6 +140,9 @@ class Body:
 
     def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""
+        wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
+        change = self._params.amplitude_rate * self._period
+        self._amplitude += np.clip(wave - self._amplitude, -change, change)
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod

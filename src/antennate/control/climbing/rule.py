@@ -62,7 +62,9 @@ class ClimbRule:
         self.stage: Ints = np.full(batch, int(Stage.WALK))
         self.ground: Ints = np.full(batch, int(Ground.FLOOR))
         self.height: Floats = np.zeros(batch)
-        self._since, self._felt, self._missed, self._free, self._blind = np.zeros((5, batch))
+        self._since, self._felt, self._free, self._blind = np.zeros((4, batch))
+        self._missed: Floats = np.zeros((batch, 2))
+        self._missing: Bools = np.zeros((batch, 2), dtype=bool)
         self._passed: Floats = np.full((batch, 2), np.nan)
         self._climbs: Ints = np.zeros(batch, np.int64)
         self._retreated: Bools = np.zeros(batch, dtype=bool)
@@ -78,7 +80,7 @@ class ClimbRule:
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""
-        known: Bools = np.isfinite(flex.sum(axis=1))
+        known: Bools = (abs(flex) < math.inf).all(axis=1)
         self._count(flex, known)
         steering = self._steer.step(t, level, contact, flex)
         maneuver = np.full(len(t), int(Maneuver.HOLD))
@@ -92,17 +94,18 @@ class ClimbRule:
     def _count(self, flex: Floats, known: Bools) -> None:
         """How long something was felt, ground was missed, nothing was felt, a stage lasted [s]."""
         touches = (flex > self._feel.touch).any(axis=1)
-        misses = (flex < self._feel.missing).all(axis=1)
         dt = np.where(known, self._period, 0.0)
         self._felt = np.where(touches, self._felt + dt, 0.0)
-        self._missed = np.where(misses, self._missed + dt, 0.0)
+        misses = flex < self._feel.missing
+        self._missed = np.where(misses, self._missed + dt[:, None], 0.0)
         self._free = np.where(touches, 0.0, self._free + dt)
         self._since += dt
         self._blind = np.maximum(self._blind - dt, 0.0)
 
     def _to(self, row: int, stage: Stage) -> None:
         self.stage[row] = stage
-        self._since[row] = self._felt[row] = self._missed[row] = 0.0
+        self._since[row] = self._felt[row] = 0.0
+        self._missed[row] = 0.0
 
     def _pose(self, row: int, elevation: float, sweep: float = 0.0, nod: float = 0.0) -> None:
         body = self._body
@@ -131,10 +134,16 @@ class ClimbRule:
         if self._felt[row] > self._feel.touch_time:
             self._passed[row] = np.nan
             self._to(row, Stage.PROBE_UP)
-        elif self._missed[row] > self._feel.missing_time and not above.any():
+        elif self._misses_ground(row) and not above.any():
             self.ground[row] = Ground.DROP
+            self._missing[row] = self._missed[row] > 0.0
             self._to(row, Stage.PROBE_DOWN)
         return Maneuver.FORWARD if self.stage[row] == Stage.WALK else Maneuver.HOLD
+
+    def _misses_ground(self, row: int) -> bool:
+        """Both antennae for a while, or one of them, as at an edge that is met aslant."""
+        low, high = sorted(self._missed[row].tolist())
+        return low > self._feel.missing_time or high > self._feel.aslant_time
 
     def _probe_up(self, row: int, flex: Floats, steering: int) -> int:
         """Stand, and raise the antennae until both have slipped over the edge."""
@@ -196,7 +205,7 @@ class ClimbRule:
         """Stand, and lower head and antennae until they find ground."""
         angle = self._feel.elevation - self._feel.sweep_rate * self._since[row]
         self._pose(row, angle, self._feel.inwards, self._feel.bow)
-        if (flex > self._feel.clear).all():
+        if (flex > self._feel.clear)[self._missing[row]].all():
             self.height[row] = self._above(self._body.raised[row])
             self._blind[row] = self._p.drop_time
             self._to(row, Stage.WALK)
