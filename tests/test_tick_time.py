@@ -92,7 +92,7 @@ def found(robot: RobotSpec, baud: int, rate: float = 100.0, fast: bool = True) -
     config = DoctorConfig.model_validate({"robot": robot.model_dump(), "control": {"rate": rate}})
     survey = BusSurvey(baud)
     survey.fast = fast
-    return bus_checks._tick(survey, config)  # pyright: ignore[reportPrivateUsage]
+    return bus_checks.tick_finding(survey, config)
 
 
 def test_26_servos_fit_10_ms_at_1_mbit_with_more_than_the_adapters_time_to_spare() -> None:

@@ -235,7 +235,7 @@ def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, st
     if not bus.registers.keys() & set(robot.ids):
         return
     yield from register_findings(bus, config)
-    yield _tick(bus, config), "tick on the wire", _shorter(config)
+    yield tick_finding(bus, config), "tick on the wire", _shorter(config)
     if bus.ping_times:
         yield _answer_time(bus, config), "answer time", f"at most {1e3 * good.answer_time:g} ms"
     if bus.read_time is not None:
@@ -349,7 +349,7 @@ def _shorter(config: DoctorConfig) -> str:
     )
 
 
-def _tick(bus: BusSurvey, config: DoctorConfig) -> Finding:
+def tick_finding(bus: BusSurvey, config: DoctorConfig) -> Finding:
     """Whether goals and answers of a tick fit it, all servos there; the speed at which they do."""
     ids, longest = config.robot.ids, config.control.period - ADAPTER
     time = tick_time(ids, bus.baud, bus.fast)
