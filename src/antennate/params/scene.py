@@ -204,6 +204,10 @@ class GroundParams(Params):
 
     height: float = number(0.10, "m", "assumed: 8 to 15 cm are to be climbed", gt=0.0, le=0.5)
     """Height of a step, of each step of stairs, or of a ramp."""
+    start: tuple[float, float] = number(
+        (0.35, 0.95), "m", "assumed: the antennae do not touch it yet, and a body length more"
+    )
+    """Distance of the first edge from the head at the start, nearest and farthest."""
     width: float = number(0.10, "m", "assumed: a link pitch", gt=0.0, le=0.5)
     """Width of a gap."""
     depth: float = number(0.35, "m", "assumed: half the robot; it does not come out", gt=0.0, le=1)
@@ -218,6 +222,15 @@ class GroundParams(Params):
     """Height of the highest block of rubble; blocks are half as high to as high."""
     density: float = number(60.0, "1/m²", "assumed: a fifth of the field is covered", ge=0, le=400)
     """Blocks of rubble on a square metre."""
+
+    @model_validator(mode="after")
+    def _start_in_front(self) -> GroundParams:
+        near, far = self.start
+        if not 0.25 <= near <= far <= 10.0:
+            raise ValueError(
+                f"start must rise from at least 0.25 to at most 10 m, found {near:g} and {far:g}"
+            )
+        return self
 
 
 class PhysicsParams(Params):

@@ -90,17 +90,17 @@ class Body:
     @property
     def climbs(self) -> Bools:
         """Rows with a plan, shape (B,)."""
-        return (self.progress > -np.inf).any(axis=1)
+        return np.logical_or.reduce(self.progress > -np.inf, axis=1)
 
     @property
     def head_is_up(self) -> Bools:
         """Rows whose head is on its way over an edge, by the plan, shape (B,)."""
-        return (self.progress < _LEVEL + self._params.settle).any(axis=1)
+        return np.logical_or.reduce(self.progress < _LEVEL + self._params.settle, axis=1)
 
     @property
     def nose_is_up(self) -> Bools:
         """Rows whose head has yet to come down behind an edge, by the plan, shape (B,)."""
-        return (self.progress < _LEVEL).any(axis=1)
+        return np.logical_or.reduce(self.progress < _LEVEL, axis=1)
 
     @property
     def behind(self) -> Bools:

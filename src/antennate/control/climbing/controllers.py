@@ -85,30 +85,42 @@ class _LiftedRule:
 
 
 class _RhythmRule:
-    """Walks for a time, then climbs as `climb` does where it feels a step, again and again."""
+    """Walks for a time, backs off, and climbs as `climb` does after a probe, again and again."""
 
     turn_offset = 0.0
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
-        self._p, self._body, self._period = control.climb, body, control.period
-        self._walked: Floats = np.zeros(batch)
+        p = control.climb
+        self._body, self._period, self._elevation = body, control.period, 0.5 * p.feel.highest
+        self._ends = np.cumsum([p.walk_time, p.retreat_time, p.lift_time, p.approach_time])
+        self._time: Floats = np.zeros(batch)
 
     def reset(self, rows: Ints | Bools) -> None:
-        self._walked[rows] = 0.0
+        self._time[rows] = 0.0
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        body, p = self._body, self._p
+        body = self._body
         known = _forward(contact) == int(Maneuver.FORWARD)
-        begins = known & ~body.climbs & (self._walked >= p.walk_time)
-        body.begin(begins)
-        lifting = body.climbs & (self._walked < p.walk_time + p.lift_time)
-        body.advance(known & body.climbs & ~lifting)
-        self._walked = np.where(known, self._walked + self._period, self._walked)
-        self._walked = np.where(
-            body.climbs | begins | (self._walked < p.walk_time), self._walked, 0
-        )
-        body.elevation[:] = p.feel.highest / 2
-        return np.where(known & ~lifting, int(Maneuver.FORWARD), int(Maneuver.HOLD))
+        part = np.searchsorted(self._ends, self._time, side="right")
+        body.begin(known & (part == 2) & ~body.climbs)
+        body.held = body.nose_is_up
+        body.advance(known & (part == len(self._ends)))
+        over = (part == len(self._ends)) & ~body.climbs
+        self._time = np.where(over, 0.0, self._time + np.where(known, self._period, 0.0))
+        body.elevation[:] = self._elevation
+        return np.where(known, _ROUND[part], int(Maneuver.HOLD))
+
+
+_ROUND = np.array(
+    [
+        Maneuver.FORWARD,
+        Maneuver.REVERSE,
+        Maneuver.HOLD,
+        Maneuver.FORWARD,
+        Maneuver.FORWARD,
+    ]
+)
+"""Maneuvers of the parts of a round of `rhythm`: walk, back off, lift, come up, climb."""
 
 
 class _EdgesRule:

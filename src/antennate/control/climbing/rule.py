@@ -80,7 +80,7 @@ class ClimbRule:
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""
-        known: Bools = (abs(flex) < math.inf).all(axis=1)
+        known: Bools = np.logical_and.reduce(abs(flex) < math.inf, axis=1)
         self._count(flex, known)
         steering = self._steer.step(t, level, contact, flex)
         maneuver = np.full(len(t), int(Maneuver.HOLD))

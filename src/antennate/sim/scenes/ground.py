@@ -20,9 +20,6 @@ from antennate.sim.parts import FLOOR_BIT, GROUND_BIT, GROUND_FRICTION
 from antennate.sim.scenes.scene import Route
 from antennate.types import Floats
 
-START = (0.35, 0.95)
-"""Distance of the first edge from the head at the start, nearest and farthest [m] (assumed: the
-antennae do not touch it yet, and a whole body length more)."""
 HALF_WIDTH = 3.0
 """Half the width of all ground [m] (assumed: nobody walks round it)."""
 BEHIND = 3.0
@@ -58,7 +55,7 @@ class GroundScene:
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Ground:
         """Draw the distance of the first edge, and the blocks of rubble."""
-        first = float(rng.uniform(*START))
+        first = float(rng.uniform(*self._params.start))
         return KINDS[self._name](self._params, robot, first, rng)
 
 
@@ -207,11 +204,17 @@ KINDS = {
 }
 """Scenes of ground by name."""
 READS: Mapping[str, tuple[str, ...]] = {
-    "step_up": ("height",),
-    "step_down": ("height",),
-    "stairs": ("height", "steps", "tread"),
-    "gap": ("width", "depth"),
-    "ramp": ("height", "slope"),
-    "rubble": ("block", "density"),
+    "step_up": (
+        "start",
+        "height",
+    ),
+    "step_down": (
+        "start",
+        "height",
+    ),
+    "stairs": ("start", "height", "steps", "tread"),
+    "gap": ("start", "width", "depth"),
+    "ramp": ("start", "height", "slope"),
+    "rubble": ("start", "block", "density"),
 }
 """Sizes that each of them reads."""
