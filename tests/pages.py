@@ -25,6 +25,7 @@ _FENCE = re.compile(r'^```(\w+)(?: title="(.*?)")?\n(.*?)^```$', re.MULTILINE | 
 _SHELL = """\
 uv() { shift; while [[ $1 == --* ]]; do shift 2; done; "$@"; }
 antennate() { "$PYTHON" -W error -m antennate "$@"; }
+python() { "$PYTHON" -W error "$@"; }
 """
 _PATIENCE = 300.0
 """Longest that a block may take [s]; the machine may be busy."""

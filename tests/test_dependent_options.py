@@ -14,10 +14,13 @@ from antennate.errors import ConfigError
 
 NEEDS = {
     "--foxglove-port": ["--foxglove"],
+    "--gait": ["--export mjcf"],
     "--key": ["--udp"],
     "--overwrite": ["--out"],
     "--resume": ["--out"],
     "--retry": ["--out"],
+    "--scene": ["--export mjcf"],
+    "--seed": ["--scene"],
     "--slurm": ["--engine slurm"],
     "--teleop.gamepad-silence": ["--gamepad"],
     "--video-trial": ["--video"],

@@ -17,7 +17,6 @@ from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.places import HEIGHT_LIMIT
-from antennate.sim.scenes import ground
 from antennate.sim.scenes.ground import Edge, Ground, GroundScene
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import FlatScene
@@ -113,7 +112,7 @@ def test_the_first_edge_is_within_its_range_and_the_exit_a_body_length_behind_th
     first = [edge.edges[0].x for edge in scenes]
     if name == "ramp":
         first = [x - 0.1 / math.tan(math.radians(15.0)) for x in first]
-    assert ground.START == (0.35, 0.95)
+    assert GroundParams().start == (0.35, 0.95)
     assert min(first) >= 0.35
     assert max(first) <= 0.95
     assert np.mean(first) == pytest.approx(0.65, abs=0.05)  # uniform: 0.17 / √200 = 0.012
@@ -175,6 +174,8 @@ REFUSED = [
     (["--scene", "stairs", "--ground.tread", "0.04"], "ground.tread: expected"),
     (["--scene", "ramp", "--ground.slope", "50"], "ground.slope: expected"),
     (["--scene", "rubble", "--ground.block", "-0.01"], "ground.block: expected"),
+    (["--scene", "gap", "--ground.start", "0.2", "0.5"], "start must rise from at least 0.25"),
+    (["--scene", "gap", "--ground.start", "0.9", "0.5"], "found 0.9 and 0.5"),
     (["--scene", "gap", "--ground.width", "nan"], "ground.width: expected"),
     (["--scene", "step_up", "--ground.width", "0.2"], "it belongs to the scenes gap"),
     (["--scene", "gap", "--ground.height", "0.2"], "step_up, step_down, stairs, ramp"),

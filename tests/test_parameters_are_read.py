@@ -94,6 +94,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "robot": {
                 "yaw": {"servo": "xl330_m288"},
                 "legs": {"kind": "lifting", "servo": "xl430_w250"},
+                "pitch": {"kind": "actuated"},
                 "elevation": {"kind": "pair"},
             },
         },

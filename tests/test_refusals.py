@@ -226,6 +226,17 @@ tracks --files a.csv --points.left a :: points: right: expected as many points
 tracks --files a.csv --points.left a b --points.right none --criteria.flex 1 :: criteria.flex: expected the default, as it is not read with two points
 """
 ROBOT = """
+robot --export mjc :: --export: expected one of mjcf or urdf, found mjc
+robot --export mjcf --scene tunle :: --scene: expected one of tunnel, :: did you mean tunnel?
+robot --export mjcf --scene missing.xml :: missing.xml: expected a readable file
+robot --export mjcf --scene tunnel --robot.width 0.5 :: at least robot.width, 0.5 m, found 0.4 m
+robot --export mjcf --scene tunnel --seed -4 :: --seed: expected a number of at least 0, found -4
+robot --export mjcf --seed 4 :: --seed: expected --scene beside it, found none
+robot --export mjcf --gait trot :: --gait: expected serpenoid, :: found 'trot'
+robot --export urdf --scene tunnel :: --scene: expected --export mjcf beside it, found none
+robot --export urdf --robot hexpod :: --robot: expected scuttle, :: (did you mean hexapod?), found
+robot --scene tunnel :: --scene: expected --export mjcf beside it, found none
+robot one two :: expected flags only, found 'two'
 doctor :: --esp32 PORT, --bus PORT or both
 doctor --bus /dev/null --esp32 /dev/null :: expected two ports
 drive --esp32 /dev/null --bus /dev/null :: expected two ports, found /dev/null twice

@@ -124,7 +124,8 @@ def driven(
         return
     told(patch, drive.command, drive.DriveOptions(arm=True, out=out, **PORTS), config)
     for name in BUILT_IN if config.control.rate < 100.0 else ():
-        act(name, config.control, config.robot)
+        climbs = name in ("climb", "lifted", "rhythm")
+        act(name, config.control, RobotSpec.named("scuttle3d") if climbs else config.robot)
 
 
 def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 ROBOT_COMMANDS = {
     "twin": "A simulated robot on two ports: an antenna board and a servo bus",
-    "robot": "Joints, supply, wiring diagram and bill of materials of a robot",
+    "robot": "Joints, supply, wiring and parts of a robot; its MJCF and URDF",
     "doctor": "Examine the real robot, or its twin: what is wrong, and the cure",
     "setup": "From a box of servos to a robot, one servo at a time",
     "setup zero": "Zeros and directions of the joints, by hand",

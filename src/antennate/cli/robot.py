@@ -9,10 +9,11 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic.dataclasses import dataclass
 
+from antennate.cli import export
 from antennate.cli.arguments import FromFile, parse
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
@@ -225,7 +226,11 @@ DESCRIPTION = """\
 Say what a robot consists of: joints with their ids and servos, what its supply has to give, a
 wiring diagram and a bill of materials. Nothing is sent to any port.
 
-The folder holds figures/wiring.svg and .png, bom.csv and result.json."""
+The folder holds figures/wiring.svg and .png, bom.csv and result.json.
+
+--export writes the robot for other programs instead. mjcf: robot.xml, scene.xml with a scene around
+it, a walk (gait.csv) and walk.py, which drives scene.xml by it in MuJoCo alone, to the same bits.
+urdf: robot.urdf. README.txt tells what the files cannot hold."""
 _COLUMNS = ("id", "servo", "mode", "zero", "direction")
 _RAIL = (
     Measure("servos", "servos", form="d"),
@@ -242,13 +247,26 @@ class DescribedRobot(Params):
     robot: RobotSpec = RobotSpec()
 
 
+_MJCF = ("--export mjcf",)
+
+
 @dataclass(frozen=True)
 class Options(ResultOptions, RobotFileOptions):
-    """Where the results go, and which file describes the robot."""
+    """Where the results go, which file describes the robot, and what is exported."""
+
+    out: Path | None = option(
+        None, "folder for the results, else runs/COMMAND-N", "FOLDER", positional=True
+    )
+    export: Literal["mjcf", "urdf"] | None = option(
+        None, "write the robot for other programs instead"
+    )
+    scene: str = option("", "scene around the robot, else a flat floor", "NAME", _MJCF)
+    seed: int = option(0, "seed of that scene; it is that of trial 0", needs=["--scene"], ge=0)
+    gait: str = option("", "gait of the walk that is written beside it", "NAME|FILE", _MJCF)
 
 
 def command(argv: Sequence[str]) -> int:
-    """Describe the robot, and write the diagram and the bill.
+    """Describe the robot, and write the diagram and the bill, or export it.
 
     Raises:
         AntennateError: The robot or the folder cannot be used.
@@ -259,23 +277,35 @@ def command(argv: Sequence[str]) -> int:
 
     config, options = parse_robot("robot", DESCRIPTION, take, argv, Options)
     robot = config.robot
+    files, result = None, {}
+    if options.export is not None:
+        wishes = options.scene, options.seed, options.gait
+        files, result = export.exported(robot, options.export, *wishes)
     with folder_for(VIEW, options, config, argv) as folder:
-        from antennate.robots.wiring import wiring  # slow to import
-
         folder.without_trials()
-        parts = [asdict(part) for part in bill(robot)]
-        folder.write("bom.csv", to_csv(parts))
-        folder.write_figures({"wiring": wiring(robot)})
-        result = {
-            "schema": 1,
-            "command": "robot",
-            "joints": dict(_joints(robot)),
-            "supply": asdict(supply(robot)),
-            "bom": parts,
-        }
+        if files is None:
+            files, result = _description(robot)
+            from antennate.robots.wiring import wiring  # slow to import
+
+            folder.write_figures({"wiring": wiring(robot)})
+        for name, content in files.items():
+            folder.write(name, content)
         folder.finish(result)
         show_result(result, options, VIEW.tables(result), VIEW.sentence(result))
     return OK
+
+
+def _description(robot: RobotSpec) -> tuple[dict[str, str], dict[str, Any]]:
+    """The bill as a file, and the result."""
+    parts = [asdict(part) for part in bill(robot)]
+    result = {
+        "schema": 1,
+        "command": "robot",
+        "joints": dict(_joints(robot)),
+        "supply": asdict(supply(robot)),
+        "bom": parts,
+    }
+    return {"bom.csv": to_csv(parts)}, result
 
 
 def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -294,6 +324,8 @@ def _supply(result: Mapping[str, Any]) -> Supply:
 
 
 def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    if "export" in result:
+        return export.tables(result)
     power, joints = _supply(result), result["joints"]
     rails = {
         f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
@@ -307,6 +339,8 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentence(result: Mapping[str, Any]) -> str:
+    if "export" in result:
+        return export.sentence(result)
     power = _supply(result)
     drawn = f"{power.walking:.1f} A while walking, at most {power.peak:.1f} A"
     return (

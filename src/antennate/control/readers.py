@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antennate.params.base import paths_of
+from antennate.params.climb import ClimbParams
 from antennate.params.control import (
     ControlParams,
     EscapeParams,
@@ -98,6 +99,7 @@ _SCHEDULE = paths_of(ScheduleParams, "schedule")
 _ZIGZAG = paths_of(ZigzagParams, "zigzag")
 _RANDOM = paths_of(RandomParams, "random")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
+_CLIMB = paths_of(ClimbParams, "climb")
 _GEOMETRIC = paths_of(GeometricParams, "geometric")
 _SEARCH = (*paths_of(SearchParams, "search"), *_GEOMETRIC)
 _SIZES = (
@@ -121,24 +123,25 @@ _FELT = (
 
 def _without(read: tuple[str, ...], *others: str) -> tuple[str, ...]:
     """Parameters of the blind controllers but those that one of them reads, and others."""
-    return (*_TABLE, *_SEARCH, *(path for path in _BLIND if path not in read), *others)
+    rest = (path for path in _BLIND if path not in read)
+    return (*_TABLE, *_SEARCH, *_CLIMB, *rest, *others)
 
 
 _MAP = ("escape.reverse_time", "escape.return_time", "escape.turn_offset")
 """Of an escape what `map` reads."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
-    "open": (*_TABLE, *_ESCAPE, *_BLIND, *_SEARCH),
+    "open": (*_TABLE, *_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
     "timed": _without(_TIMED, *_FELT),
-    "paper": (*_ESCAPE, *_BLIND, *_SEARCH),
-    "closed": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_GEOMETRIC),
-    "geometric": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_SIZES),
-    "closed-1": (*_TABLE, *_BLIND, *_SEARCH),
-    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_BLIND, *_SEARCH),
+    "paper": (*_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
+    "closed": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_GEOMETRIC, *_CLIMB),
+    "geometric": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_SIZES, *_CLIMB),
+    "closed-1": (*_TABLE, *_BLIND, *_SEARCH, *_CLIMB),
+    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_BLIND, *_SEARCH, *_CLIMB),
     "schedule": _without(_SCHEDULE, *_TURNING),
     "zigzag": _without(_ZIGZAG, *_TURNING),
     "random": _without(_RANDOM, *_TURNING),
-    "map": (*_TABLE, *_BLIND, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
-    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_BLIND, *_SEARCH),
+    "map": (*_TABLE, *_BLIND, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP), *_CLIMB),
+    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 

@@ -126,6 +126,8 @@ class ClimbParams(Params):
     """Height under which it walks on."""
     step_time: float = number(1.0, "s", "assumed: as long as it walks over it", ge=0, le=30)
     """Time for which it feels nothing new after so low a step."""
+    over_time: float = number(3.0, "s", "assumed: it walks into it within", ge=0, le=30)
+    """Time within which something new means that the step was not so low."""
     drop_time: float = number(4.0, "s", "assumed: its length at the usual speed", ge=0, le=30)
     """The same after a drop whose ground it has felt."""
     attempts: int = number(3, "1", "assumed: thrice the same place is a wall", ge=1, le=20)
@@ -138,5 +140,7 @@ class ClimbParams(Params):
     """Time to turn after that."""
     lift: float = number(0.35, "rad", "assumed: above it the head costs speed", ge=0, le=1)
     """Lift of the head of `lifted`."""
-    walk_time: float = number(4.0, "s", "fitted: antennate climb, best of the sweep", ge=0, le=60)
+    walk_time: float = number(
+        5.0, "s", "fitted: best of 3, 5 and 8 s at 10 cm (docs/science/climb.md)", ge=0, le=60
+    )
     """Time that `rhythm` walks between two climbs."""

@@ -72,7 +72,7 @@ def attach_antenna(
     for geom in part.geoms:
         if geom.name:  # the links; the base is no obstacle to anything
             geom.contype, geom.conaffinity = contype, conaffinity
-    _add_sensors(part, antenna)
+    add_sensors(part, antenna)
     frame = carrier.add_frame(pos=place, quat=quaternion)
     spec.attach(part, frame=frame, prefix=f"{name}/")
     for link in [b.name for b in spec.bodies if b.name.startswith(f"{name}/")]:
@@ -91,28 +91,34 @@ def _carrier(spec: mujoco.MjSpec, body: str, name: str) -> mujoco.MjsBody:
     return carrier
 
 
-def _add_sensors(part: mujoco.MjSpec, antenna: AntennaSpec) -> None:
-    """A position and a touch sensor for each hinge and its link."""
+def add_sensors(spec: mujoco.MjSpec, antenna: AntennaSpec, prefix: str = "") -> None:
+    """Add a position and a touch sensor for each hinge of an antenna and its link.
+
+    Args:
+        spec: Where the antenna is; it is changed.
+        antenna: The antenna.
+        prefix: Before all names of the antenna, those of the sensors too.
+    """
     for i, hinge in enumerate(antenna.hinge_names):
-        link = part.body(hinge)
+        link = spec.body(prefix + hinge)
         link.add_site(
-            name=f"touch{i}",
+            name=f"{prefix}touch{i}",
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[0, 0, 0, antenna.link_length, 0, 0],
             size=[_TOUCH_MARGIN * antenna.radius, 0, 0],
             group=4,  # not drawn by default
         )
-        part.add_sensor(
-            name=f"angle{i}",
+        spec.add_sensor(
+            name=f"{prefix}angle{i}",
             type=mujoco.mjtSensor.mjSENS_JOINTPOS,
             objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            objname=hinge,
+            objname=prefix + hinge,
         )
-        part.add_sensor(
-            name=f"touch{i}",
+        spec.add_sensor(
+            name=f"{prefix}touch{i}",
             type=mujoco.mjtSensor.mjSENS_TOUCH,
             objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=f"touch{i}",
+            objname=f"{prefix}touch{i}",
         )
 
 

@@ -214,12 +214,24 @@ def check_start(config: TrialConfig) -> None:
     """
     scene = scene_of(config)
     variation_of(config, scene)
+    if config.scene == TUNNEL:
+        draw_scene(config, scene, 0)
+    else:
+        still_trial(config, scene, GaitParams())
+
+
+def still_trial(config: TrialConfig, scene: Scene, gait: GaitParams) -> tuple[World, SceneInstance]:
+    """Trial 0 without chance: the robot at the start of its scene, at phase 0 of a gait.
+
+    Raises:
+        SceneError: The scene cannot be drawn or built, or the robot does not fit at its start.
+    """
     drawn = draw_scene(config, scene, 0)
-    if config.scene != TUNNEL:
-        with _errors_of(config.scene):
-            world = make_world(config.physics, config.robot, drawn)
-            place_at_start(world, drawn, GaitParams())
-            require_room(world)
+    with _errors_of(config.scene):
+        world = make_world(config.physics, config.robot, drawn)
+        place_at_start(world, drawn, gait)
+        require_room(world)
+    return world, drawn
 
 
 def _drawn(config: TrialConfig, scene: Scene, rng: np.random.Generator) -> SceneInstance:

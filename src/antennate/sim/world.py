@@ -64,14 +64,10 @@ def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
     return spec
 
 
-def compile_world(
+def world_spec(
     physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
-) -> mujoco.MjModel:
-    """Robot in a scene, on a bare floor without one; the head is over the origin.
-
-    Raises:
-        SceneError: The engine cannot compile it.
-    """
+) -> mujoco.MjSpec:
+    """Robot in a scene, uncompiled; on a bare floor without one. The head is over the origin."""
     spec = new_spec(physics)
     if scene is None:
         add_floor(spec)
@@ -80,10 +76,27 @@ def compile_world(
         _meet_robot(spec)
     if robot.elevation_count:
         _feel_floor(spec)
+    add_robot(spec, robot, physics)
+    return spec
+
+
+def add_robot(spec: mujoco.MjSpec, robot: RobotSpec, physics: PhysicsParams) -> None:
+    """Add the robot with its free joint, and give all contacts their stiffness."""
     frame = spec.worldbody.add_frame(pos=[0, 0, axle_height(robot)])
     spec.attach(build_robot(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     set_contacts(spec, physics)
+
+
+def compile_world(
+    physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
+) -> mujoco.MjModel:
+    """The world of `world_spec`, compiled.
+
+    Raises:
+        SceneError: The engine cannot compile it.
+    """
+    spec = world_spec(physics, robot, scene)
     try:
         return spec.compile()
     except ValueError as error:

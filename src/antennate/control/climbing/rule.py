@@ -61,22 +61,22 @@ class ClimbRule:
         self.turn_offset = self._steer.turn_offset
         self.stage: Ints = np.full(batch, int(Stage.WALK))
         self.ground: Ints = np.full(batch, int(Ground.FLOOR))
-        self.height: Floats = np.zeros(batch)
+        self.height: Floats = np.full(batch, np.nan)
         self._since, self._felt, self._free, self._blind = np.zeros((4, batch))
         self._missed: Floats = np.zeros((batch, 2))
         self._missing: Bools = np.zeros((batch, 2), dtype=bool)
         self._passed: Floats = np.full((batch, 2), np.nan)
         self._climbs: Ints = np.zeros(batch, np.int64)
-        self._retreated: Bools = np.zeros(batch, dtype=bool)
+        self._close: Bools = np.zeros(batch, dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
         """Some rows begin anew, walking."""
         self._steer.reset(rows)
         self.stage[rows], self.ground[rows] = Stage.WALK, Ground.FLOOR
-        for memory in (self._since, self._felt, self._missed, self._free, self._blind, self.height):
+        for memory in (self._since, self._felt, self._missed, self._free, self._blind):
             memory[rows] = 0.0
-        self._climbs[rows], self._retreated[rows] = 0, False
-        self._passed[rows] = np.nan
+        self._climbs[rows], self._close[rows] = 0, False
+        self._passed[rows] = self.height[rows] = np.nan
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""
@@ -133,6 +133,8 @@ class ClimbRule:
             return Maneuver.FORWARD
         if self._felt[row] > self._feel.touch_time:
             self._passed[row] = np.nan
+            over = self.height[row] < self._p.lowest  # what it thought to walk over holds it
+            self._close[row] = over and self._since[row] < self._p.over_time
             self._to(row, Stage.PROBE_UP)
         elif self._misses_ground(row) and not above.any():
             self.ground[row] = Ground.DROP
@@ -157,17 +159,13 @@ class ClimbRule:
         self.ground[row] = Ground.STEP_UP
         if self._climbs[row] >= self._p.attempts:
             self._wall(row)
-        elif self.height[row] < self._p.lowest:
+        elif self.height[row] < self._p.lowest and not self._close[row]:
             self._blind[row] = self._p.step_time
             self._to(row, Stage.WALK)
-        elif self._climbs[row] and not self._body.climbs[row] and not self._retreated[row]:
-            self._retreated[row] = True
+        elif (self._climbs[row] or self._close[row]) and not self._body.climbs[row]:
             self._to(row, Stage.RETREAT)
         else:
-            self._retreated[row] = False
-            self._climbs[row] += not self._body.climbs[row]
-            self._body.begin(self._one(row))
-            self._to(row, Stage.LIFT)
+            self._raise(row)
         return Maneuver.HOLD
 
     def _above(self, angle: float) -> float:
@@ -175,6 +173,12 @@ class ClimbRule:
         axle = self._robot.leg_radius + self._robot.leg_eccentricity
         tip = axle + self._robot.antenna.length * math.sin(angle)
         return math.inf if math.isnan(angle) else tip
+
+    def _raise(self, row: int) -> None:
+        """Begin a climb."""
+        self._climbs[row] += not self._body.climbs[row]
+        self._body.begin(self._one(row))
+        self._to(row, Stage.LIFT)
 
     def _lift(self, row: int, flex: Floats, steering: int) -> int:
         """Stand until the head is raised, then the antennae level before it."""
@@ -215,10 +219,10 @@ class ClimbRule:
         return Maneuver.HOLD
 
     def _retreat(self, row: int, flex: Floats, steering: int) -> int:
-        """Back off from a step that was not climbed, to come up to it again."""
-        self._pose(row, self._feel.elevation)
+        """Back off from a step that it stands at, to have room for the head."""
+        self._pose(row, 0.5 * self._feel.highest)
         if self._since[row] > self._p.retreat_time:
-            self._to(row, Stage.WALK)
+            self._raise(row)
         return Maneuver.REVERSE
 
     def _back(self, row: int, flex: Floats, steering: int) -> int:

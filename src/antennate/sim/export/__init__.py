@@ -1,0 +1,1 @@
+"""The robot as files for other programs: MJCF and URDF."""
