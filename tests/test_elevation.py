@@ -18,7 +18,7 @@ from antennate.sim.parts import GROUND_BIT
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.testing import check_robot
-from antennate.types import SIDES, Floats, Maneuver
+from antennate.types import Floats, Maneuver
 
 ROBOT = RobotSpec.named("scuttle3d")
 
@@ -66,7 +66,7 @@ def mirrored(places: Floats) -> bool:
 def test_it_is_a_robot_with_26_servos_that_releases_what_carries_it_last() -> None:
     check_robot(ROBOT)
     assert ROBOT.ids == tuple(range(1, 27))
-    assert ROBOT.joint_names[-2:] == tuple(f"antenna_{side}_elevation" for side in SIDES)
+    assert ROBOT.joint_names[-2:] == ("antenna_l_elevation", "antenna_r_elevation")
     antennae, elevation, yaw, pitch, legs = ROBOT.in_order_of_release
     assert (antennae, elevation) == ((18, 19), (25, 26))
     assert (yaw, pitch, legs) == (tuple(range(1, 6)), tuple(range(20, 25)), tuple(range(6, 18)))
