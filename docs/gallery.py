@@ -47,6 +47,7 @@ FEW = {
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",
+    "dataset": "--trials 20",
     "bench touch": "--trials 1 --speeds 0.15",
     "tunnel": "--trials 1 --time-limit 20",
     "bench wall": "--trials 1",

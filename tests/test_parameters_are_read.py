@@ -30,6 +30,7 @@ RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
 TRACKS = "frame,time,a_x,a_y,b_x,b_y\n" + "".join(
     f"{i},{0.02 * i:.2f},{i},5,{i + 3},4\n" for i in range(30)
 )
+ROWS = "controller,scene,seed,trial,outcome,time_s\nopen,flat+time_limit=0.1,3,0,timeout,0.1\n"
 OTHER_SENSOR = {"kind": "fsr"}
 RISING = {"polarity": 1}
 """What the curve of the other sensor needs."""
@@ -103,6 +104,11 @@ TINY: dict[str, list[dict[str, Any]]] = {
             for scene in ("stairs", "gap", "ramp", "rubble")
         ),
     ],
+    "compete": [
+        {"trials": 1, "controllers": ["open"], "scenes": ["flat+time_limit=0.1"], "hidden": hidden}
+        for hidden in (False, True)
+    ]
+    + [{"check": "rows.csv"}],
     "gait": [
         {
             "cycles": 2,
@@ -202,6 +208,25 @@ TINY: dict[str, list[dict[str, Any]]] = {
         {"rig": {"pushes": 2, "speeds": [0.3]}, "antenna": {"sensor": OTHER_SENSOR}},
         {"recording": "recording.csv"},
     ],
+    "dataset": [
+        {
+            "trials": 10,
+            "kinds": ["walk"] if sensor else ["walk", "gap", "push"],
+            "walk": {"time": 2.5, "windows": 2, "stride": 0.5},
+            "robot": {
+                "yaw": {"servo": servo},
+                "antenna": {"sensor": sensor},
+                "legs": {"kind": kind, "servo": "xl430_w250"},
+                "elevation": {"kind": "pair"},
+            },
+            "physics": {"timestep": 0.0025, "contact_time": 0.005},
+            "bench": {"timestep": 0.002, "contact_time": 0.004},
+        }
+        for servo, sensor, kind in (
+            ("xl330_m288", OTHER_SENSOR, "lifting"),
+            ("xc430_w240", {}, "rolling"),
+        )
+    ],
     "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
     "servo": [
         {"recording": ["servo.json"], "fit": True},
@@ -244,6 +269,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     told = of_twin(Path("servo.json"), 1200, 400, 0.5, 1.5).read_text()
     Path("silent.json").write_text(told.replace("input_volts", "volts"))
     Path("tracks.csv").write_text(TRACKS)
+    Path("rows.csv").write_text(ROWS)
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
     for module in (loads, force):  # a bisection that is given no configuration, and takes long
         monkeypatch.setattr(module, "largest_force", lambda chain, limit: 0.05)

@@ -293,7 +293,33 @@ twin --fault esp32=left :: --fault: expected a reading of 0 to 65535 :: found 'e
 twin --fault esp32=right:-1 :: --fault: expected a reading of 0 to 65535 :: found 'esp32=right:-1'
 twin --fault esp32=ber :: --fault: expected a share of 0 to 1 :: found 'esp32=ber'
 """
-TOPICS = [NAMES, VALUES, LISTS, TOGETHER, KNOWLEDGE, NOT_READ, HEXAPOD, BENCH, ANTENNA, ROBOT, TWIN]
+DATASET = """
+dataset --held-out-profile descending :: held_out_profile: expected another one than profile :: found descending twice
+dataset --held-out-speeds 1.0 1.4 :: held_out_speeds: expected a range apart from speeds, 0.8 to 1.1 :: found 1 to 1.4
+dataset --walk.windows 9 :: walk.time: expected room for 9 windows :: found 6 s
+dataset --trials 5 :: --trials: expected a number of at least 10, found 5
+dataset --kinds walk walk :: kinds must differ
+dataset --gait.frequency 0.9 :: gait.frequency: expected at most 1 Hz :: found 1.35 Hz
+dataset --robot.antenna.roll 0.5 :: robot.antenna.roll: expected 0 :: found 0.5
+dataset --push.depth 0.3 0.1 :: push.depth: expected a range that rises, found 0.3 and 0.1
+dataset --robot hexapod :: robot.antennae.kind: expected a pair of antennae, found none
+dataset --bench.timestep 0.003 :: bench
+dataset --antenna.radius 0.01 :: --robot.antenna.radius
+"""
+TOPICS = [
+    NAMES,
+    VALUES,
+    LISTS,
+    TOGETHER,
+    KNOWLEDGE,
+    NOT_READ,
+    HEXAPOD,
+    BENCH,
+    DATASET,
+    ANTENNA,
+    ROBOT,
+    TWIN,
+]
 ROWS = [line.split(" :: ") for topic in TOPICS for line in topic.strip().splitlines()]
 
 

@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.standings import CONTROLLER, PAIR
+from antennate.experiments.dataset.episodes import EpisodeRow
+from antennate.experiments.dataset.experiment import KIND
 from antennate.experiments.force.experiment import MEASURES as FORCE
 from antennate.experiments.force.experiment import TraverseRow
 from antennate.experiments.gait.experiment import MANEUVER
@@ -25,17 +29,21 @@ from antennate.studies.measures import Measure, count, mean, shown, summarise
 DOCS = Path(__file__).parents[1] / "docs"
 MEASURES = {
     ("results.md", "tunnel"): (*tunnel.CONTROLLER, *tunnel.PAIR),
+    ("results.md", "compete"): (*CONTROLLER, *PAIR),
     ("results.md", "gait"): MANEUVER,
     ("results.md", "geometry"): geometry.GAIT,
     ("results.md", "wall"): (*wall.PROFILE, *wall.PAIR),
     ("results.md", "touch"): (*PROFILE, *AVERAGING),
     ("results.md", "force"): FORCE,
+    ("results.md", "dataset"): KIND,
 }
 ROWS = {
     ("results.md", "tunnel"): TrialResult,
+    ("results.md", "compete"): Episode,
     ("results.md", "geometry"): Walked,
     ("results.md", "wall"): WallTrial,
     ("results.md", "force"): TraverseRow,
+    ("results.md", "dataset"): EpisodeRow,
     ("tracks.md", "tracks"): TrackRow,
 }
 

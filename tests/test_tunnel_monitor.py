@@ -18,7 +18,9 @@ def walked(heads: list[tuple[float, float]], bends: np.ndarray) -> Any:
     """The row of a robot whose head was seen at these places of a bent corridor of 1 + 1 m."""
     scene = Route(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]))
     monitor = TrialMonitor(0, 0, "open", scene, [], 100.0)
-    world: Any = SimpleNamespace(t=1.0, robot=RobotSpec(), obstacle_force=lambda: 0.0)
+    world: Any = SimpleNamespace(
+        t=1.0, robot=RobotSpec(), obstacle_force=lambda: 0.0, overturned=False
+    )
     for angles in bends:
         world.bends = lambda angles=angles: angles
         monitor.bend(world)

@@ -17,7 +17,7 @@ from typing import Any
 from corridors import HERE, OURS, Rows, against, alone, row, rows_of, shares, written
 
 from antennate.sim.scenes.registry import HARD
-from antennate.studies.statistics import difference95
+from antennate.studies.statistics import difference95, holm
 
 SIDE = "timed, knows side"
 RIVALS = ("schedule", "timed 12 s", "timed 5 s")
@@ -46,12 +46,9 @@ def judged(scenes: dict[str, Rows]) -> dict[str, Any]:
         result[scene] = {"controllers": alones, "best": best, "pair": pair}
         if SIDE in rows:
             result[scene]["saved"] = saved(rows)
-    order = sorted(result, key=lambda scene: result[scene]["pair"]["wilcoxon_p"])
-    least = 0.0
-    for rank, scene in enumerate(order):
-        pair = result[scene]["pair"]
-        least = max(least, min(1.0, (len(order) - rank) * pair["wilcoxon_p"]))
-        pair["holm_p"] = least
+    raised = holm([cell["pair"]["wilcoxon_p"] for cell in result.values()])
+    for cell, p in zip(result.values(), raised, strict=True):
+        cell["pair"]["holm_p"] = p
     return result
 
 

@@ -56,8 +56,8 @@ _GROUPS = {
 """Groups that are no command of their own."""
 _FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
 _EXPERIMENTS = (
-    *("tunnel", "gait", "geometry", "calibrate", "bench", "antenna", "study"),
-    *("reproduce", "tracks", "servo"),
+    *("tunnel", "compete", "gait", "geometry", "calibrate", "bench", "antenna", "study"),
+    *("dataset", "reproduce", "tracks", "servo"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}

@@ -98,6 +98,7 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
     """Fields of the options that this experiment has not."""
     has = {
         OF_WORKERS: experiment.on_workers,
+        ("engine", "slurm"): experiment.anywhere,
         ("shard",): experiment.in_shards,
         ("video", "video_trial"): experiment.films is not None,
         ("video_view",): experiment.films is not None and "robot" in experiment.config.model_fields,
@@ -128,6 +129,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
             f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
             "found none"
         )
+    config = experiment.settled(config, options.out if options.resume or options.retry else None)
     experiment.check(config)
     if options.video:
         require_films(experiment, config, options.video_trial)

@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,18 +21,13 @@ from antennate.cli.pages import MODULE, FoxgloveOptions
 from antennate.cli.results import ResultOptions, log_of, show_result
 from antennate.cli.terminal import progress, stop_signals
 from antennate.control.readings import condition
-from antennate.errors import (
-    AntennateError,
-    ConfigError,
-    MissingPackageError,
-    OutputError,
-    reason,
-)
+from antennate.errors import AntennateError, ConfigError, OutputError, reason
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
-from antennate.messages import command_words, extra, one_line, shortened, typed
+from antennate.messages import command_words, one_line, shortened, typed
 from antennate.params.base import Params, from_values
 from antennate.studies.formats import csv_lines
 from antennate.studies.measures import Table
+from antennate.studies.parquet import require_parquet
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
@@ -180,14 +174,7 @@ def _export(path: Path, target: Path) -> LogReader:
 
 def _write_parquet(target: Path, rows: Iterator[Mapping[str, Any]]) -> None:
     """A Parquet file with a column for each number, written in groups of rows."""
-    try:
-        arrow: Any = import_module("pyarrow")
-        parquet: Any = import_module("pyarrow.parquet")
-    except ImportError:
-        raise MissingPackageError(
-            f"{target}: expected the package pyarrow, found none; install it with "
-            f"{extra('parquet')}, or write a .csv"
-        ) from None
+    arrow, parquet = require_parquet(str(target), ", or write a .csv")
     with writing_whole(target, overwrite=True) as file:
         first = arrow.Table.from_pylist(list(islice(rows, _ROWS)))
         with parquet.ParquetWriter(file, first.schema) as out:

@@ -143,13 +143,12 @@ class MapRule:
 
 
 class Rule(Protocol):
-    """The decision of a controller.
+    """The decision of a controller."""
 
-    Attributes:
-        turn_offset: Yaw offset of its turns [rad].
-    """
-
-    turn_offset: float
+    @property
+    def turn_offset(self) -> Floats | float:
+        """Yaw offset of its turns [rad], one for all rows or of shape (B,)."""
+        ...
 
     def reset(self, rows: Ints | Bools) -> None:
         """Forget everything about some rows."""
@@ -183,7 +182,7 @@ class Moves(Protocol):
         """Start some rows anew at a phase [rad]."""
         ...
 
-    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """The targets of a maneuver each, shape (B,); HOLD keeps them.
 
         Args:

@@ -139,8 +139,17 @@ class Gait:
             turn_offset: Yaw offset of the turns [rad], the gait's own if absent.
         """
         size = self.params.turn_offset if turn_offset is None else turn_offset
+        return self.steer(maneuver, STEER[maneuver] * size)
+
+    def steer(self, maneuver: Ints, goal: Floats) -> JointCommand:
+        """Advance one control period while the offset goes to a goal, and return the targets.
+
+        Args:
+            maneuver: One `Maneuver` a row, shape (B,); it decides the sense of the phase alone.
+            goal: Yaw offset to go to [rad], positive to the right, shape (B,).
+        """
         moves = _STEERS[maneuver]
-        change = STEER[maneuver] * size - self.offset
+        change = goal - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * moves
         self.phase += DIRECTION[maneuver] * self._advance

@@ -92,7 +92,7 @@ class TwoGaits:
         self.wave[rows] = self._goals[0]
         self.bent[rows] = self._sweep[rows] = 0.0
 
-    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """Advance one control period and return the targets; HOLD keeps the command."""
         moves = (maneuver != int(Maneuver.HOLD))[:, None]
         goal = self._goals[(STEER[maneuver] != 0.0).astype(int)]

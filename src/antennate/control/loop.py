@@ -208,33 +208,15 @@ class CheckedController:
             self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {level[row]}"
 
 
-class Retunable:
-    """A controller of one robot that is made anew with other numbers and keeps its gait phase.
-
-    What it remembered is forgotten then: means, the maneuver that it held, an escape.
+class Wrapped:
+    """A controller that stands before another one, and answers as that does.
 
     Args:
-        make: Makes the controller of such numbers.
-        control: The numbers at first.
-
-    Attributes:
-        control: The numbers in force.
+        made: The other one.
     """
 
-    def __init__(self, make: Callable[[ControlParams], Controller], control: ControlParams) -> None:
-        self._make, self.control = make, control
-        self._made = make(control)
-
-    def retune(self, control: ControlParams) -> None:
-        """Go on with other numbers.
-
-        Raises:
-            ConfigError: There is no such controller with these.
-        """
-        phase: Any = getattr(self._made, "phase", None)
-        self._made = self._make(control)
-        self.control = control
-        self._made.reset(np.array([0]), 0.0 if phase is None else np.array(phase))
+    def __init__(self, made: Controller) -> None:
+        self._made = made
 
     @property
     def maneuver(self) -> Ints:
@@ -253,7 +235,7 @@ class Retunable:
 
     @property
     def phase(self) -> Floats | None:
-        """Gait phase [rad], shape (1,); None if the controller tells none."""
+        """Gait phase [rad], shape (B,); None if the controller tells none."""
         return getattr(self._made, "phase", None)
 
     @property
@@ -278,3 +260,32 @@ class Retunable:
     def step(self, frame: AntennaFrame) -> JointCommand:
         """As of a `Controller`."""
         return self._made.step(frame)
+
+
+class Retunable(Wrapped):
+    """A controller of one robot that is made anew with other numbers and keeps its gait phase.
+
+    What it remembered is forgotten then: means, the maneuver that it held, an escape.
+
+    Args:
+        make: Makes the controller of such numbers.
+        control: The numbers at first.
+
+    Attributes:
+        control: The numbers in force.
+    """
+
+    def __init__(self, make: Callable[[ControlParams], Controller], control: ControlParams) -> None:
+        self._make, self.control = make, control
+        super().__init__(make(control))
+
+    def retune(self, control: ControlParams) -> None:
+        """Go on with other numbers.
+
+        Raises:
+            ConfigError: There is no such controller with these.
+        """
+        phase: Any = getattr(self._made, "phase", None)
+        self._made = self._make(control)
+        self.control = control
+        self._made.reset(np.array([0]), 0.0 if phase is None else np.array(phase))

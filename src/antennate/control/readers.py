@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from antennate.params.base import paths_of
 from antennate.params.climb import ClimbParams
 from antennate.params.control import (
+    CentreParams,
     ControlParams,
     EscapeParams,
+    FollowParams,
     GeometricParams,
     RandomParams,
     RepetitionParams,
@@ -98,8 +100,11 @@ _TIMED = paths_of(TimedParams, "timed")
 _SCHEDULE = paths_of(ScheduleParams, "schedule")
 _ZIGZAG = paths_of(ZigzagParams, "zigzag")
 _RANDOM = paths_of(RandomParams, "random")
+_FOLLOW = paths_of(FollowParams, "follow")
+_CENTRE = paths_of(CentreParams, "centre")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
-_CLIMB = paths_of(ClimbParams, "climb")
+_OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *paths_of(ClimbParams, "climb"))
+"""Groups of single controllers, and of those that climb."""
 _GEOMETRIC = paths_of(GeometricParams, "geometric")
 _SEARCH = (*paths_of(SearchParams, "search"), *_GEOMETRIC)
 _SIZES = (
@@ -122,26 +127,27 @@ _FELT = (
 
 
 def _without(read: tuple[str, ...], *others: str) -> tuple[str, ...]:
-    """Parameters of the blind controllers but those that one of them reads, and others."""
-    rest = (path for path in _BLIND if path not in read)
-    return (*_TABLE, *_SEARCH, *_CLIMB, *rest, *others)
+    """Parameters of single controllers but those that one of them reads, and others."""
+    return (*_TABLE, *_SEARCH, *(path for path in _OTHERS if path not in read), *others)
 
 
 _MAP = ("escape.reverse_time", "escape.return_time", "escape.turn_offset")
 """Of an escape what `map` reads."""
 UNREAD: Mapping[str, tuple[str, ...]] = {
-    "open": (*_TABLE, *_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
+    "open": (*_TABLE, *_ESCAPE, *_OTHERS, *_SEARCH),
     "timed": _without(_TIMED, *_FELT),
-    "paper": (*_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
-    "closed": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_GEOMETRIC, *_CLIMB),
-    "geometric": (*_TABLE, *_BLIND, *_OTHER_ESCAPE, *_SIZES, *_CLIMB),
-    "closed-1": (*_TABLE, *_BLIND, *_SEARCH, *_CLIMB),
-    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_BLIND, *_SEARCH, *_CLIMB),
+    "paper": (*_ESCAPE, *_OTHERS, *_SEARCH),
+    "closed": (*_TABLE, *_OTHERS, *_OTHER_ESCAPE, *_GEOMETRIC),
+    "geometric": (*_TABLE, *_OTHERS, *_OTHER_ESCAPE, *_SIZES),
+    "closed-1": (*_TABLE, *_OTHERS, *_SEARCH),
+    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_OTHERS, *_SEARCH),
     "schedule": _without(_SCHEDULE, *_TURNING),
+    "follow": _without(_FOLLOW, *_TURNING),
+    "centre": _without(_CENTRE, *_TURNING),
     "zigzag": _without(_ZIGZAG, *_TURNING),
     "random": _without(_RANDOM, *_TURNING),
-    "map": (*_TABLE, *_BLIND, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP), *_CLIMB),
-    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_BLIND, *_SEARCH, *_CLIMB),
+    "map": (*_TABLE, *_OTHERS, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
+    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from antennate import checks
-from antennate.control import blind, controllers, geometric
+from antennate.control import blind, controllers, geometric, steering
 from antennate.control.climbing import controllers as climbing
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, raised
@@ -27,6 +27,8 @@ BUILT_IN: dict[str, ControllerFactory] = {
     "closed": controllers.closed_loop,
     "closed-1": controllers.closed_1,
     "geometric": geometric.geometric,
+    "follow": steering.follow,
+    "centre": steering.centre,
     "schedule": blind.schedule,
     "zigzag": blind.zigzag,
     "random": blind.RandomController,
@@ -49,6 +51,8 @@ ABOUT = {
     "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
     "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
     "geometric": "closed by a faster gait; its escapes are in metres and degrees, by a model",
+    "follow": "steers along a wall that one antenna feels, by PD control; it never backs off",
+    "centre": "steers away from the antenna that is bent more, by as much; it never backs off",
     "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
     "zigzag": "blind: turns right and left by the clock, always by as much",
     "random": "blind: backs off and turns at random times, to random sides, by random angles",

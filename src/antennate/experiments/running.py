@@ -147,8 +147,9 @@ def run(
         if given and out is None:
             raise ConfigError(f"{name}: expected out beside it, found none")
     experiment, config = _configured(name_or_config, settings)
+    config = experiment.settled(config, out if resume else None)
     experiment.check(config)
-    if engine != LOCAL and not experiment.on_workers:
+    if engine != LOCAL and not (experiment.on_workers and experiment.anywhere):
         raise ConfigError(
             f"engine: expected an experiment that runs trials on workers, found {experiment.name}"
         )

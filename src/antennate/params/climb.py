@@ -80,7 +80,9 @@ class ClimbParams(Params):
     """
 
     feel: FeelParams = FeelParams()
-    rise: float = number(0.15, "m", "assumed: the highest that is to be climbed", gt=0, le=0.3)
+    rise: float = number(
+        0.17, "m", "fitted: antennate climb; 0.15 is to be climbed, and the body sags", gt=0, le=0.3
+    )
     """Step for which it is raised, whatever the height."""
     ramp: float = number(0.24, "m", "fitted: antennate climb, true position", gt=0.05, le=1)
     """Length over which the line rises."""
@@ -97,7 +99,11 @@ class ClimbParams(Params):
     amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
     """Largest change of that amplitude."""
     pace: float = number(
-        0.05, "m/s", "fitted: antennate climb; 0.03 is as sure, 0.12 loses the edge", gt=0, le=0.5
+        0.035,
+        "m/s",
+        "fitted: antennate climb; at 0.05 a robot that slips back loses the edge",
+        gt=0,
+        le=0.5,
     )
     """Speed of the plan along the way."""
     ahead: float = number(

@@ -300,6 +300,48 @@ class GeometricParams(Params):
     """Share of the amplitude that is given up where an antenna is fully bent."""
 
 
+class FollowParams(Params):
+    """How `follow` keeps one antenna at a wall: PD control of its flex."""
+
+    side: Literal["left", "right"] = number(
+        "right", "1", "assumed: scenes are mirrored by chance, so neither side is better"
+    )
+    """Antenna that follows a wall."""
+    bend: float = number(0.15, "1", "assumed: half of what a grazed wall gives", ge=0, le=1)
+    """Flex that it keeps, as a share of the calibrated range."""
+    gain: float = number(
+        2.0,
+        "rad",
+        "fitted: least time of 7 pairs on 18 public draws, within chance (docs/controllers.md)",
+        ge=0,
+        le=20,
+    )
+    """Yaw offset for a flex that is off by the whole range (P)."""
+    rate_gain: float = number(1.0, "rad*s", "fitted: as gain, with it", ge=0, le=20)
+    """Yaw offset for a flex that changes by the whole range in a second (D)."""
+    smoothing_time: float = number(
+        0.8, "s", "assumed: half a gait cycle, as the head swings with the gait", gt=0, le=10
+    )
+    """Time constant of the low-pass that both terms are taken behind."""
+
+
+class CentreParams(Params):
+    """How `centre` keeps between two walls: PD control of the difference of both flexes."""
+
+    gain: float = number(
+        1.0,
+        "rad",
+        "fitted: less time than 2 on 18 public draws, within chance (docs/controllers.md)",
+        ge=0,
+        le=20,
+    )
+    """Yaw offset for flexes that differ by the whole range (P)."""
+    rate_gain: float = number(0.0, "rad*s", "assumed: off; not tried", ge=0, le=20)
+    """Yaw offset for a difference that changes by the whole range in a second (D)."""
+    smoothing_time: float = number(0.8, "s", "assumed: as follow.smoothing_time", gt=0, le=10)
+    """Time constant of the low-pass that both terms are taken behind."""
+
+
 class ControlParams(Params):
     """Conditioning, contact rule, maneuvers and gait of the controllers."""
 
@@ -314,6 +356,8 @@ class ControlParams(Params):
     escape: EscapeParams = EscapeParams()
     search: SearchParams = SearchParams()
     geometric: GeometricParams = GeometricParams()
+    follow: FollowParams = FollowParams()
+    centre: CentreParams = CentreParams()
     timed: TimedParams = TimedParams()
     schedule: ScheduleParams = ScheduleParams()
     zigzag: ZigzagParams = ZigzagParams()

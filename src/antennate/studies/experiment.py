@@ -263,6 +263,8 @@ class Experiment(Generic[Config, Found]):
         sentence: One plain sentence: what came out, and how sure it is.
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
+        settled: settled(config, folder) -> the configuration with what chance decides before a run,
+            as of the run that goes on in a folder; None where none does.
         check: Raises if a configuration cannot be run; called before anything is written.
         failed: Whether a result says nothing, so that the command ends with exit code 2.
         parts: What `on_step` counts.
@@ -277,6 +279,7 @@ class Experiment(Generic[Config, Found]):
         explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
+        anywhere: Whether workers may be elsewhere than in processes of this machine.
         tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
             trials; None if it is the list of `trials`, or if a run does not go on with more.
         in_shards: Whether its trials are known from the start, so that shards can divide them.
@@ -289,7 +292,8 @@ class Experiment(Generic[Config, Found]):
     tables: Callable[[Mapping[str, Any]], Sequence[Table]]
     sentence: Callable[[Mapping[str, Any]], str]
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
-    files: Callable[[Found], Mapping[str, str]] = lambda outcome: {}
+    files: Callable[[Found], Mapping[str, str | bytes]] = lambda outcome: {}
+    settled: Callable[[Config, Path | None], Config] = lambda config, folder: config
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
     parts: str = "trials"
@@ -303,6 +307,7 @@ class Experiment(Generic[Config, Found]):
     explained: str = ""
     captions: Mapping[str, str] = field(default_factory=dict)
     on_workers: bool = True
+    anywhere: bool = True
     in_shards: bool = True
     tasks: Callable[[Config], Sequence[Any]] | None = None
 

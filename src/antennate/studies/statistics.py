@@ -166,6 +166,19 @@ def mcnemar(ok: Bools) -> Discordance:
     return Discordance(only_first, only_second, p)
 
 
+def holm(p: Sequence[float]) -> list[float]:
+    """P values of several tests, raised so that one false rejection among them stays unlikely.
+
+    Holm (1979), Scandinavian Journal of Statistics 6, 65-70: the k-th smallest of m is multiplied
+    by m - k + 1, and none is smaller than the one before it.
+    """
+    raised, least = [0.0] * len(p), 0.0
+    for rank, place in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
+        least = max(least, min(1.0, (len(p) - rank) * p[place]))
+        raised[place] = least
+    return raised
+
+
 def signed_rank(difference: Floats) -> float:
     """Two-sided p of Wilcoxon's signed-rank test on differences (n,), with Pratt's ranks.
 

@@ -138,7 +138,7 @@ class Body:
         lower = np.maximum(self.rise - self._params.sink_rate * self._period, 0.0)
         self.rise = np.where(rows[:, None] & self.behind, lower, self.rise)
 
-    def step(self, maneuver: Ints, turn_offset: float | None = None) -> JointCommand:
+    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""
         wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
         change = self._params.amplitude_rate * self._period

@@ -89,7 +89,7 @@ def drag(
                 break
             if force > 0.0:
                 last = bench.t
-                rows.append((bench.flex(), force, _place(bench.joints(), post), last))
+                rows.append((bench.flex(), force, place_along(bench.joints(), post), last))
     except SimulationError as error:
         none = np.zeros(0)
         return Traverse(none, none, none, none, str(error))
@@ -107,7 +107,7 @@ def way(t: float, speed: float) -> float:
     return speed * (t * t / (2 * _RISE) if t < _RISE else t - _RISE / 2)
 
 
-def _place(joints: Floats, post: Ball) -> float:
+def place_along(joints: Floats, post: Ball) -> float:
     """Where along the antenna lies the point nearest to the post, over its length."""
     starts, sides = joints[:-1], np.diff(joints, axis=0)
     square = (sides**2).sum(axis=1)

@@ -56,8 +56,9 @@ class TunnelConfig(TrialConfig):
         min_length=1,
         examples=[*BUILT_IN, *PRIVILEGED],
     )
-    """Controllers to run: open, timed, paper, closed, closed-1, geometric, schedule, zigzag,
-    random, map, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
+    """Controllers to run: open, timed, paper, closed, closed-1, geometric, follow, centre,
+    schedule, zigzag, random, map, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned
+    policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )
@@ -151,6 +152,7 @@ class TrialResult:
             negative where it was bent the other way too.
         spring_high_n_m: That largest torque [N·m], of looks at every tick.
         spring_cycles: Load cycles of that spring, see `largest_load`.
+        overturned: Whether the robot lies on its back at the end.
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -174,6 +176,7 @@ class TrialResult:
     spring_low_n_m: float = 0.0
     spring_high_n_m: float = 0.0
     spring_cycles: int = 0
+    overturned: bool = False
     reason: str = ""
 
 
@@ -314,6 +317,7 @@ class TrialMonitor:
             spring_low_n_m=round(load.low, 9),
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,
+            overturned=world.overturned,
             reason=reason,
         )
 

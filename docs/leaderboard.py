@@ -1,0 +1,83 @@
+"""Write the board of docs/leaderboard.md from docs/leaderboard.csv; with --check only compare it.
+
+The table holds the rows of one run or more of `antennate compete`, as their trials.csv has them.
+What stands outside of the two marks is written by hand. Without --check it draws the figures, too.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from generated import finish
+
+from antennate.experiments.compete.checking import read_rows
+from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig
+from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.page import markdown, sentence
+from antennate.experiments.compete.standings import standings
+
+HERE = Path(__file__).parent
+ROWS = Path(__file__).with_suffix(".csv")
+BEGIN, END = "<!-- board: python docs/leaderboard.py -->", "<!-- end of board -->"
+WHOLE = 100
+"""Draws of each scene that a board needs; with fewer it is preliminary."""
+
+
+def result_of(rows: Sequence[Episode]) -> dict[str, Any]:
+    """The standing of these rows, with what a page says of the run."""
+    config = CompeteConfig()
+    seeds = list(dict.fromkeys(row.seed for row in rows))
+    return {
+        **standings(rows, config.tie),
+        "seeds": seeds,
+        "hidden": not set(seeds) & set(DEVELOPMENT),
+        "check": None,
+    }
+
+
+def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
+    """What stands between the marks."""
+    counts = [c["episodes"] for cells in result["scenes"].values() for c in cells.values()]
+    kinds = {
+        name: ", ".join(sorted({getattr(row, name) for row in rows}))
+        for name in ("version", "engine", "processor")
+    }
+    least, most = min(counts), max(counts)
+    draws = f"{least}" if least == most else f"{least} to {most}"
+    parts = []
+    if least < WHOLE:
+        parts.append(
+            f"**Preliminary**: {draws} draw{'s' * (most > 1)} of each scene and controller, where "
+            f"a board has {WHOLE}. Ranks whose intervals overlap are not told apart."
+        )
+    parts += [
+        sentence(result),
+        markdown(result),
+        f"{len(rows)} episodes of antennate {kinds['version']}, MuJoCo "
+        f"{kinds['engine']}, {kinds['processor']}. Every row is in `docs/leaderboard.csv`.",
+    ]
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    """Write the page and the figures, or compare the page."""
+    rows = read_rows(ROWS)
+    result = result_of(rows)
+    page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    text = f"{before}{BEGIN}\n{board(rows, result)}\n{END}{after}"
+    if "--check" not in sys.argv[1:]:
+        from antennate.experiments.compete.figure import drawn
+        from antennate.figures import render
+
+        for name, figure in drawn(result, rows).items():
+            (HERE / "images" / f"leaderboard-{name}.png").write_bytes(render(figure)["png"])
+    finish(__file__, text, name="leaderboard.md")
+
+
+if __name__ == "__main__":
+    main()

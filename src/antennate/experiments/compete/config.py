@@ -1,0 +1,130 @@
+"""What is run: controllers, scenes and draws; and the seeds that nobody could tune on."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pydantic import field_validator, model_validator
+
+from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED
+from antennate.params.base import Params, number, read_file, require_different
+from antennate.sim.scenes.registry import SHIPPED, check_name
+from antennate.studies.run_files import CONFIG
+
+DEVELOPMENT = range(600_000, 600_100)
+"""Public seeds, to tune on; hidden ones are never among them."""
+RESERVED = range(700_000, 800_000)
+"""Seeds that are kept for evaluations by others; hidden ones are never among them."""
+_SEEDS = 2**31
+"""Hidden seeds lie below that."""
+CONTROLLERS_OF_BOARD = (
+    *("open", "timed", "schedule", "paper", "closed", "geometric", "follow", "centre"),
+    "map",
+)
+SCENES_OF_BOARD = (
+    *("uturn", "corner", "deadend", "room", "heavy"),
+    "uturn+variation.broken=random",
+    "uturn+variation.reading_noise=3",
+    "uturn+readings=delayed:0.02",
+)
+"""Five of the hard set, and one of them with a broken antenna, with three times the noise, and with
+readings that are 15 ms late, which at 100 Hz are used two ticks later."""
+
+
+class CompeteConfig(Params):
+    """Everything that decides the outcome of `antennate compete`."""
+
+    controllers: tuple[str, ...] = number(
+        CONTROLLERS_OF_BOARD,
+        "1",
+        "assumed: rules by touch, blind ones, and one with a map",
+        min_length=1,
+        examples=[*BUILT_IN, *PRIVILEGED],
+    )
+    """Controllers: names of `tunnel --controllers`, those of installed packages, MODULE:NAME,
+    FILE.py:NAME, or FILE.onnx."""
+    scenes: tuple[str, ...] = number(
+        SCENES_OF_BOARD,
+        "1",
+        "assumed: those that our controllers do not all cross (docs/science/corridors.md)",
+        min_length=1,
+        examples=[*SHIPPED],
+    )
+    """Scenes: names of `tunnel --scene`, each with other parameters behind a +, as
+    uturn+variation.reading_noise=3."""
+    trials: int = number(10, "1", "assumed: to look; a board takes 100", ge=1, le=100_000)
+    """Trials of every controller in every scene."""
+    seed: int = number(
+        DEVELOPMENT.start, "1", "assumed: the first of the public seeds, 600000 to 600099", ge=0
+    )
+    """Seed of all chance; with `hidden` the one that was drawn."""
+    hidden: bool = number(False, "1", "assumed: to develop on public seeds")
+    """Draw the seed from the system's entropy when the run begins; the result publishes it."""
+    decision_limit: float = number(
+        0.05, "s", "assumed: five control periods, after which readings are stale", gt=0, le=60
+    )
+    """Processor time that a decision may take; waiting is given 20 times as long."""
+    tie: float = number(
+        0.01,
+        "1",
+        "measured: two processors, 200 and 198 successes of the same 200 draws",
+        ge=0,
+        le=1,
+    )
+    """Success shares that differ by no more than this are a tie."""
+    check: str | None = number(None, "1", "assumed: no file", metavar="FILE")
+    """Table of trials, trials.csv of a run, whose rows are run again and compared."""
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What the file says, where there is one."""
+        names = ("controllers", "scenes", "trials", "seed", "hidden") if self.check else ()
+        return dict.fromkeys(names, "the file of check says it")
+
+    @field_validator("controllers")
+    @classmethod
+    def _known_controllers(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(CONTROLLERS.check, names))
+
+    @field_validator("scenes")
+    @classmethod
+    def _known_scenes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            check_name(name.partition("+")[0])
+        return names
+
+    @model_validator(mode="after")
+    def _agree(self) -> CompeteConfig:
+        require_different("controllers", self.controllers)
+        require_different("scenes", self.scenes)
+        return self
+
+
+def hidden_seed(draw: Callable[[int], int] = secrets.randbelow) -> int:
+    """A seed that nobody knew: neither public nor reserved.
+
+    Args:
+        draw: draw(n) -> a number of 0 to n - 1, from the entropy of the system if not given.
+    """
+    while (seed := draw(_SEEDS)) in DEVELOPMENT or seed in RESERVED:
+        pass
+    return seed
+
+
+def settled(config: CompeteConfig, folder: Path | None) -> CompeteConfig:
+    """The configuration with its hidden seed: that of the run that goes on, or a fresh one.
+
+    A hidden run with a seed of its own is one that is known already, and keeps it.
+
+    Raises:
+        ConfigError: The configuration in the folder cannot be read.
+    """
+    if not config.hidden or config.seed != DEVELOPMENT.start:
+        return config
+    known = None if folder is None else folder / CONFIG
+    if known is not None and known.is_file():
+        seed = read_file(known, CompeteConfig).seed
+    else:
+        seed = hidden_seed()
+    return config.model_copy(update={"seed": seed})

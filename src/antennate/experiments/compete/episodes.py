@@ -1,0 +1,183 @@
+"""One episode: a controller in one draw of a scene, with a time limit for each decision.
+
+A decision has to be there before the readings are stale. Its time is that of the processor, so that
+a machine with other work to do judges alike; who waits or sleeps in a decision is stopped by the
+clock, after `WAITING` times as long, and so is the first decision, in which libraries are loaded.
+Episodes run in lockstep, and a step of all that stays within the limit of one is within it for
+each. After one that does not, each episode runs alone, and is INVALID where its own decision takes
+too long.
+"""
+
+from __future__ import annotations
+
+import functools
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from antennate import __version__
+from antennate.control.loop import Wrapped
+from antennate.control.readings import condition
+from antennate.control.registry import make_controller
+from antennate.errors import ControllerError
+from antennate.experiments.compete.scenes import tunnel_config
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.physics import TrialResult
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.scene import TIME_LIMIT
+from antennate.studies.work import processor
+from antennate.telemetry.header import versions
+from antennate.types import AntennaFrame, Controller, JointCommand
+
+WAITING = 20.0
+"""How many times as long a decision may take on the clock as on the processor; the first one may
+take so long on the processor, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One row of the table.
+
+    Attributes:
+        controller: Name of the controller.
+        scene: The scene, with its other parameters if it has some.
+        seed: Seed of the run; with `trial` and `scene` it decides all chance.
+        trial: Number of the draw.
+        outcome: success, timeout, left, or invalid, which counts as a failure.
+        time_s: Time to the exit [s]; the limit for every failure.
+        limit_s: Time limit [s].
+        progress_m: How far the head came [m].
+        overturned: Whether the robot lies on its back at the end.
+        given: What the simulation gave to the controller, in words; empty for its readings alone.
+        version: Version of antennate.
+        engine: Version of MuJoCo.
+        processor: Model of the processor.
+        reason: Why it is invalid; empty otherwise.
+    """
+
+    controller: str
+    scene: str
+    seed: int
+    trial: int
+    outcome: str
+    time_s: float
+    limit_s: float = TIME_LIMIT
+    progress_m: float = 0.0
+    overturned: bool = False
+    given: str = ""
+    version: str = __version__
+    engine: str = ""
+    processor: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What an episode is run from: its key, the limit of a decision [s], and what it is given."""
+
+    controller: str
+    scene: str
+    seed: int
+    trial: int
+    decision_limit: float
+    given: str = ""
+
+
+class Timed(Wrapped):
+    """A controller whose decisions must not take longer than a limit.
+
+    Args:
+        made: The controller.
+        limit: Processor time of a step [s].
+
+    Raises:
+        ControllerError: In a step that took longer.
+    """
+
+    def __init__(self, made: Controller, limit: float) -> None:
+        super().__init__(made)
+        self._limit, self._begun = limit, False
+        self._alarm = threading.current_thread() is threading.main_thread()
+        if self._alarm:
+            signal.signal(signal.SIGALRM, self._give_up)
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """As of a `Controller`."""
+        if self._alarm:
+            signal.setitimer(signal.ITIMER_REAL, WAITING * self._limit)
+        begin = time.process_time()
+        try:
+            command = self._made.step(frame)
+            used = time.process_time() - begin
+        finally:
+            if self._alarm:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if used > self._limit * (1.0 if self._begun else WAITING):
+            self._give_up()
+        self._begun = True
+        return command
+
+    def _give_up(self, *_: object) -> None:
+        raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
+
+
+def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None]) -> None:
+    """Run some episodes of one controller in this process, those of one scene in lockstep.
+
+    Args:
+        draws: What they are run from, each as the only argument of a task.
+        emit: Takes the place of each and its row as it ends.
+    """
+    cells: dict[tuple[str, str, int], dict[int, int]] = {}
+    for place, (draw,) in enumerate(draws):
+        cells.setdefault((draw.controller, draw.scene, draw.seed), {})[draw.trial] = place
+    for (controller, scene, seed), places in cells.items():
+        config = tunnel_config(scene, controller, seed)
+        first = draws[next(iter(places.values()))][0]
+        name = condition(controller, config.readings[0])
+        make = functools.partial(_timed, first.decision_limit)
+
+        def take(item: tuple[TrialResult, Any], places: Any = places) -> None:
+            place = places[item[0].trial]
+            emit(place, _row_of(draws[place][0], item[0]))
+
+        run_trials(config, name, list(places), take, make=make)
+
+
+def _timed(
+    limit: float, name: str, control: ControlParams, robot: RobotSpec, batch: int
+) -> Controller:
+    return Timed(make_controller(name, control, robot, batch), limit)
+
+
+def _row_of(draw: Draw, row: TrialResult) -> Episode:
+    return Episode(
+        *(draw.controller, draw.scene, draw.seed, draw.trial, row.outcome, row.time_s),
+        limit_s=row.limit_s,
+        progress_m=row.progress_m,
+        overturned=row.overturned,
+        given=draw.given,
+        engine=versions()["mujoco"],
+        processor=processor(),
+        reason=row.reason,
+    )
+
+
+def lost(draw: Draw, reason: str) -> Episode:
+    """The row of an episode whose process died, or did not end."""
+    return Episode(
+        *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", TIME_LIMIT),
+        given=draw.given,
+        engine=versions()["mujoco"],
+        processor=processor(),
+        reason=reason,
+    )
+
+
+def restricted(rows: Iterable[Episode]) -> list[float]:
+    """Time of each row as a share of its limit; 1 of a failure."""
+    return [row.time_s / row.limit_s if row.outcome == "success" else 1.0 for row in rows]

@@ -1,0 +1,188 @@
+"""The competition: who crosses which scene how often and how fast, and how sure a rank is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.control.knowledge import needs_of
+from antennate.control.loop import CheckedController
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError, ControllerError
+from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
+from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
+from antennate.experiments.compete.page import readme, sentence, tables
+from antennate.experiments.compete.scenes import tunnel_config
+from antennate.experiments.compete.standings import CONTROLLER, standings
+from antennate.experiments.tunnel.batch import BATCH
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.sim.knowledge import require_route
+from antennate.sim.trial import check_start, draw_scene, scene_of
+from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.pool import Workers, chunk_of, gather, workers_from
+from antennate.studies.work import Failure
+from antennate.types import AntennaFrame
+
+
+@dataclass(frozen=True, slots=True)
+class CompeteOutcome:
+    """All rows in the order of controllers, scenes and draws, and the table that was checked."""
+
+    config: CompeteConfig
+    rows: list[Episode]
+    theirs: list[Episode] | None
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        config = self.config
+        seeds = list(dict.fromkeys(row.seed for row in self.rows))
+        return {
+            "schema": 1,
+            "command": "compete",
+            "seed": config.seed if self.theirs is None else None,
+            "seeds": seeds,
+            "hidden": config.hidden and config.seed not in DEVELOPMENT,
+            "trials": max((row.trial for row in self.rows), default=-1) + 1,
+            "decision_limit_s": config.decision_limit,
+            "tie": config.tie,
+            "interrupted": False,
+            **standings(self.rows, config.tie),
+            "check": None if self.theirs is None else compared(self.theirs, self.rows),
+        }
+
+
+def draws(config: CompeteConfig) -> list[Draw]:
+    """All that is to be run, controller by controller.
+
+    Raises:
+        ConfigError: The table to check cannot be read, or a controller cannot be made.
+    """
+    if config.check is None:
+        keys = [
+            (name, scene, config.seed, trial)
+            for name, scene, trial in product(
+                config.controllers, config.scenes, range(config.trials)
+            )
+        ]
+    else:
+        rows = read_rows(Path(config.check))
+        keys = [(row.controller, row.scene, row.seed, row.trial) for row in rows]
+        order = list(dict.fromkeys(key[0] for key in keys))
+        keys.sort(key=lambda key: order.index(key[0]))
+    given = {name: "" for name, *_ in keys}
+    for name in given:
+        given[name] = " ".join(needs_of(_made(name, tunnel_config(keys[0][1], name, 0))))
+    return [Draw(*key, config.decision_limit, given[key[0]]) for key in keys]
+
+
+def _made(name: str, config: TunnelConfig) -> Any:
+    try:
+        return make_controller(name, config.control, config.robot)
+    except ConfigError as error:
+        raise ConfigError(f"--controllers: {error}") from error
+
+
+def check(config: CompeteConfig) -> None:
+    """Find a bad scene or controller before anything is run; each controller decides once.
+
+    Raises:
+        ConfigError: There is no such scene or controller, it was made for another robot or rate,
+            or what it answers has another form.
+        SceneError: A scene cannot be built, or the robot does not fit at its start.
+    """
+    cells = dict.fromkeys((draw.controller, draw.scene, draw.seed) for draw in draws(config))
+    started, decided = set[str](), set[tuple[str, str]]()
+    for name, scene, seed in cells:
+        settings = tunnel_config(scene, name, seed)
+        if scene not in started:
+            check_start(settings)
+            started.add(scene)
+        made = _made(name, settings)
+        if needs := needs_of(made):
+            instance = draw_scene(settings, scene_of(settings), 0)
+            require_route(settings.scene, instance, needs)
+        robot = (name, settings.robot.model_dump_json())
+        if robot not in decided and not needs:
+            _decide(name, made, settings)
+            decided.add(robot)
+
+
+def _decide(name: str, made: Any, config: TunnelConfig) -> None:
+    """Let a controller decide on one reading, that of straight antennae."""
+    checked = CheckedController(made, config.robot, 1)
+    counts = np.full((1, 2), config.control.conditioning.counts_high)
+    joints = np.zeros((1, len(config.robot.joint_names)))
+    try:
+        checked.reset(np.array([0]))
+        checked.step(AntennaFrame(np.zeros(1), counts, joints))
+    except ControllerError as error:
+        raise ConfigError(f"--controllers: {name!r}: {error}") from error
+
+
+def run(
+    config: CompeteConfig,
+    workers: int | Workers = 1,
+    on_step: OnStep = no_step,
+    on_row: OnRow = no_row,
+) -> CompeteOutcome:
+    """Run all episodes; the processes of one controller end before those of the next begin.
+
+    Raises:
+        WorkerError: A worker process failed.
+    """
+    workers = replace(workers_from(workers), engine=None, apart=True, _staying=None)
+    planned, rows = draws(config), list[Episode]()
+    for name in dict.fromkeys(draw.controller for draw in planned):
+        own = [draw for draw in planned if draw.controller == name]
+        before = len(rows)
+
+        def given_up(place: int, failure: Failure, own: list[Draw] = own) -> Episode:
+            if failure.status == "failed":
+                raise failure.raised()
+            return lost(own[place], failure.reason)
+
+        def step(done: int, total: int, before: int = before) -> None:
+            on_step(before + done, len(planned))
+
+        rows += gather(
+            run_episodes,
+            [(draw,) for draw in own],
+            *(workers, step, on_row),
+            chunk=chunk_of(len(own), workers, BATCH),
+            together=True,
+            lost=given_up,
+        )
+    return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
+
+
+def failed(result: Mapping[str, Any]) -> bool:
+    """Whether a table that was checked does not repeat: more rows end otherwise than a tie has."""
+    check = result["check"]
+    return check is not None and check["other_outcome"] > result["tie"] * check["rows"]
+
+
+EXPERIMENT = Experiment.of_folder(
+    *(__name__, CompeteConfig, run, tables, sentence),
+    settled=settled,
+    check=check,
+    files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
+    failed=failed,
+    parts="episodes",
+    measures=CONTROLLER,
+    in_shards=False,
+    anywhere=False,
+    captions={
+        "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "
+        "Wilson's.",
+        "scenes": "Successes of each controller in each scene.",
+        "profiles": "Share of the draws that a controller crosses within a factor of the time of "
+        "the fastest (Dolan and More).",
+    },
+    explained="docs/results.md",
+)

@@ -1,0 +1,115 @@
+"""Figures of `antennate compete`: ranks, scenes by controllers, performance profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from antennate import figures as style
+from antennate.control.readings import short_names
+from antennate.experiments.compete.experiment import CompeteOutcome
+from antennate.experiments.compete.page import ordered
+from antennate.experiments.compete.scenes import label
+from antennate.experiments.compete.standings import Rows, profiles
+
+
+def figures(outcome: CompeteOutcome) -> dict[str, Figure]:
+    """All three figures of a run."""
+    return drawn(outcome.result(), outcome.rows)
+
+
+def drawn(result: Mapping[str, Any], rows: Rows) -> dict[str, Figure]:
+    """All three figures of a result and its rows."""
+    if not rows:
+        return {}
+    return {"ranks": ranks(result), "scenes": scenes(result), "profiles": profile(rows)}
+
+
+@style.styled
+def ranks(result: Mapping[str, Any]) -> Figure:
+    """Rank and success of each controller with their intervals, a line each."""
+    names = ordered(result)
+    colours, short = style.controller_colours(names), short_names(names)
+    figure = style.canvas(style.WIDTH, 2 * (0.9 + 0.27 * len(names)))
+    rank, success = figure.subplots(2, 1)
+    for i, name in enumerate(names):
+        row = result["controllers"][name]
+        if row["rank"] is not None:
+            _interval(rank, i, row["rank"], row["rank_95"], colours[name])
+        else:
+            rank.text(1, i, "not ranked", va="center", fontsize=8, color=style.MUTED)
+        if row["episodes"]:
+            ends = [100.0 * end for end in row["wilson95"]]
+            _interval(success, i, 100.0 * row["success_share"], ends, colours[name])
+    for panel in (rank, success):
+        panel.set_yticks(range(len(names)), [short[name] for name in names])
+        panel.set_ylim(len(names) - 0.5, -0.5)
+        panel.grid(visible=False, axis="y")
+    rank.xaxis.set_major_locator(MaxNLocator(integer=True))
+    rank.set(xlabel="rank", title="Rank; 95 %, all together")
+    ranked = sum(row["rank"] is not None for row in result["controllers"].values())
+    rank.set_xlim(0.7, max(2, ranked) + 0.3)
+    success.set(xlabel="draws crossed [%]", title="Success; Wilson 95 %", xlim=(-2, 102))
+    return figure
+
+
+def _interval(panel: Axes, at: int, value: float, ends: Any, colour: str) -> None:
+    panel.plot(list(ends), [at, at], color=colour, linewidth=2.4, solid_capstyle="butt")
+    panel.plot(value, at, color=colour, marker="o", markersize=7, clip_on=False)
+
+
+@style.styled
+def scenes(result: Mapping[str, Any]) -> Figure:
+    """Share of successes, a line a scene and a column a controller."""
+    names, places = ordered(result), list(result["scenes"])
+    short = short_names(names)
+    shares = np.array(
+        [
+            [np.nan if (s := result["scenes"][p][n]["success_share"]) is None else s for n in names]
+            for p in places
+        ]
+    )
+    figure = style.canvas(style.WIDTH, 1.3 + 0.32 * len(places))
+    panel = figure.subplots()
+    panel.imshow(100.0 * shares, cmap="Blues", vmin=0, vmax=125, aspect="auto")
+    for (i, j), share in np.ndenumerate(shares):
+        if np.isfinite(share):
+            panel.text(j, i, f"{100.0 * share:.0f}", ha="center", va="center", fontsize=8)
+    panel.set_xticks(range(len(names)), [short[name] for name in names], rotation=45, ha="right")
+    panel.set_yticks(range(len(places)), [label(place) for place in places])
+    panel.grid(visible=False)
+    panel.set_title("Draws crossed [%]")
+    return figure
+
+
+@style.styled
+def profile(rows: Rows) -> Figure:
+    """Share of the draws crossed within a factor of the fastest, a line a controller."""
+    factors, shares = profiles(rows)
+    colours, short = style.controller_colours(list(shares)), short_names(shares)
+    figure = style.canvas(style.WIDTH, 3.6)
+    panel = figure.subplots()
+    for name, share in shares.items():
+        line: Any = style.CONTROLLER_LINES.get(name, "solid")
+        panel.step(
+            factors,
+            100.0 * share,
+            where="post",
+            color=colours[name],
+            linestyle=line,
+            linewidth=1.5,
+            label=short[name],
+        )
+    panel.set_xscale("log")
+    panel.set_xticks([1, 2, 3, 5, 10], ["1", "2", "3", "5", "10"])
+    panel.minorticks_off()
+    panel.set(xlim=(1, 10), ylim=(0, 100))
+    panel.set(xlabel="time over that of the fastest", ylabel="draws crossed [%]")
+    if shares:
+        figure.legend(loc="outside upper center", ncols=4, handlelength=2.6)
+    return figure

@@ -1,0 +1,178 @@
+"""The result as tables, as one sentence, and as the README of a run directory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antennate.control.readings import short_names
+from antennate.control.registry import about
+from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.scenes import label
+from antennate.experiments.compete.standings import CONTROLLER, PAIR
+from antennate.studies.measures import Table, shown
+
+Result = Mapping[str, Any]
+_NOTE = (
+    "A failure counts as its time limit, and so does INVALID: an answer that is not finite, an "
+    "exception,\na decision that took too long. {given}Ranks: of those that live on their readings "
+    "alone."
+)
+
+
+def ordered(result: Result) -> list[str]:
+    """Controllers by rank, then by time; those outside the ranking last."""
+    rows = result["controllers"]
+    return sorted(
+        rows,
+        key=lambda name: (
+            rows[name]["rank"] is None,
+            rows[name]["rank"] or 0,
+            rows[name]["restricted_mean_share"] or 0.0,
+        ),
+    )
+
+
+def tables(result: Result) -> Sequence[Table]:
+    """Controllers, scenes, pairs; and what differs from a table that was checked."""
+    names = ordered(result)
+    short = short_names(names)
+    rows = {short[name]: result["controllers"][name] for name in names}
+    privileged = [name for name, row in rows.items() if row["given"]]
+    given = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
+    note = _NOTE.format(given=given)
+    parts = [
+        Table.of("Controllers", rows, CONTROLLER, note, about(names)),
+        Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
+    ]
+    if pairs := result["paired"]:
+        parts.append(_pair_table(pairs, short))
+    if result["check"] is not None:
+        parts.insert(0, _check_table(result["check"]))
+    return parts
+
+
+def _scene_lines(result: Result, names: Sequence[str]) -> list[tuple[str, list[str]]]:
+    lines = []
+    for scene, cells in result["scenes"].items():
+        told = [
+            f"{cells[n]['successes']}/{cells[n]['episodes']}" if cells[n]["episodes"] else "-"
+            for n in names
+        ]
+        lines.append((label(scene), told))
+    return lines
+
+
+def _pair_table(pairs: Mapping[str, Mapping[str, Any]], short: Mapping[str, str]) -> Table:
+    heads = [
+        head
+        for m in PAIR
+        for head in ((m.title, m.ends.label.strip()) if m.interval else [m.title])
+    ]
+    lines = []
+    for pair in pairs.values():
+        cells = [
+            cell
+            for m in PAIR
+            for cell in ((m.cell(pair), m.ends.cell(pair)) if m.interval else [m.cell(pair)])
+        ]
+        names = " and ".join(short[name] for name in pair["names"])
+        lines.append((names + (" (tie)" if pair["tie"] else ""), cells))
+    note = (
+        "McNemar's test is exact, Wilcoxon's takes Pratt's ranks; Holm's correction over all\n"
+        "pairs. A tie is a difference that two kinds of processor make, too."
+    )
+    return Table("Pairs, draw by draw", heads, lines, note)
+
+
+def _check_table(check: Mapping[str, Any]) -> Table:
+    heads = ("outcome", "here", "time [s]", "here")
+    lines = [
+        (
+            f"{row['controller']} in {label(row['scene'])}, {row['seed']}, {row['trial']}",
+            [
+                *(row["outcome"], row["outcome_here"]),
+                *(shown(row[key], ".2f") for key in ("time_s", "time_here_s")),
+            ],
+        )
+        for row in check["differ"]
+    ]
+    note = (
+        f"By controller, scene, seed and trial. {check['same']} of {check['rows']} rows are the "
+        f"same.\nThey were run by antennate "
+        f"{', '.join(check['versions'])} on {', '.join(check['processors'])}."
+    )
+    return Table("Rows that differ", heads, lines, note)
+
+
+def sentence(result: Result) -> str:
+    """Who stands first and how sure that is; or how many rows of a table repeat."""
+    if (check := result["check"]) is not None:
+        return (
+            f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
+            f"{check['other_outcome']} of them in how they end."
+        )
+    rows, names = result["controllers"], ordered(result)
+    short = short_names(names)
+    ranked = [name for name in names if rows[name]["rank"] is not None]
+    scenes = len(result["scenes"])
+    told = [
+        f"{short[name]} {rows[name]['rank']} ({shown(rows[name]['rank_95'], '.0f')}; "
+        f"{rows[name]['successes']} of {rows[name]['episodes']})"
+        for name in ranked
+    ]
+    seeds = result["seeds"]
+    kind = f"{'hidden' if result['hidden'] else 'public'} seed{'s' * (len(seeds) > 1)}"
+    ranks = ", ".join(told) or "none, as none lives on its readings"
+    return (
+        f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
+        f"{', '.join(map(str, seeds))}: {ranks}."
+    )
+
+
+def markdown(result: Result) -> str:
+    """The standing and the scenes as tables in Markdown."""
+    names = ordered(result)
+    short = short_names(names)
+    lines = [
+        "| controller | rank (95 %) | successes | Wilson 95 % [%] | restricted mean time [% of "
+        "limit] (95 %) | speed [m/s] | on its back | INVALID |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name in names:
+        row = result["controllers"][name]
+        rank = f"{row['rank']} ({shown(row['rank_95'], '.0f')})" if row["rank"] else "not ranked"
+        time = shown(row["restricted_mean_share"], ".0f", 100.0)
+        ends = shown(row["restricted_mean_share_95"], ".0f", 100.0)
+        lines.append(
+            f"| `{short[name]}` | {rank} | {row['successes']} of {row['episodes']} | "
+            f"{shown(row['wilson95'], '.0f', 100.0)} | {time} ({ends}) | "
+            f"{shown(row['speed_m_s'], '.3f')} | {row['overturned']} | {row['invalid']} |"
+        )
+    lines += ["", f"| scene | {' | '.join(f'`{short[n]}`' for n in names)} |"]
+    lines += ["|---" * (len(names) + 1) + "|"]
+    for scene, cells in _scene_lines(result, names):
+        lines.append(f"| `{scene}` | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def readme(result: Result, rows: Sequence[Episode]) -> str:
+    """What stands in the run directory for who finds it."""
+    kinds = {name: sorted({getattr(row, name) for row in rows}) for name in ("engine", "processor")}
+    reasons = [
+        f"- `{row.controller}` in `{row.scene}`, trial {row.trial}: {row.reason}"
+        for row in rows
+        if row.outcome == "invalid"
+    ]
+    parts = [
+        "# A competition of controllers",
+        sentence(result),
+        markdown(result),
+        f"antennate {', '.join(sorted({row.version for row in rows}))}, MuJoCo "
+        f"{', '.join(kinds['engine'])}, {', '.join(kinds['processor'])}. "
+        f"A decision may take {1e3 * result['decision_limit_s']:g} ms of processor time.",
+        "Every row is in `trials.csv`; `antennate compete --check trials.csv` runs them again.",
+    ]
+    if reasons:
+        parts += ["INVALID, which counts as a failure:", "\n".join(reasons)]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,400 @@
+"""Competition: fair to all, INVALID where it must be, the same rows on any number of workers."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import antennate
+from antennate.cli import main
+from antennate.errors import ConfigError
+from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.config import (
+    DEVELOPMENT,
+    RESERVED,
+    CompeteConfig,
+    hidden_seed,
+    settled,
+)
+from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
+from antennate.experiments.compete.experiment import run
+from antennate.experiments.compete.scenes import label, tunnel_config
+
+SHORT = "flat+time_limit=0.3"
+ENTRIES = '''
+import builtins, time
+import numpy as np
+from antennate.control.controllers import open_loop
+
+class Entry:
+    """`open` with a fault."""
+    def __init__(self, control, robot, batch):
+        self.inner, self.ticks = open_loop(control, robot, batch), 0
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+    def reset(self, rows, phase=0.0):
+        self.inner.reset(rows, phase)
+        self.odd, self.ticks = phase, 0
+    def step(self, frame):
+        self.ticks += 1
+        command = self.inner.step(frame)
+        if self.ticks > 5:
+            self.fault(command)
+        return command
+    def fault(self, command):
+        pass
+
+class NotFinite(Entry):
+    def fault(self, command):
+        command.yaw[:, 0] = np.nan
+class Raises(Entry):
+    def fault(self, command):
+        raise ZeroDivisionError("no")
+class Busy(Entry):
+    def fault(self, command):
+        end = time.process_time() + 0.08
+        while time.process_time() < end:
+            pass
+class Asleep(Entry):
+    def fault(self, command):
+        time.sleep(30.0)
+class Shape(Entry):
+    def step(self, frame):
+        command = self.inner.step(frame)
+        return type(command)(yaw=command.yaw[:, :2], leg=command.leg, antenna=command.antenna)
+class Curious(Entry):
+    """It could use a map, and fails if it is given one."""
+    knows, needs = ("map",), ()
+    def know(self, knowledge):
+        raise RuntimeError("it was told")
+class Leaves(Entry):
+    def fault(self, command):
+        builtins.left_behind = True
+class Looks(Entry):
+    def fault(self, command):
+        if hasattr(builtins, "left_behind"):
+            raise RuntimeError("somebody was here before")
+'''
+
+
+@pytest.fixture
+def entries(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
+    """Names of the controllers of a file in the working folder."""
+    (tmp_path / "entries.py").write_text(ENTRIES)
+    monkeypatch.chdir(tmp_path)
+    return lambda name: f"entries.py:{name}"
+
+
+def episodes(name: str, count: int = 1, scene: str = SHORT, limit: float = 0.05) -> list[Episode]:
+    """Rows of some draws of one controller, run in this process."""
+    rows: dict[int, Episode] = {}
+    draws = [(Draw(name, scene, DEVELOPMENT.start, trial, limit),) for trial in range(count)]
+    run_episodes(draws, rows.__setitem__)
+    return [rows[place] for place in range(count)]
+
+
+# faults in a trial
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("NotFinite", "expected finite angles in yaw"),
+        ("Raises", "step raised ZeroDivisionError: no"),
+        ("Busy", "a decision took longer than 50 ms"),
+        ("Asleep", "a decision took longer than 10 ms"),
+    ],
+)
+def test_what_fails_in_a_trial_is_invalid_with_its_reason(
+    name: str, why: str, entries: Callable[[str], str]
+) -> None:
+    (row,) = episodes(entries(name), limit=0.01 if name == "Asleep" else 0.05)
+    assert row.outcome == "invalid"
+    assert why in row.reason
+
+
+def test_a_decision_within_the_limit_is_none_that_took_too_long(
+    entries: Callable[[str], str],
+) -> None:
+    assert [r.outcome for r in episodes(entries("Busy"), 2, limit=5.0)] == ["timeout"] * 2
+
+
+def test_decisions_of_a_batch_are_judged_alone(
+    tmp_path: Path, entries: Callable[[str], str]
+) -> None:
+    """Each takes 2 ms, so a step of 20 takes 40 ms, which is more than the limit of one."""
+    text = "time.process_time() + 0.08"
+    busy = ENTRIES.replace(text, "time.process_time() + 0.002 * len(command.yaw)")
+    (tmp_path / "rows.py").write_text(busy)
+    rows = episodes("rows.py:Busy", 20, limit=0.02, scene="flat+time_limit=0.1")
+    assert {row.outcome for row in rows} == {"timeout"}
+
+
+def test_who_can_use_knowledge_but_needs_none_is_given_none(
+    entries: Callable[[str], str],
+) -> None:
+    assert episodes(entries("Curious"))[0].reason == ""
+
+
+# a run
+
+
+def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
+    tmp_path: Path, entries: Callable[[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [*map(entries, ("Leaves", "Looks", "NotFinite")), "map"]
+    words = ["compete", "--trials", "3", "--scenes", SHORT, "--no-figures"]
+    assert main([*words, "--controllers", *names, "--workers", "2", "--out", "run"]) == 0
+    rows = list(csv.DictReader((tmp_path / "run" / "trials.csv").read_text().splitlines()))
+    by_name = {name: [r for r in rows if r["controller"] == name] for name in names}
+    assert [len(own) for own in by_name.values()] == [3] * 4
+    assert {row["reason"] for row in by_name[names[1]]} == {""}
+    assert {row["outcome"] for row in by_name[names[2]]} == {"invalid"}
+    assert {row["given"] for row in by_name["map"]} == {"jam map"}
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    cells = result["controllers"]
+    assert (cells[names[2]]["invalid"], cells[names[2]]["success_share"]) == (3, 0.0)
+    assert cells[names[2]]["restricted_mean_share"] == 1.0
+    assert cells["map"]["rank"] is None
+    assert not any("map" in pair for pair in result["paired"])
+    readme = (tmp_path / "run" / "README.md").read_text()
+    assert "| `map` | not ranked |" in readme
+    assert "expected finite angles in yaw" in readme
+    assert capsys.readouterr().out.splitlines()[-1].startswith("Ranks in 1 scene")
+
+
+def test_rows_are_the_same_for_any_number_of_workers() -> None:
+    config = CompeteConfig(controllers=("follow", "centre"), scenes=(SHORT, "uturn+time_limit=0.5"))
+    one, three = (run(config, workers).rows for workers in (1, 3))
+    assert one == three
+    assert len({(r.controller, r.scene, r.trial) for r in one}) == 40
+
+
+def test_a_row_is_that_of_tunnel() -> None:
+    """The same scene, seed and trial, run by the command `tunnel` with those parameters."""
+    text = "uturn+variation.reading_noise=3+time_limit=2"
+    rows = episodes("closed", 2, text)
+    theirs = antennate.run(
+        "tunnel",
+        scene="uturn",
+        seed=DEVELOPMENT.start,
+        trials=2,
+        time_limit=2.0,
+        controllers=("closed",),
+        variation={"reading_noise": 3.0},
+    ).rows
+    assert [r.progress_m for r in rows] == [r.progress_m for r in theirs]
+
+
+def write_wheel(path: Path) -> None:
+    """A wheel of a package with a controller and a scene, as an installer takes it."""
+    about = "rivals-2.0.dist-info"
+    files = {
+        "rivals.py": "from antennate.control.controllers import closed_loop as Rival\n"
+        "from antennate.sim.scenes.scene import FlatScene\n"
+        "class Mile(FlatScene):\n    def __init__(self):\n        super().__init__(0.05)\n",
+        f"{about}/METADATA": "Metadata-Version: 2.1\nName: rivals\nVersion: 2.0\n",
+        f"{about}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\n"
+        "Tag: py3-none-any\n",
+        f"{about}/entry_points.txt": "[antennate.controllers]\nrival = rivals:Rival\n"
+        "[antennate.scenes]\nmile = rivals:Mile\n",
+    }
+    files[f"{about}/RECORD"] = "".join(f"{name},,\n" for name in [*files, f"{about}/RECORD"])
+    with zipfile.ZipFile(path, "w") as wheel:
+        for name, text in files.items():
+            wheel.writestr(name, text)
+
+
+def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Path) -> None:
+    wheel = tmp_path / "rivals-2.0-py3-none-any.whl"
+    write_wheel(wheel)
+    zipfile.ZipFile(wheel).extractall(tmp_path / "site")  # what an installer does with this one
+    words = ["compete", "--controllers", "rival", "open", "--scenes", "mile", "--trials", "2"]
+    done = subprocess.run(
+        [sys.executable, "-m", "antennate", *words, "--no-figures", "--json", "--out", "run"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert [result["controllers"][n]["successes"] for n in ("rival", "open")] == [2, 2]
+    assert result["paired"]["rival-open"]["tie"]
+
+
+# refusals
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("--controllers entries.py:Shape", "expected yaw of shape (1, 5), found (1, 2)"),
+        ("--controllers clsoed", "did you mean closed?"),
+        ("--controllers missing.py:Mine", "no file"),
+        ("--scenes utrun", "did you mean uturn?"),
+        ("--scenes uturn+variation.noise=3", "'uturn+variation.noise=3': "),
+        ("--scenes uturn+control.rate=50", "expected a parameter of tunnel, corridors, robot"),
+        ("--scenes uturn+readings=yoked", "expected readings of its own"),
+        ("--scenes uturn+readings=delayed:0.015", "whole control periods"),
+        ("--scenes uturn uturn", "scenes must differ"),
+        ("--check no.csv", "no.csv: expected a readable file"),
+        ("--check no.csv --trials 3", "the file of check says it"),
+        ("--engine dask", "--engine"),
+    ],
+)
+def test_bad_input_is_one_line_before_the_first_trial(
+    words: str, why: str, tmp_path: Path, entries: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenes = [] if "--scenes" in words or "--check" in words else ["--scenes", SHORT]
+    assert main(["compete", *words.split(), *scenes, "--out", "run"]) == 2
+    err = capsys.readouterr().err
+    assert why in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"mass": 2.5}, "made for another robot: expected robot.mass 2.5"),
+        ({"rate": 50.0}, "expected rate 50.0, found 100.0"),
+    ],
+)
+def test_a_policy_of_another_robot_or_rate_is_refused(
+    change: dict[str, Any], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    from policy_files import FORWARD, constant
+
+    from antennate.control.policy.contract import contract_of
+    from antennate.control.policy.interface import PolicyInterface
+    from antennate.params.control import ControlParams
+    from antennate.robots.spec import RobotSpec
+
+    control = ControlParams(rate=change.get("rate", 100.0))
+    robot = RobotSpec.model_validate({k: v for k, v in change.items() if k == "mass"})
+    made = contract_of(PolicyInterface(), control, robot)
+    file = constant(tmp_path / "policy.onnx", FORWARD, made)
+    assert main(["compete", "--controllers", str(file), "--scenes", SHORT]) == 2
+    assert why in capsys.readouterr().err
+
+
+def test_a_policy_competes(tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    from policy_files import FORWARD, constant
+
+    file = constant(tmp_path / "policy.onnx", FORWARD)
+    assert [row.outcome for row in episodes(str(file), 2)] == ["timeout"] * 2
+
+
+# seeds
+
+
+def test_a_hidden_seed_is_neither_public_nor_reserved() -> None:
+    offered = iter([DEVELOPMENT[0], RESERVED[0], RESERVED[-1], DEVELOPMENT[-1], 7, 8])
+    assert hidden_seed(lambda most: next(offered)) == 7
+    assert len({hidden_seed() for _ in range(20)}) == 20
+    assert (RESERVED[0], RESERVED[-1]) == (700_000, 799_999)
+
+
+def test_a_hidden_run_that_was_stopped_goes_on_with_its_seed_and_publishes_it(
+    tmp_path: Path,
+) -> None:
+    words: dict[str, Any] = {"hidden": True, "controllers": ("open", "centre"), "trials": 1}
+    words |= {"scenes": (SHORT,), "out": tmp_path / "run"}
+
+    def stop(done: int, total: int) -> None:
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        antennate.run("compete", on_step=stop, **words)
+    steps = list[int]()
+    again = antennate.run(
+        "compete", resume=True, on_step=lambda done, total: steps.append(done), **words
+    )
+    assert steps == [1, 2]  # the first from the folder
+    seed = settled(CompeteConfig(hidden=True), tmp_path / "run").seed
+    assert {row.seed for row in again.rows} == {seed} == {again.summary["seed"]}
+    assert seed not in DEVELOPMENT
+    assert f"hidden seed {seed}" in again.sentence
+
+
+def test_only_a_hidden_run_without_a_seed_draws_one() -> None:
+    assert settled(CompeteConfig(hidden=True, seed=5), None).seed == 5
+    assert settled(CompeteConfig(), None).seed == DEVELOPMENT.start
+
+
+# a table that is run again
+
+
+def test_a_table_is_run_again_and_rows_that_differ_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scenes = ["--scenes", SHORT, "flat+time_limit=0.2"]
+    words = ["compete", "--controllers", "open", "centre", *scenes, "--trials", "2"]
+    assert main([*words, "--no-figures", "--out", "run"]) == 0
+    text = (tmp_path / "run" / "trials.csv").read_text()
+    file = tmp_path / "theirs.csv"
+    for changed, said, code in [
+        (text, "8 of 8 rows repeat; 0 differ", 0),
+        (text.replace(",timeout,", ",success,", 1), "7 of 8 rows repeat; 1 differ, 1 of them", 2),
+        (text.replace("timeout,0.3,", "timeout,0.4,", 1), "1 differ, 0 of them", 0),
+    ]:
+        file.write_text(changed)
+        assert main(["compete", "--check", str(file), "--no-figures", "--out", "again"]) == code
+        assert said in capsys.readouterr().out
+        check = json.loads((tmp_path / "again" / "result.json").read_text())["check"]
+        assert (check["rows"], len(check["processors"])) == (8, 1)
+        (tmp_path / "again").rename(tmp_path / f"old{code}{len(said)}")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "expected a table of trials, found no row"),
+        ("controller,scene\nopen,flat\n", "line 2: expected outcome, found none"),
+        ("controller,scene,outcome\nopen,flat,success\n", "line 2: "),
+        ("\0\n", "expected a table of trials"),
+    ],
+)
+def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(ConfigError, match=why) as error:
+        read_rows(tmp_path / "a.csv")
+    assert "\n" not in str(error.value)
+
+
+def test_rows_that_were_not_run_are_not_compared() -> None:
+    row = Episode("open", "flat", 1, 0, "success", 10.0)
+    check = compared([row, replace(row, trial=1)], [row])
+    assert (check["rows"], check["same"], check["differ"]) == (1, 1, [])
+
+
+# scenes with other parameters
+
+
+def test_a_scene_takes_parameters_as_the_configuration_does() -> None:
+    text = "tunnel+tunnel.turns_deg=[120]+variation.broken=left+readings=delayed:0.02+time_limit=5"
+    config = tunnel_config(text, "closed", 3)
+    assert config.tunnel.turns_deg == (120.0,)
+    assert config.variation.broken == "left"
+    assert (config.readings, config.time_limit) == (("delayed:0.02",), 5.0)
+    assert (config.scene, config.seed, config.controllers) == ("tunnel", 3, ("closed",))
+    assert label("uturn+variation.broken=left") == "uturn, broken=left"
+    assert tunnel_config("a+b.py:Scene+time_limit=1", "open", 0).scene == "a+b.py:Scene"

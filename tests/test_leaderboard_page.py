@@ -1,0 +1,58 @@
+"""docs/leaderboard.py: the rows of a board stand on its page, and a page that is old is noticed."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from antennate.experiments.compete.config import DEVELOPMENT, SCENES_OF_BOARD
+from antennate.experiments.compete.episodes import Episode
+from antennate.studies.formats import to_csv
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-W", "error", str(folder / "leaderboard.py"), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Path:
+    """The page and its script beside two rows: one controller crosses, the other does not."""
+    for name in ("leaderboard.py", "leaderboard.md", "generated.py"):
+        shutil.copy(DOCS / name, tmp_path / name)
+    (tmp_path / "images").mkdir()
+    rows = [
+        Episode("closed", SCENES_OF_BOARD[0], 5, 0, "success", 20.0, progress_m=2.0),
+        Episode("open", SCENES_OF_BOARD[0], 5, 0, "timeout", 100.0),
+    ]
+    (tmp_path / "leaderboard.csv").write_text(to_csv(asdict(row) for row in rows))
+    return tmp_path / "leaderboard.md"
+
+
+def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -> None:
+    before = page.read_text()
+    done = run(page.parent, "--check")
+    assert done.returncode == 1
+    assert "out of date" in done.stderr
+    assert run(page.parent).returncode == 0
+    text = page.read_text()
+    assert text.split("<!-- board")[0] == before.split("<!-- board")[0]
+    assert text.split("end of board")[1] == before.split("end of board")[1]
+    assert "| `closed` | 1 (1 to 2) | 1 of 1 |" in text
+    assert "**Preliminary**: 1 draw of" in text
+    assert "hidden seed 5" in text
+    assert run(page.parent, "--check").returncode == 0
+    assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
+
+
+def test_the_page_tells_the_public_seeds_as_the_program_has_them() -> None:
+    assert (
+        f"{DEVELOPMENT[0]} to {DEVELOPMENT[-1]} are public" in (DOCS / "leaderboard.md").read_text()
+    )

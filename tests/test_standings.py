@@ -1,0 +1,127 @@
+"""Standings of a competition: made of rows alone, against closed forms and published figures."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.figure import drawn
+from antennate.experiments.compete.page import markdown, ordered, readme, sentence, tables
+from antennate.experiments.compete.standings import profiles, standings
+from antennate.studies.statistics import holm, wilson95
+
+LIMIT = 100.0
+
+
+def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episode]:
+    """Rows of one controller, in two scenes by turns; None is a failure."""
+    return [
+        Episode(
+            *(name, ("uturn", "corner")[k % 2], 1, k // 2),
+            outcome="timeout" if time is None else "success",
+            time_s=LIMIT if time is None else time,
+            progress_m=2.0,
+            given=given,
+        )
+        for k, time in enumerate(times)
+    ]
+
+
+def judged(*groups: list[Episode], **more: Any) -> dict[str, Any]:
+    rows = [row for group in groups for row in group]
+    more = {"seeds": [1], "hidden": True, "decision_limit_s": 0.05, "check": None, **more}
+    return {**standings(rows, 0.01), **more}
+
+
+@pytest.mark.parametrize(
+    ("p", "wanted"),
+    [
+        ([0.01, 0.04, 0.03, 0.005], [0.03, 0.06, 0.06, 0.02]),
+        ([0.4, 0.6], [0.8, 0.8]),
+        ([], []),
+    ],
+)
+def test_holm_raises_p_values_as_its_paper_says(p: list[float], wanted: list[float]) -> None:
+    """Of 0.005 four times, of 0.01 thrice, of 0.03 twice, and 0.04 no less than that."""
+    assert holm(p) == pytest.approx(wanted)
+
+
+def test_a_difference_that_two_processors_make_is_a_tie() -> None:
+    """200 and 198 of 200; 197 is beyond it."""
+    first = rows_of("a", [10.0] * 200)
+    near, far = (rows_of("b", [10.0] * n + [None] * (200 - n)) for n in (198, 197))
+    tied, apart = judged(first, near), judged(first, far)
+    assert tied["paired"]["a-b"]["tie"]
+    assert [tied["controllers"][n]["rank"] for n in "ab"] == [1, 1]
+    assert not apart["paired"]["a-b"]["tie"]
+    assert [apart["controllers"][n]["rank"] for n in "ab"] == [1, 2]
+    assert [apart["controllers"][n]["rank_95"] for n in "ab"] == [[1, 2], [1, 2]]
+
+
+def test_ranks_and_their_intervals_follow_from_the_tests_of_every_two() -> None:
+    """With 40 draws a alone crosses 20 more than b and c each: p is 2 * 0.5^20, thrice that."""
+    result = judged(
+        rows_of("a", [10.0] * 40),
+        rows_of("b", [20.0] * 20 + [None] * 20),
+        rows_of("c", [None] * 2 + [20.0] * 19 + [None] * 19),
+    )
+    cells, pair = result["controllers"], result["paired"]["a-b"]
+    assert (pair["only_first"], pair["only_second"]) == (20, 0)
+    assert pair["mcnemar_p"] == pytest.approx(2 * 0.5**20)
+    assert pair["mcnemar_holm_p"] == pytest.approx(2 * 2 * 0.5**20)  # c has 21: it is first
+    assert [cells[n]["rank"] for n in "abc"] == [1, 2, 3]
+    assert [cells[n]["rank_95"] for n in "abc"] == [[1, 1], [2, 3], [2, 3]]
+    assert cells["b"]["wilson95"] == wilson95(20, 40)
+    assert cells["b"]["restricted_mean_share"] == pytest.approx((20 * 0.2 + 20) / 40)
+    assert result["scenes"]["uturn"]["a"]["episodes"] == 20
+
+
+def test_who_is_given_more_stands_outside_the_ranking() -> None:
+    result = judged(rows_of("a", [10.0] * 6), rows_of("map", [5.0] * 6, given="jam map"))
+    assert result["controllers"]["map"]["rank"] is None
+    assert result["controllers"]["a"]["rank_95"] == [1, 1]
+    assert result["paired"] == {}
+    assert ordered(result) == ["a", "map"]
+    assert "| `map` | not ranked |" in markdown(result)
+    assert "map" not in sentence(result)
+    _, shares = profiles([*rows_of("a", [10.0] * 6), *rows_of("map", [5.0] * 6, "jam map")])
+    assert shares.keys() == {"a"}
+    assert shares["a"][0] == 1.0
+
+
+def test_a_profile_tells_how_many_draws_are_crossed_within_a_factor_of_the_fastest() -> None:
+    """Ratios of a: 1, 2, inf, nobody; of b: 3, 1, 1, nobody."""
+    factors, shares = profiles(
+        [*rows_of("a", [10.0, 40.0, None, None]), *rows_of("b", [30.0, 20.0, 50.0, None])]
+    )
+    at = {x: int(np.argmin(np.abs(factors - x))) for x in (1.0, 1.9, 2.0, 2.9, 3.0, 10.0)}
+    assert [shares["a"][i] for i in at.values()] == [0.25, 0.25, 0.5, 0.5, 0.5, 0.5]
+    assert [shares["b"][i] for i in at.values()] == [0.5, 0.5, 0.5, 0.5, 0.75, 0.75]
+
+
+def test_random_rows_rank_alike_in_any_order() -> None:
+    rng = np.random.default_rng(3)
+    times = {n: [float(t) if t < 90 else None for t in rng.uniform(5, 120, 30)] for n in "abcd"}
+    one = judged(*(rows_of(n, times[n]) for n in "abcd"))
+    other = judged(*(rows_of(n, times[n]) for n in "dbca"))
+    for name, key in product("abcd", ("rank", "rank_95", "successes", "restricted_mean_share")):
+        assert one["controllers"][name][key] == other["controllers"][name][key]
+
+
+def test_tables_page_and_figures_show_every_controller_and_scene() -> None:
+    rows = [*rows_of("open", [10.0, None] * 4), *rows_of("closed", [20.0] * 8)]
+    result = judged(rows)
+    text = readme(result, rows)
+    assert "hidden seed 1" in text
+    for shown in (*(table.columns for table in tables(result)[:2]),):
+        assert list(shown) == ["closed", "open"]
+    assert [name for name, _ in tables(result)[1].rows] == ["uturn", "corner"]
+    figures = drawn(result, rows)
+    assert list(figures) == ["ranks", "scenes", "profiles"]
+    ticks = {t.get_text() for panel in figures["scenes"].axes for t in panel.get_yticklabels()}
+    assert ticks == {"uturn", "corner"}
+    assert drawn(result, []) == {}
