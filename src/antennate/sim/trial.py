@@ -51,7 +51,8 @@ class TrialConfig(Params):
     """Seed of all chance."""
     scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
     """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, step_up,
-    step_down, stairs, gap, ramp, rubble, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
+    step_down, stairs, gap, ramp, rubble, step_tunnel, a MJCF file.xml, MODULE:CLASS or
+    file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
     ground: GroundParams = GroundParams()

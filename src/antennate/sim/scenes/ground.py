@@ -216,5 +216,6 @@ READS: Mapping[str, tuple[str, ...]] = {
     "gap": ("start", "width", "depth"),
     "ramp": ("start", "height", "slope"),
     "rubble": ("start", "block", "density"),
+    "step_tunnel": ("height",),
 }
 """Sizes that each of them reads."""

@@ -16,6 +16,7 @@ from antennate.sim.scenes.geometry import Arm, Room
 from antennate.sim.scenes.ground import KINDS, GroundScene
 from antennate.sim.scenes.mjcf import MjcfScene, require_compiles
 from antennate.sim.scenes.scene import TIME_LIMIT, FlatScene, Scene
+from antennate.sim.scenes.step_tunnel import StepTunnelScene
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.scenes.wall import WallScene
 
@@ -49,6 +50,7 @@ _SHIPPED: dict[str, Callable[[], Scene]] = {
     "wall": WallScene,
     **HARD,
     **{name: functools.partial(GroundScene, name) for name in KINDS},
+    "step_tunnel": StepTunnelScene,
 }
 SHIPPED = tuple(_SHIPPED)
 """Scenes that need no file and no code of others."""
@@ -95,6 +97,8 @@ def make_scene(
         return CorridorsScene(corridors)
     if name in KINDS:
         return GroundScene(name, ground)
+    if name == "step_tunnel":
+        return StepTunnelScene(ground)
     if _is_file(name):
         if parent_process() is None:  # the process that started this worker has tried it
             require_compiles(Path(name))
