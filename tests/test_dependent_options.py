@@ -24,6 +24,7 @@ NEEDS = {
     "--slurm": ["--engine slurm"],
     "--teleop.gamepad-silence": ["--gamepad"],
     "--video-trial": ["--video"],
+    "--video-view": ["--video"],
     "--view-paused": ["--view"],
     "--view-port": ["--view"],
     "--view-speed": ["--view", "--foxglove"],

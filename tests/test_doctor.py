@@ -33,7 +33,7 @@ def test_a_healthy_robot_has_no_row_that_is_not_ok_and_nothing_is_written() -> N
     before = memory(patient)
     checkup = patient.examine()
     assert wrong(checkup) == {}
-    assert len(checkup.rows) == 37
+    assert len(checkup.rows) == 38
     assert memory(patient) == before
     assert sum(servo.eeprom_writes for servo in patient.robot.servos) == 0
 

@@ -15,15 +15,17 @@ from lockstep import BoardPort, LockstepClock
 from twin_rig import Rig, rig
 
 from antennate.cli import main
+from antennate.control.registry import CONTROLLERS
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import Operator, drive
-from antennate.hardware.driving.report import Report, late_sentence
+from antennate.hardware.driving.report import Report, late_sentence, raised_links
 from antennate.hardware.safety.causes import Cause, State, what_to_do
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
+from antennate.robots.spec import RobotSpec
 from antennate.telemetry.feed import Feed
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
@@ -420,3 +422,83 @@ def test_cures_of_causes_that_come_together_say_each_step_once_and_arming_last()
     for words in ("lose other programs", "check cables, plugs and supply", "drive --arm"):
         assert said.lower().count(words) == 1, said
     assert said.endswith("; then start `drive --arm` again. See docs/causes.md.")
+
+
+@pytest.mark.parametrize(
+    ("pitch", "said"),
+    [
+        ((), ""),
+        ((0.0, 0.1, -0.1, 0.0, 0.0), ""),
+        ((math.nan,) * 5, ""),
+        ((0.35, 0.0, 0.0, 0.0, 0.0), "link 0 is raised: hold it"),
+        ((0.0, 0.35, 0.0, 0.0, 0.0), "links 0 and 1 are raised: hold them"),
+        ((0.0, 0.4, -0.4, 0.0, 0.0), "links 0 and 1 are raised: hold them; link 2 is lowered"),
+        ((-0.2, 0.0, 0.0, 0.0, 0.0), "link 0 is lowered: hold it"),
+        ((0.0, 0.0, 0.0, 0.0, 0.3), "link 5 is raised: hold it"),
+        ((0.3, 0.0, 0.0, 0.3, 0.0), "links 0, 4 and 5 are raised: hold them"),
+    ],
+)
+def test_the_shorter_part_at_a_pitch_joint_that_is_bent_is_to_be_held(
+    pitch: tuple[float, ...], said: str
+) -> None:
+    found = raised_links(pitch)
+    assert found.startswith(said)
+    assert bool(found) == bool(said)
+
+
+def raising(angle: float) -> type:
+    """A controller that stands and raises both first links by an angle [rad]."""
+
+    class Raising:
+        def __init__(self, control: object, robot: RobotSpec, batch: int) -> None:
+            shapes = robot.command_shapes(batch).items()
+            self._command = JointCommand(**{name: np.zeros(shape) for name, shape in shapes})
+            self._command.pitch[:, 1] = angle
+            self.maneuver = np.zeros(batch, dtype=int)
+            self.contact = np.zeros((batch, 2), dtype=int)
+            self.level = np.zeros((batch, 2))
+
+        def reset(self, rows: object, phase: float = 0.0) -> None:
+            pass
+
+        def step(self, frame: AntennaFrame) -> JointCommand:
+            return self._command
+
+    return Raising
+
+
+@pytest.mark.parametrize(("angle", "warned"), [(0.35, True), (0.05, False)])
+def test_links_in_the_air_are_told_before_torque_goes_off(
+    angle: float, warned: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(CONTROLLERS.added, "raising", raising(angle))
+    made = rig(TwinConfig(robot=RobotSpec.named("scuttle3d")), "raising")
+    told: list[tuple[str, bool, float]] = []
+
+    def warn(text: str) -> None:
+        torque = all(servo.torque for servo in made.robot.servos)
+        told.append((text, torque, made.clock.now()))
+
+    report = drive(made.session, CONFIG, arm=True, operator=Operator(warn=warn))
+    assert report.on == []
+    assert not any(servo.torque for servo in made.robot.servos)
+    assert report.result(made.session)["held"] == report.held
+    if not warned:
+        assert (told, report.held) == ([], "")
+        return
+    [(text, torque, at)] = told
+    assert (text, torque) == (report.held, True)
+    assert text == "links 0 and 1 are raised: hold them"
+    assert made.clock.now() - at >= CONFIG.stand - 0.02
+
+
+def test_a_warning_that_fails_does_not_keep_torque_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONTROLLERS.added, "raising", raising(0.35))
+    made = rig(TwinConfig(robot=RobotSpec.named("scuttle3d")), "raising")
+
+    def warn(text: str) -> None:
+        raise RuntimeError(text)
+
+    with pytest.raises(RuntimeError, match="links 0 and 1"):
+        drive(made.session, CONFIG, arm=True, operator=Operator(warn=warn))
+    assert not any(servo.torque for servo in made.robot.servos)

@@ -29,11 +29,16 @@ from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tunnel.experiment import ending, films
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.bench import SweepParams
+from antennate.params.gaits import GaitParams
+from antennate.params.scene import PhysicsParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim import engine_setup
 from antennate.sim.camera import Camera
 from antennate.sim.parts import ANTENNA_BIT, LEG_BIT
+from antennate.sim.scenes.ground import GroundScene
+from antennate.sim.trial import make_world, place_at_start
 from antennate.telemetry import film
-from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder
+from antennate.telemetry.film import HEIGHT, RATE, STRIP, WIDTH, FilmRecorder, WalkRecorder
 from antennate.telemetry.strip import WINDOW, Band, Strip, Trace
 
 QUICK = ["tunnel", "--trials", "1", "--controllers", "open", "--time-limit", "1", "--workers", "1"]
@@ -54,6 +59,39 @@ def require_drawing() -> None:
         engine_setup.backend()
     except AntennateError as error:
         pytest.skip(str(error))
+
+
+def test_from_the_side_a_walk_is_seen_lower_and_nearer_and_is_the_same() -> None:
+    config = TunnelConfig(trials=1, controllers=("open",), time_limit=0.5, scene="step_up")
+    above = films(config, 0)["open"]()
+    side = above.seen_from("side")
+    assert above.seen_from("above") is above
+    assert side.shot.elevation < 30.0 < above.shot.elevation
+    assert side.shot.distance < above.shot.distance
+    assert side.shot.azimuth == above.shot.azimuth == 90.0
+    assert side.positions is above.positions
+    assert above.targets[:, 2] == pytest.approx(0.033, abs=0.01)  # the links, not the floor
+
+
+@pytest.mark.parametrize("view", ["above", "side"])
+def test_ground_floor_and_sky_are_told_apart_in_a_picture(view: Any) -> None:
+    """The floor before the step is grey, ground is warmer, and the sky is white."""
+    require_drawing()
+    robot = RobotSpec.named("scuttle3d")
+    scene = GroundScene("step_up").draw(robot, np.random.default_rng(0))
+    world = make_world(PhysicsParams(), robot, scene)
+    place_at_start(world, scene, GaitParams())
+    world.data.qpos[world.root] = scene.edges[0].x - 0.2
+    mujoco.mj_kinematics(world.model, world.data)
+    recorder = WalkRecorder(robot)
+    recorder.see(world, 0.0, counts=np.zeros(2))
+    [picture] = film.pictures(recorder.walk("", [], []).seen_from(view))
+    low = picture[HEIGHT // 2 + 40].astype(int)
+    floor, ground = low[60], low[WIDTH - 20]
+    assert np.ptp(floor) <= 3
+    assert floor.min() > 120
+    assert ground[0] > ground[2] + 5
+    assert (picture[5] == 255).all() == (view == "side")
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0])

@@ -28,6 +28,10 @@ NODDING = RobotSpec.model_validate({"pitch": {"kind": "actuated"}})
 LIFTING = RobotSpec.model_validate({"links": 3, "legs": {"kind": "lifting"}})
 
 
+PLANAR = [name for name in BUILT_IN if name not in ("geometric", "climb", "lifted", "rhythm")]
+"""Controllers of ours for such legs without pitch servos."""
+
+
 class Lift:
     """Presses all legs down by 0.3 rad and commands the pitch joints, where there are any."""
 
@@ -119,7 +123,7 @@ def test_actuated_pitch_is_driven_through_bytes_as_in_simulation() -> None:
     assert middle == (2048,) * 5  # level, half a turn of the servo
 
 
-@pytest.mark.parametrize("name", [name for name in BUILT_IN if name != "geometric"])
+@pytest.mark.parametrize("name", PLANAR)
 def test_our_controllers_step_with_lifting_legs_and_stand_in_hold(name: str) -> None:
     """A leg is up or down, half of them each; a reading that is missing moves nothing."""
     controller = make_controller(name, robot=LIFTING)

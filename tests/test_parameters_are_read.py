@@ -95,8 +95,14 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "robot": {
                 "yaw": {"servo": "xl330_m288"},
                 "legs": {"kind": "lifting", "servo": "xl430_w250"},
+                "pitch": {"kind": "actuated"},
+                "elevation": {"kind": "pair"},
             },
         },
+        *(
+            {"trials": 1, "controllers": ["open"], "time_limit": 0.02, "scene": scene}
+            for scene in ("stairs", "gap", "ramp", "rubble")
+        ),
     ],
     "compete": [
         {"trials": 1, "controllers": ["open"], "scenes": ["flat+time_limit=0.1"], "hidden": hidden}
@@ -112,6 +118,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "robot": {
                 "yaw": {"servo": servo},
                 "antenna": {"sensor": sensor},
+                "elevation": {"kind": elevation},
                 "legs": {"kind": kind, "servo": "xl430_w250"},
             },
             "unknown": ["robot.leg_friction=0.5:0.6"],
@@ -119,9 +126,9 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "physics": {"timestep": 0.004, "contact_time": 0.008},
             "rate": 50.0,
         }
-        for servo, sensor, kind in (
-            ("xl330_m288", OTHER_SENSOR, "lifting"),
-            ("xc430_w240", {}, "rolling"),
+        for servo, sensor, kind, elevation in (
+            ("xl330_m288", OTHER_SENSOR, "lifting", "pair"),
+            ("xc430_w240", {}, "rolling", "none"),
         )
     ],
     "geometry": [
@@ -139,15 +146,16 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "robot": {
                 "yaw": {"servo": servo, "fastest": 4.0},
                 "pitch": {"kind": pitch},
+                "elevation": {"kind": elevation},
                 "antenna": {"sensor": sensor},
                 "legs": {"kind": kind, "servo": "xl430_w250"},
             },
             "physics": {"timestep": 0.004, "contact_time": 0.008},
             "rate": 50.0,
         }
-        for servo, sensor, kind, pitch in (
-            ("xl330_m288", OTHER_SENSOR, "lifting", "actuated"),
-            ("xc430_w240", {}, "rolling", "locked"),
+        for servo, sensor, kind, pitch, elevation in (
+            ("xl330_m288", OTHER_SENSOR, "lifting", "actuated", "pair"),
+            ("xc430_w240", {}, "rolling", "locked", "none"),
         )
     ],
     "climb": [

@@ -43,7 +43,7 @@ tunnel --tunnel.mirror often :: expected one of random, never or always
 tunnel --trials many :: --trials: expected a whole number, found many
 tunnel --seed '' :: --seed: expected a whole number, found ''
 tunnel --robot '' :: --robot: expected  :: found nothing
-tunnel --robot scutle :: expected scuttle, hexapod or a TOML file :: did you mean scuttle
+tunnel --robot scutle :: expected scuttle, scuttle3d, hexapod or a TOML file :: did you mean scuttle
 tunnel --trials :: --trials: expected 1 value, INT, found none
 tunnel --trials 0 :: --trials: expected a number of at least 1, found 0
 tunnel --controllers dance :: controllers: expected one of open, timed, paper, closed, :: dance
@@ -80,6 +80,10 @@ twin --servos 1:xl330-m288,2:xl430-w250 :: --servos: expected values separated b
 record --marks 0,5 1,0 :: --marks: expected numbers separated by spaces, with decimal points, found '0,5 1,0'
 """
 TOGETHER = """
+tunnel --video-view side :: --video
+tunnel --video-view below --video :: --video-view :: expected one of above or side
+bench wall --video-view side --video :: expected a known flag
+log plot no.mcap --video-view side :: expected `film` beside it, found plot
 tunnel --video-trial 0 --video --no-video :: beside it, found none
 tunnel --slurm timeout_min=1 --engine dask :: beside it, found none
 tunnel --slurm timeout_min=1 --engine=local :: beside it, found none

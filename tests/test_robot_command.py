@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import combinations
 from pathlib import Path
 
 import pytest
 
 from antennate.cli import main
-from antennate.robots.parts import supply
-from antennate.robots.spec import RobotSpec
+from antennate.robots.parts import bill, supply
+from antennate.robots.spec import ROBOTS, RobotSpec
+from antennate.robots.wiring import wiring
 
 
 @pytest.mark.parametrize("links", [4, 6, 8])
@@ -36,6 +38,32 @@ def test_every_joint_is_listed_drawn_and_bought(
     stall = 1.3 * (joints - 2) + 2 * 1.47 * 5.0 / 11.1 / 0.9
     assert result["supply"]["stall"] == pytest.approx(stall)
     assert f"{stall:.1f} A if all of them stall" in said
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_no_two_boxes_of_the_wiring_are_drawn_over_one_another(name: str) -> None:
+    robot = RobotSpec.named(name)
+    axes = wiring(robot).axes[0]
+    boxes = [patch.get_window_extent() for patch in axes.patches]
+    named = [text.get_window_extent() for text in axes.texts if "  " in text.get_text()]
+    assert len(boxes) >= len(named) == len(robot.ids)
+    assert not [pair for pair in combinations(boxes, 2) if pair[0].overlaps(pair[1])]
+    for letters in named:  # each within its box
+        assert any(box.x0 < letters.x0 and letters.x1 < box.x1 for box in boxes)
+
+
+def test_elevation_servos_are_bought_fed_and_cabled() -> None:
+    """22 servos at 11.1 V, two a feed; four of 1.47 A at 5 V behind 90 %."""
+    robot = RobotSpec.named("scuttle3d")
+    power = supply(robot)
+    assert [len(rail.ids) for rail in power.rails] == [22, 4]
+    assert power.feeds == 11
+    assert power.stall == pytest.approx(1.3 * 22 + 4 * 1.47 * 5.0 / 11.1 / 0.9)
+    assert power.fuse >= 1.25 * power.peak
+    rows = {(part.use, part.item): part.count for part in bill(robot)}
+    assert rows["elevation", "DYNAMIXEL XL330-M288-T"] == 2
+    assert rows["pitch", "DYNAMIXEL XC430-W240-T"] == 5
+    assert rows["servo bus", "cable with three wires, JST EHR-03 at both ends"] == 27
 
 
 def test_one_plug_feeds_no_more_than_its_contacts_stand() -> None:

@@ -61,7 +61,10 @@ SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 BRIEF = {"patience": 1.0}
 """Torque is refused before a silent bus; it is asked for so long."""
 PITCH = {"kind": "actuated", "servo": "xl430_w250"}
-LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH}
+LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH, "elevation": {"kind": "pair"}}
+GROUND = ("stairs", "gap", "ramp", "rubble")
+"""Scenes that read all sizes of ground between them."""
+PLANAR = {name: group for name, group in LIFTING.items() if name != "elevation"}
 HEXAPOD = RobotSpec.named("hexapod").model_dump()
 """Without antennae."""
 
@@ -122,7 +125,8 @@ def driven(
         return
     told(patch, drive.command, drive.DriveOptions(arm=True, out=out, **PORTS), config)
     for name in BUILT_IN if config.control.rate < 100.0 else ():
-        act(name, config.control, config.robot)
+        climbs = name in ("climb", "lifted", "rhythm")
+        act(name, config.control, RobotSpec.named("scuttle3d") if climbs else config.robot)
 
 
 def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:
@@ -263,7 +267,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "fault_time": 0.1,
                 "robot": LIFTING,
             },
-            {**SHORT, "robot": LIFTING, "controller": "test_legs_and_pitch:Lift"},
+            {**SHORT, "robot": PLANAR, "controller": "test_legs_and_pitch:Lift"},
         ],
     ),
     "teleop": (
@@ -341,6 +345,7 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
                 "scene": "corridors",
                 "corridors": {"pieces": [2, 2], "room_share": 0.5, "arm_share": 0.5},
             },
+            *({"duration": 0.05, "scene": scene} for scene in GROUND),
         ],
     ),
 }

@@ -16,7 +16,7 @@ ODD = [np.nan, np.inf, -np.inf, -0.0, 5e-324, 0.1, 1 / 3, 1.7976931348623157e308
 """Floats that a careless writer changes."""
 
 
-def made(ticks: int = 8, links: int = 6, pitch: int = 0) -> TimeSeries:
+def made(ticks: int = 8, links: int = 6, pitch: int = 0, elevation: int = 0) -> TimeSeries:
     rng = np.random.default_rng(1)
     counts = rng.normal(size=(ticks, 2))
     counts[:, 0] = np.resize(ODD, ticks)
@@ -30,6 +30,7 @@ def made(ticks: int = 8, links: int = 6, pitch: int = 0) -> TimeSeries:
         leg=rng.normal(size=(ticks, links, 2)),
         antenna=rng.normal(size=(ticks, 2)),
         pitch=rng.normal(size=(ticks, pitch)),
+        elevation=rng.normal(size=(ticks, elevation)),
         head=rng.normal(size=(ticks, 2)),
         meta={"controller": "closed", "seed": 3, "length_m": 0.1, "scene": None, "note": "ä\n,"},
     )
@@ -52,9 +53,12 @@ def test_columns_are_named_by_side_and_axis_and_joints_are_numbered() -> None:
     pairs = [f"{name}_{side}" for name in ("counts", "level", "contact") for side in SIDES]
     legs = [f"leg_{link}_{side}" for link in range(4) for side in SIDES]
     yaw, pitch = [f"yaw_{k}" for k in range(3)], [f"pitch_{k}" for k in range(3)]
-    ends = [f"antenna_{side}" for side in SIDES]
+    ends, lifts = ([f"{name}_{side}" for side in SIDES] for name in ("antenna", "elevation"))
     assert list(made(links=4, pitch=3).columns()) == [
         *("t", *pairs, "maneuver", *yaw, *legs, *ends, *pitch, "head_x", "head_y")
+    ]
+    assert list(made(links=4, pitch=3, elevation=2).columns()) == [
+        *("t", *pairs, "maneuver", *yaw, *legs, *ends, *pitch, *lifts, "head_x", "head_y")
     ]
 
 

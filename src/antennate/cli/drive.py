@@ -264,7 +264,7 @@ def _operator(config: DriveConfig, options: DriveOptions) -> Iterator[Operator]:
                     "drive; remove it"
                 )
             arrived = stack.enter_context(Arrival(options.until))
-        yield Operator(stop, pressed, arrived or (lambda: False))
+        yield Operator(stop, pressed, arrived or (lambda: False), warn=viewer.warn)
 
 
 @dataclass(frozen=True)

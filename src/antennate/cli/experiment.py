@@ -38,6 +38,7 @@ from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD
+from antennate.telemetry import FilmView
 from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -71,6 +72,7 @@ class RunOptions(ResultOptions):
     )
     video: bool = option(False, "film one trial of each condition, drawn without a display")
     video_trial: int = option(0, "trial that --video films", "INT", needs=["--video"], ge=0)
+    video_view: FilmView = option("above", "from where --video looks", needs=["--video"])
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
         ("engine", "slurm"): experiment.anywhere,
         ("shard",): experiment.in_shards,
         ("video", "video_trial"): experiment.films is not None,
+        ("video_view",): experiment.films is not None and "robot" in experiment.config.model_fields,
         ("video_trial",): "trials" in experiment.config.model_fields,
         tuple(fields_of(ViewOptions)): experiment.shown,
         ("log",): experiment.logs is not None,
@@ -324,7 +327,7 @@ def _end(
     if options.video:
         try:
             with progress("% of the films") as step:
-                write_films(experiment, config, options.video_trial, run, step)
+                write_films(experiment, config, options.video_trial, run, step, options.video_view)
         except KeyboardInterrupt:
             sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
             return INTERRUPTED

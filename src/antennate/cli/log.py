@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -30,6 +31,7 @@ from antennate.studies.parquet import require_parquet
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
+from antennate.telemetry import FilmView
 from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, parts
 from antennate.telemetry.reader import LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
@@ -76,6 +78,7 @@ class LogOptions(ResultOptions):
         "FILE",
     )
     overwrite: bool = option(False, "replace that file")
+    video_view: FilmView = option("above", "from where `film` looks")
     json: bool = option(False, "print what `info` finds as JSON")
 
 
@@ -91,6 +94,8 @@ def command(argv: Sequence[str]) -> int:
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
     path = log_of(Path(options.log))
+    if options.video_view != "above" and options.action != "film":
+        raise ConfigError(f"--video-view: expected `film` beside it, found {options.action}")
     if options.action == "info":
         for flag, given in (("--out", options.out is not None), ("--overwrite", options.overwrite)):
             if given:
@@ -105,7 +110,7 @@ def command(argv: Sequence[str]) -> int:
         "recover": _recover,
         "export": _export,
         "plot": _plot,
-        "film": _film,
+        "film": partial(_film, view=options.video_view),
     }
     place = target.resolve()
     remove_abandoned(place.parent, place.name.__eq__)
@@ -187,13 +192,13 @@ def _plot(path: Path, target: Path) -> LogReader:
     return log
 
 
-def _film(path: Path, target: Path) -> LogReader:
+def _film(path: Path, target: Path, view: FilmView) -> LogReader:
     from antennate.telemetry.film import PICTURE_SIZE, encoded, require_video  # slow to import
     from antennate.telemetry.log_film import film_of
 
     with LogReader(path) as log:
         require_video()
-        film = film_of(log, arena_of(path, log.header), path.name)
+        film = film_of(log, arena_of(path, log.header), path.name).seen_from(view)
     require_room(target, PICTURE_SIZE * len(film.t))
     with (
         progress("pictures of the film") as step,

@@ -30,6 +30,7 @@ from antennate.hardware.host import LEVEL, urgent
 from antennate.hardware.ports.finder import read_key
 from antennate.params.base import changes, paths_of
 from antennate.sim.world import World
+from antennate.telemetry import FilmView
 from antennate.telemetry.twin_log import TwinLog
 from antennate.twin.board import UdpEndpoint
 from antennate.twin.config import Passage, TwinConfig, watched
@@ -92,6 +93,7 @@ class RecordOptions:
 
     log: Path | None = option(None, "keep a log, .mcap", "FILE")
     video: Path | None = option(None, "film it, .mp4; drawn when it has ended", "FILE")
+    video_view: FilmView = option("above", "from where --video looks", needs=["--video"])
 
 
 @dataclass(frozen=True)
@@ -372,12 +374,12 @@ class Recording:
             if not failure:
                 _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
         if self._film is not None and self._options.video is not None:
-            _draw(self._film, self._options.video)
+            _draw(self._film, self._options.video, self._options.video_view)
         if failure and isinstance(error, KeyboardInterrupt | None):
             raise LogError(failure) from None
 
 
-def _draw(recorded: TwinFilm, path: Path) -> None:
+def _draw(recorded: TwinFilm, path: Path, view: FilmView) -> None:
     """Draw the film; a second Ctrl-C gives it up."""
     from antennate.telemetry.film import MOST_PICTURES, RATE, encoded
 
@@ -389,7 +391,7 @@ def _draw(recorded: TwinFilm, path: Path) -> None:
         _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
     try:
         with progress("pictures of the film") as step, stop_signals():
-            data = encoded(film, step)
+            data = encoded(film.seen_from(view), step)
     except KeyboardInterrupt:
         _say("video: interrupted: no film was written")
         return

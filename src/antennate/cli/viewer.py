@@ -228,6 +228,11 @@ def say(error: AntennateError) -> None:
     write(f"\nantennate drive: {one_line(str(error))}\n")
 
 
+def warn(text: str) -> None:
+    """Show on stderr what to do before torque goes off, below the status line."""
+    write(f"\nantennate drive: torque goes off now; {text}\n")
+
+
 MEASURES = (
     Measure("pace.ticks", "ticks", form="d"),
     Measure("pace.missed_cycles", "missed ticks", form="d"),
@@ -258,7 +263,9 @@ def sentences(result: Mapping[str, Any]) -> str:
     """What came out, how late the loop was, and the cure of what went wrong."""
     held = result["worst_state"] == State.HOLD.name and result.get("worst_s", 0.0) >= _LONG
     causes = f"{result['refusal']}; {result['why']}" if held or failed(result) else ""
-    return "\n".join([_sentence(result), *late_sentence(result), *what_to_do(causes)])
+    held = result.get("held")  # results of older versions have none
+    last = [f"Before torque went off: {held}."] if held else []
+    return "\n".join([_sentence(result), *late_sentence(result), *what_to_do(causes), *last])
 
 
 _LONG = 1.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antennate.params.base import paths_of
+from antennate.params.climb import ClimbParams
 from antennate.params.control import (
     CentreParams,
     ControlParams,
@@ -102,8 +103,8 @@ _RANDOM = paths_of(RandomParams, "random")
 _FOLLOW = paths_of(FollowParams, "follow")
 _CENTRE = paths_of(CentreParams, "centre")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
-_OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE)
-"""Groups of one controller each."""
+_OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *paths_of(ClimbParams, "climb"))
+"""Groups of single controllers, and of those that climb."""
 _GEOMETRIC = paths_of(GeometricParams, "geometric")
 _SEARCH = (*paths_of(SearchParams, "search"), *_GEOMETRIC)
 _SIZES = (

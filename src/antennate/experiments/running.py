@@ -22,6 +22,7 @@ from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import FILMS
+from antennate.telemetry import FilmView
 
 _PARTS = 100
 """Parts of the making of a film that are told."""
@@ -223,6 +224,7 @@ def write_films(
     trial: int,
     directory: RunDirectory,
     on_step: Callable[[int, int], None] = lambda done, total: None,
+    view: FilmView = "above",
 ) -> None:
     """Run one trial of each condition once more, and write its film into the run directory.
 
@@ -238,7 +240,7 @@ def write_films(
         def step(part: int, total: int, before: int = _PARTS * done) -> None:
             on_step(before + _PARTS * part // total, _PARTS * len(records))
 
-        data = encoded(record(), step)
+        data = encoded(record().seen_from(view), step)
         directory.write(f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4", data)
 
 

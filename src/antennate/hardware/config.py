@@ -136,6 +136,7 @@ class RobotConfig(Params):
 _EXAMINED = (
     *paths_of(ConditioningParams, "control.conditioning"),
     "control.conditioning_right",
+    "control.rate",
     "control.rule.threshold",
     *(
         f"limits.{name}"

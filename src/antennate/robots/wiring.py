@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
+from antennate.robots.antenna import BASE
 from antennate.robots.parts import Supply, servos_of, supply
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
@@ -28,6 +29,8 @@ _TOP, _STEP = -0.35, 0.72
 """Height of the first boxes above the servos, and from one to the next."""
 _ANTENNAE, _CONVERTER, _FIRST = -2.8, -3.3, -3.95
 """Heights of the antennae's servos, of the converter and of the first row of legs."""
+_ASIDE, _WIDE = 3.69, 1.36
+"""Column of the right antenna's servos where there are two rows, and width of their boxes."""
 _HEIGHT, _LETTERS = 0.3, 8
 """Of a box, and of its letters [points]."""
 _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
@@ -38,7 +41,7 @@ _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
 def wiring(robot: RobotSpec) -> Figure:
     """The diagram; the order of the bus is that of the cable, head first."""
     power, places = supply(robot), _places(robot)
-    end = _FIRST - 2 * (robot.links - 1) * _ROW
+    end = _FIRST - _lower(robot) - 2 * (robot.links - 1) * _ROW
     legend = _told(power)
     low = end - 0.5 - 0.16 * legend.count("\n") - 0.2
     figure = Figure(figsize=(style.WIDTH, -low))
@@ -49,39 +52,57 @@ def wiring(robot: RobotSpec) -> Figure:
     servos = dict(zip(robot.joint_names, servos_of(robot), strict=True))
     order = _cable(robot)
     _bus(axes, [places[name] for name in order])
-    _feeds(axes, power, order, places, servos)
+    converter = _CONVERTER - _lower(robot)
+    _feeds(axes, power, order, places, servos, converter)
     for name, servo_id in zip(robot.joint_names, robot.ids, strict=True):
         kind = servos[name]
         colour = _MAIN if kind.voltage == power.rails[0].voltage else _LOW
-        width = 0.92 if not name.startswith(ANTENNA_PREFIXES) else 1.24
+        width = (
+            0.92
+            if not name.startswith(ANTENNA_PREFIXES)
+            else _WIDE
+            if robot.elevation_count
+            else 1.24
+        )
         _box(axes, places[name], f"{servo_id}  {name}\n{kind.product}", colour, width)
-    _electronics(axes, power, bool(robot.antenna_count))
+    _electronics(axes, power, bool(robot.antenna_count), converter)
     axes.text(0.1, end - 0.45, legend, fontsize=_LETTERS, va="top", linespacing=1.4)
     return figure
+
+
+def _lower(robot: RobotSpec) -> float:
+    """How much lower all below the first row of antenna servos stands than without a second one."""
+    return _ROW if robot.elevation_count else 0.0
 
 
 def _places(robot: RobotSpec) -> dict[str, Place]:
     """Where each joint stands in the picture, head to the top."""
     places: dict[str, Place] = {}
-    antennae = (_ADAPTER, _ANTENNAE), (_BOARD, _ANTENNAE)
-    for side, prefix, antenna in zip(SIDES, ANTENNA_PREFIXES, antennae, strict=True):
+    lower = _lower(robot)
+    first, columns = _FIRST - lower, (_ADAPTER, _BOARD if not lower else _ASIDE)
+    for side, prefix, column in zip(SIDES, ANTENNA_PREFIXES, columns, strict=True):
         for name in robot.joint_names:
             if name.startswith(prefix):
-                places[name] = antenna
+                row = _ANTENNAE - (lower if name.endswith(BASE) else 0.0)
+                places[name] = (column, row)
             elif name.startswith(f"leg_{side}"):
                 link = int(name.removeprefix(f"leg_{side}"))
-                places[name] = (_LEFT if side == SIDES[0] else _RIGHT, _FIRST - 2 * link * _ROW)
+                places[name] = (_LEFT if side == SIDES[0] else _RIGHT, first - 2 * link * _ROW)
     shift = 0.57 if robot.pitch_count else 0.0
     for j in range(1, robot.links):
-        places[f"yaw{j}"] = (_MIDDLE - shift, _FIRST - (2 * j - 1) * _ROW)
-        places[f"pitch{j}"] = (_MIDDLE + shift, _FIRST - (2 * j - 1) * _ROW)
+        places[f"yaw{j}"] = (_MIDDLE - shift, first - (2 * j - 1) * _ROW)
+        places[f"pitch{j}"] = (_MIDDLE + shift, first - (2 * j - 1) * _ROW)
     return places
 
 
 def _cable(robot: RobotSpec) -> list[str]:
-    """Joints in the order in which the cable reaches them."""
+    """Joints in the order in which the cable reaches them.
+
+    Of the antennae first what stands on the head, then what that carries, back from the right.
+    """
     names = robot.joint_names
-    order = [name for prefix in ANTENNA_PREFIXES for name in names if name.startswith(prefix)]
+    bases = [name for name in names if name.endswith(BASE)]
+    order = [*robot.elevation_names, *(reversed(bases) if robot.elevation_count else bases)]
     for link in range(robot.links):
         order += [f"{kind}{link}" for kind in ("yaw", "pitch") if f"{kind}{link}" in names]
         order += [f"leg_{side}{link}" for side in SIDES]
@@ -99,6 +120,7 @@ def _feeds(
     order: Sequence[str],
     places: dict[str, Place],
     servos: dict[str, ServoParams],
+    converter: float,
 ) -> None:
     """The lines of both voltages and of ground, and where they reach the cable."""
     end, below = min(y for _, y in places.values()) + 0.24, _TOP - 2 * _STEP - 0.35
@@ -110,8 +132,9 @@ def _feeds(
         _feed(axes, _RAIL, places[name], _MAIN)
     for name in [*main[:: power.per_feed], *(name for name in order if name not in main)]:
         _feed(axes, _GROUND, places[name], style.INK)
-    for x, y in (places[name] for name in order if name not in main):
-        _line(axes, [(_SUPPLY, _CONVERTER), (x, _CONVERTER), (x, y)], _LOW, 1.4)
+    aside = 0.0 if converter == _CONVERTER else 0.4  # beside the cable between two rows
+    for x, y in ((places[name][0] + aside, places[name][1]) for name in order if name not in main):
+        _line(axes, [(_SUPPLY, converter), (x, converter), (x, y)], _LOW, 1.4)
 
 
 def _feed(axes: Axes, line: float, place: Place, colour: str) -> None:
@@ -155,7 +178,7 @@ def _box(
     axes.text(x, y, text, ha="center", va="center", fontsize=_LETTERS, zorder=3)
 
 
-def _electronics(axes: Axes, power: Supply, antennae: bool) -> None:
+def _electronics(axes: Axes, power: Supply, antennae: bool, converter: float) -> None:
     """Battery, fuse, stop, converter and adapter above, and the board of the antennae."""
     main = power.rails[0].voltage
     for step, text in enumerate(
@@ -173,11 +196,11 @@ def _electronics(axes: Axes, power: Supply, antennae: bool) -> None:
         _board(axes)
     for rail in power.rails[1:]:
         text = f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
-        _box(axes, (_SUPPLY, _CONVERTER), text, _LOW, 1.0)
+        _box(axes, (_SUPPLY, converter), text, _LOW, 1.0)
         for line, y, colour in ((_RAIL, 0.07, _MAIN), (_GROUND, -0.07, style.INK)):
-            _line(axes, [(line, _CONVERTER + y), (_SUPPLY, _CONVERTER + y)], colour, 1.4)
-            _joint(axes, (line, _CONVERTER + y), colour)
-        _voltage(axes, (_SUPPLY + 0.62, _CONVERTER + 0.04), rail.voltage, _LOW)
+            _line(axes, [(line, converter + y), (_SUPPLY, converter + y)], colour, 1.4)
+            _joint(axes, (line, converter + y), colour)
+        _voltage(axes, (_SUPPLY + 0.62, converter + 0.04), rail.voltage, _LOW)
         _warning(axes, main, rail.voltage)
 
 

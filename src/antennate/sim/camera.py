@@ -26,6 +26,9 @@ _SAMPLES = 4
 """Samples of a pixel: thin antennae would flicker otherwise."""
 _THIN = 1.5
 """Least radius of an antenna in the middle of a picture [pixels], so that it is seen (assumed)."""
+_SKY, _HORIZON = 255, 30.0
+"""Grey of what is behind all, and elevation below which it is in the picture [deg]: half the field
+of view, and some more."""
 _GRID = 16
 """Grid lines to either side of the middle."""
 
@@ -84,7 +87,7 @@ class Camera:
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 500)
         self._option = mujoco.MjvOption()
-        self._shot = shot
+        self._shot, self._sees_sky = shot, shot.elevation < _HORIZON
         self._camera = _aimed(shot)
         if shot.flat:
             self._model.vis.global_.fovy = _RIGHT_ANGLE or 2 * shot.distance
@@ -120,7 +123,10 @@ class Camera:
         self._driver.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._context)
         pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(pixels, None, self._rect, self._context)
+        depth = np.empty(pixels.shape[:2], dtype=np.float32) if self._sees_sky else None
+        mujoco.mjr_readPixels(pixels, depth, self._rect, self._context)
+        if depth is not None:
+            pixels[depth >= 1.0] = _SKY
         return pixels[::-1]
 
     def __enter__(self) -> Camera:

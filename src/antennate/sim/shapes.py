@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from antennate.errors import BadInputError
 from antennate.robots.spec import ANTENNA_PREFIXES
 from antennate.sim.engine import mujoco
-from antennate.sim.parts import ANTENNA_BIT, BODY_BIT, FLOOR_BIT, LEG_BIT, OBSTACLE_BIT
+from antennate.sim.parts import ANTENNA_BIT, BODY_BIT, FLOOR_BIT, GROUND_BIT, LEG_BIT, OBSTACLE_BIT
 from antennate.sim.places import Contacts
 from antennate.types import Bools, Floats, Ints
 
@@ -33,6 +33,7 @@ Colour = tuple[float, float, float, float]
 _UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 """The engine's colour of a geom that has none of its own."""
 FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
+_GROUND: Colour = (0.90, 0.88, 0.83, 1.0)
 _OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
 _BODY: Colour = (0.34, 0.34, 0.38, 1.0)
 _LEG: Colour = (0.53, 0.55, 0.60, 1.0)
@@ -48,8 +49,9 @@ def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.f
     painted = model.geom_rgba.copy()
     bare = (painted == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
     kind = model.geom_contype
+    painted[bare & ((kind & GROUND_BIT) != 0)] = _GROUND
+    painted[bare & ((kind & FLOOR_BIT) != 0)] = FLOOR
     for bit, colour in (
-        (FLOOR_BIT, FLOOR),
         (OBSTACLE_BIT, _OBSTACLE),
         (BODY_BIT, _BODY),
         (LEG_BIT, _LEG),

@@ -301,6 +301,11 @@ class Judge:
         return self._crossings > 0
 
 
+def is_uneven(scene: SceneInstance) -> bool:
+    """Whether the ground of a scene is not flat, so that robots that have overturned are told."""
+    return hasattr(scene, "ground")
+
+
 def _exit_of(scene: SceneInstance) -> Floats:
     try:
         line = np.asarray(scene.exit, float)

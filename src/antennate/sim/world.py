@@ -240,6 +240,24 @@ class World:
         self._qpos[self.places.driven] = angles
         mujoco.mj_forward(self.model, self.data)
 
+    def stand_on_tail(self) -> None:
+        """Turn and raise the robot so that its last link is level, as high as at the start.
+
+        For what knows the joints alone, of a robot whose links can rise.
+        """
+        data, root = self.data, self.root
+        upright, new = np.zeros(4), np.zeros(4)
+        across = data.xmat[self.places.links[-1]].reshape(3, 3)[:, 2]
+        axis = np.cross(across, [0.0, 0.0, 1.0])
+        sine = float(np.linalg.norm(axis))
+        angle = math.atan2(sine, float(across[2]))
+        mujoco.mju_axisAngle2Quat(upright, axis / (sine or 1.0), angle)
+        mujoco.mju_mulQuat(new, upright, data.qpos[root + 3 : root + 7])
+        data.qpos[root + 3 : root + 7] = new
+        mujoco.mj_kinematics(self.model, data)
+        data.qpos[root + 2] += axle_height(self.robot) - data.xpos[self.places.links[-1], 2]
+        mujoco.mj_forward(self.model, data)
+
     def drive_speeds(self) -> Floats:
         """Speeds of all driven joints [rad/s], shape (n,)."""
         return self._qvel[self.places.turning]

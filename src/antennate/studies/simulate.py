@@ -23,6 +23,7 @@ from antennate.sim.trial import (
     Trial,
     TrialConfig,
     draw_trial,
+    is_uneven,
     require_own_curves,
     require_room,
     scene_of,
@@ -53,10 +54,12 @@ def simulate(
             earlier at the exit, or when the robot has left the scene or the physics failed.
         control: Parameters of the controller, the defaults if not given.
         log: A file that does not exist yet, with the ending .mcap, for the log of the trial.
-        settings: Fields of the trial: seed, scene, robot, tunnel, corridors, variation, physics.
+        settings: Fields of the trial: seed, scene, robot, tunnel, corridors, ground, variation,
+            physics.
 
     Returns:
-        The series; `meta["outcome"]` is success, timeout, left or invalid.
+        The series; `meta["outcome"]` is success, timeout, left, overturned or
+        invalid.
 
     Raises:
         ConfigError: A setting is unknown or out of bounds, there is no such controller, the log
@@ -162,5 +165,9 @@ class _Walk:
         self._ticks += 1
         self.outcome = "invalid" if self._robot.failures else "timeout"
         if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
-            self.outcome = self._judge.look(self._start.world.head[:2]) or "timeout"
+            world, scene = self._start.world, self._start.scene
+            fallen = is_uneven(scene) and world.overturned
+            self.outcome = self._judge.look(world.head[:2]) or (
+                "overturned" if fallen else "timeout"
+            )
         return self.outcome == "timeout" and self._start.world.t < self._time_limit

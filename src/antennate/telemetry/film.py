@@ -9,7 +9,7 @@ import importlib
 import io
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -23,6 +23,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim import engine_setup
 from antennate.sim.camera import Camera, Picture, Shot
 from antennate.sim.world import World
+from antennate.telemetry import FilmView
 from antennate.telemetry.strip import Band, Strip, Trace, with_word
 from antennate.types import Contact, Floats, Ints, Maneuver
 
@@ -43,6 +44,10 @@ _CONTACTS = {
     int(Contact.CONTACT): ("contact", "#222222"),
     int(Contact.UNKNOWN): ("unknown", "#CC79A7"),
 }
+_NEARER = 0.55
+"""Distance from the side over that from above: its height needs no room in the picture."""
+_LOW = 14.0
+"""Elevation of the camera at the side [deg]: above the next step, 0.2 m higher, yet low."""
 _MANEUVERS = {int(m): (MANEUVER_NAMES[m], MANEUVER_COLOURS[m]) for m in Maneuver}
 
 
@@ -70,6 +75,13 @@ class Film:
     traces: Sequence[Trace]
     bands: Sequence[Band]
     ending: str = ""
+
+    def seen_from(self, view: FilmView) -> Film:
+        """The same film of a walk, seen from there."""
+        if view == "above":
+            return self
+        near = replace(self.shot, distance=_NEARER * self.shot.distance, elevation=_LOW)
+        return replace(self, shot=near)
 
     @property
     def held(self) -> int:
@@ -159,7 +171,7 @@ class WalkRecorder(FilmRecorder):
     def see(self, world: World, t: float, **values: Any) -> None:
         """Offer a moment [s] with `counts` and whatever else is to be shown; see `take`."""
         self._model = world.model
-        self.take(t, world.data.qpos, world.links().mean(axis=0), **values)
+        self.take(t, world.data.qpos, world.link_places().mean(axis=0), **values)
 
     def walk(
         self, title: str, traces: Sequence[Trace], bands: Sequence[Band], ending: str = ""

@@ -17,7 +17,9 @@ from antennate.notebook import from_columns, html
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
 _ENDS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("counts", "level", "contact", "leg", "antenna"), ("left", "right")),
+    **dict.fromkeys(
+        ("counts", "level", "contact", "leg", "antenna", "elevation"), ("left", "right")
+    ),
     "head": ("x", "y"),
 }
 """What the columns of the last axis are called; those of others are numbered, head first."""

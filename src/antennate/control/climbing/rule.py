@@ -199,9 +199,9 @@ class ClimbRule:
         return Maneuver.FORWARD
 
     def _wall(self, row: int) -> None:
-        """Give up all plans, and steer."""
+        """Give up plans for what is ahead, and steer; those behind the head go on."""
         self.ground[row], self.height[row] = Ground.WALL, math.inf
-        self._body.progress[row] = np.nan
+        self._body.progress[row, ~self._body.behind[row]] = np.nan
         self._steer.reset(np.array([row]))
         self._to(row, Stage.STEER)
 
@@ -241,6 +241,8 @@ class ClimbRule:
     def _in_plane(self, row: int, flex: Floats, steering: int) -> int:
         """Steer by level antennae, as `closed` does, until nothing is felt for a while."""
         self._pose(row, 0.0, self._feel.plane_sweep)
+        if steering == Maneuver.FORWARD:
+            self._body.advance(self._one(row))
         if self._free[row] > self._feel.plane_time and steering == Maneuver.FORWARD:
             self._to(row, Stage.WALK)
         return steering

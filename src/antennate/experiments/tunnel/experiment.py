@@ -201,6 +201,7 @@ def ending(row: TrialResult, config: TunnelConfig) -> str:
         "success": there,
         "timeout": "stuck" if row.stuck > row.recovered else f"not {there}",
         "left": "left the scene",
+        "overturned": "overturned",
         "invalid": "invalid",
     }
     return f"{words[row.outcome]} after {row.time_s:.3g} s"

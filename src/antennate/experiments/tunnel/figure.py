@@ -39,6 +39,7 @@ _OUTCOMES = {
     "success": "out after {:.1f} s",
     "timeout": "out of time, {:.0f} s",
     "left": "left the scene",
+    "overturned": "overturned",
     "invalid": "invalid",
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from statistics import median
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 from antennate.dxl.inquiry import FOUND, State
 from antennate.dxl.model import RETURN_DELAY_UNIT, WATCHDOG_UNIT, hardware_errors
@@ -13,6 +13,7 @@ from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, worst
 from antennate.hardware.dynamixel.bringup import CURE
+from antennate.hardware.dynamixel.tick_time import ADAPTER, tick_time
 from antennate.hardware.joints import settings
 from antennate.robots.spec import RobotSpec
 
@@ -234,6 +235,7 @@ def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, st
     if not bus.registers.keys() & set(robot.ids):
         return
     yield from register_findings(bus, config)
+    yield tick_finding(bus, config), "tick on the wire", _shorter(config)
     if bus.ping_times:
         yield _answer_time(bus, config), "answer time", f"at most {1e3 * good.answer_time:g} ms"
     if bus.read_time is not None:
@@ -336,6 +338,27 @@ def _answer_time(bus: BusSurvey, config: DoctorConfig) -> Finding:
         "before a twin, or on a busy computer, the computer may be too busy: close other programs"
     )
     return Finding(longest, "bad", f"{late}: check its return delay, then its cable; {busy}")
+
+
+_BAUDS: tuple[int, ...] = get_args(RobotSpec.model_fields["baud"].annotation)
+
+
+def _shorter(config: DoctorConfig) -> str:
+    return (
+        f"at most {1e3 * (config.control.period - ADAPTER):g} of {1e3 * config.control.period:g} ms"
+    )
+
+
+def tick_finding(bus: BusSurvey, config: DoctorConfig) -> Finding:
+    """Whether goals and answers of a tick fit it, all servos there; the speed at which they do."""
+    ids, longest = config.robot.ids, config.control.period - ADAPTER
+    time = tick_time(ids, bus.baud, bus.fast)
+    text = f"{1e3 * time:.1f} ms for {len(ids)} servos at {bus.baud}"
+    if time <= longest:
+        return Finding(text)
+    faster = [baud for baud in _BAUDS if tick_time(ids, baud, bus.fast) <= longest]
+    cure = f"set robot.baud to {min(faster)} and {FIX}" if faster else "lower control.rate"
+    return Finding(text, "bad", cure)
 
 
 def _read_time(bus: BusSurvey, time: float, longest: float) -> Finding:

@@ -10,7 +10,7 @@ from functools import partial
 
 from antennate.control.loop import run_loop
 from antennate.hardware.config import DriveConfig
-from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.report import Report, raised_links
 from antennate.hardware.driving.stopping import DeadMan, StopOnce
 from antennate.hardware.safety.causes import OF_CONTROLLER, Cause, State
 from antennate.hardware.safety.session import Session
@@ -29,12 +29,14 @@ class Operator:
             if no key has to be held.
         arrived: Whether the robot is where it was to go.
         watches: Whether somebody sees what the robot does; torque waits for that.
+        warn: Tells what to hold before torque goes off.
     """
 
     stop: StopOnce | None = None
     pressed: Callable[[], bool] | None = None
     arrived: Callable[[], bool] = field(default=lambda: False)
     watches: Callable[[], bool] = field(default=lambda: True)
+    warn: Callable[[str], None] = field(default=lambda text: None)
 
 
 _SKIP = "; --no-touch-check arms without the check"
@@ -156,7 +158,7 @@ def drive(
             report.ended = _SIGNAL if stop.received else str(error) or "its controller"
         finally:
             stop.closed = True
-            report.on = _off(session, config.stand)
+            report.on = _off(session, config.stand, report, operator.warn)
             report.close(session)
     return report
 
@@ -226,11 +228,20 @@ class _Going:
         return t >= self._failed_at + wait
 
 
-def _off(session: Session, stand: float) -> list[int] | None:
-    """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on."""
+def _off(
+    session: Session, stand: float, report: Report, warn: Callable[[str], None]
+) -> list[int] | None:
+    """Stand for a moment, then torque off: ids that did not confirm it, None if it never was on.
+
+    Links in the air are told first, so that somebody can hold them while the robot stands.
+    """
     if not session.touched:
         return None
     try:
+        if session.actuators.enabled:
+            report.held = raised_links(session.control.command.pitch.ravel().tolist())
+        if report.held:
+            warn(report.held)
         session.stand(stand)
     finally:
         left = session.release()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -95,6 +95,38 @@ def late_sentence(result: Mapping[str, Any]) -> list[str]:
     ]
 
 
+RAISED = 0.1
+"""Angle of a pitch joint from which on links may hang in the air [rad] (assumed: a link of 0.12 m
+is 12 mm high then)."""
+
+
+def raised_links(pitch: Sequence[float]) -> str:
+    """What to hold before torque goes off, in words; empty if no pitch joint is bent by RAISED.
+
+    Of a joint it is the shorter part, the front one of two that are alike: links in front of it if
+    it is within the front half, else those behind it.
+
+    Args:
+        pitch: Commanded pitch joints, head first [rad], positive where both parts rise.
+    """
+    parts: dict[str, set[int]] = {"raised": set(), "lowered": set()}
+    count = len(pitch) + 1
+    for joint, angle in enumerate(pitch, start=1):
+        if abs(angle) > RAISED:
+            links = range(joint) if joint <= count - joint else range(joint, count)
+            parts["raised" if angle > 0 else "lowered"] |= {*links}
+    parts["lowered"] -= parts["raised"]
+    return "; ".join(_held(sorted(links), how) for how, links in parts.items() if links)
+
+
+def _held(links: Sequence[int], how: str) -> str:
+    """Links in words, as "links 0 and 1 are raised: hold them"."""
+    if len(links) == 1:
+        return f"link {links[0]} is {how}: hold it"
+    *others, last = map(str, links)
+    return f"links {', '.join(others)} and {last} are {how}: hold them"
+
+
 _FILLING = (Cause.STALE, Cause.LOST)
 """What is said of a healthy board, too, until it has sent a few readings."""
 _FILLED = 1.0
@@ -144,6 +176,7 @@ class Report:
         why: The causes of the longest time in that state, an operator's key that was let go last.
         refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
+        held: What was to be held when torque went off, in words; empty if nothing was.
         ended: What ended it.
         walk: How long the robot walked.
     """
@@ -154,6 +187,7 @@ class Report:
     why: str = ""
     refusal: str = ""
     on: list[int] | None = None
+    held: str = ""
     ended: str = ""
     walk: Walk = field(default_factory=Walk)
     _torque: bool = False
@@ -224,6 +258,7 @@ class Report:
             "ended": self.ended,
             "torque_off": None if self.on is None else self.safe,
             "servos_on": self.on or [],
+            "held": self.held,
             "pace": _pace(self.timing),
             "walking": _since(self.timing, self.before),
             "walked_s": self.walk.time,

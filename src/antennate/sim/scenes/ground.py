@@ -89,8 +89,8 @@ class Ground(Route):
         heights = np.cumsum([start, *(edge.rise for edge in self.edges)])
         self._levels: Floats = heights
         self.top = float(heights.max() + 2.0 * self._blocks[:, 4].max(initial=0.0))
-        last = max([0.0, *(edge.x for edge in self.edges), *([ramp[1]] if ramp else [])])
-        end = max(last, float(self._blocks[:, 0].max(initial=0.0))) + length
+        ends = [0.0, *(edge.x for edge in self.edges), *self._blocks[:, 0].tolist()]
+        end = max(ends) + length
         super().__init__(np.array([[0.0, 0.0], [end, 0.0]]))
 
     def build(self, spec: mujoco.MjSpec) -> None:

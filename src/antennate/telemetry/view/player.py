@@ -71,6 +71,8 @@ class LogScene:
         before = self.world.drives()
         if angles.shape == before.shape:
             self.world.place_drives(np.where(np.isfinite(angles), angles, before))
+            if self.world.robot.pitch_count:
+                self.world.stand_on_tail()
 
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
