@@ -78,6 +78,13 @@ def press(controller: Controller, control: ControlParams) -> None:
 
 
 def meet_ground(control: ControlParams, robot: RobotSpec) -> None:
+    """Let `climb` meet all kinds of ground, and `lifted` and `rhythm` climb."""
+    climb_all(control, robot)
+    for name in ("lifted", "rhythm"):
+        act(name, control, robot)
+
+
+def climb_all(control: ControlParams, robot: RobotSpec) -> None:
     """Let `climb` meet low and high steps, drops with and without a floor, and walk on behind."""
     straight, floor, bent = 1870.0, 1745.0, 1500.0
     controller = climb(control, robot, 1)
@@ -100,5 +107,3 @@ def meet_ground(control: ControlParams, robot: RobotSpec) -> None:
         controller.step(AntennaFrame(t=t, counts=np.full((1, 2), counts)))
     rule.stage[0] = Stage.RETREAT  # as after a climb that failed
     controller.step(AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), floor)))
-    for name in ("lifted", "rhythm"):
-        act(name, control, robot)

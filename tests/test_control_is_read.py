@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from recorded import act, leaves, press, recorded
+from recorded import act, climb_all, leaves, press, recorded
 
 from antennate.cli import main
 from antennate.control.readers import BY_CONTACT, TELEOP, UNREAD, unread_by_all
@@ -25,6 +25,8 @@ from antennate.telemetry.view.pace import Tuning
 
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'own_controller.py'}:OwnController"
 LIFTING = {"legs": {"kind": "lifting"}}
+RISING = {"pitch": {"kind": "actuated"}, "elevation": {"kind": "pair"}}
+CLIMBING = ("climb", "lifted", "rhythm", "edges")
 
 
 def by_keys(control: ControlParams, robot: RobotSpec) -> None:
@@ -35,6 +37,7 @@ def by_keys(control: ControlParams, robot: RobotSpec) -> None:
 ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
     **{name: lambda c, r, name=name: act(name, c, r) for name in (*BUILT_IN, *PRIVILEGED)},
     TELEOP: by_keys,
+    "climb": climb_all,
 }
 
 
@@ -47,7 +50,7 @@ def test_what_a_controller_is_said_not_to_read_is_that(
     if name == "geometric" and robot:
         pytest.skip("it refuses lifting legs (test_geometric.py)")
     control = ControlParams.model_validate({"rate": 25.0, "escape": {"trigger": trigger}})
-    spec = RobotSpec.model_validate(robot)
+    spec = RobotSpec.model_validate(robot | (RISING if name in CLIMBING else {}))
     with recorded(control) as read:
         ACTS[name](control, spec)
     unread = {f"control.{leaf}" for leaf in set(leaves(ControlParams)) - read}

@@ -103,7 +103,23 @@ _RANDOM = paths_of(RandomParams, "random")
 _FOLLOW = paths_of(FollowParams, "follow")
 _CENTRE = paths_of(CentreParams, "centre")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
-_OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *paths_of(ClimbParams, "climb"))
+_CLIMB = paths_of(ClimbParams, "climb")
+_BODY = tuple(
+    f"climb.{name}"
+    for name in (
+        *("rise", "ramp", "before", "over", "settle", "amplitude", "amplitude_rate", "rate"),
+        *("carry_gain", "carry_rate"),
+    )
+)
+"""What raises a body."""
+_RAISED = (*_BODY, "climb.feel.highest")
+"""The same with antennae held up."""
+_RHYTHM = tuple(
+    f"climb.{name}"
+    for name in ("walk_time", "retreat_time", "lift_time", "approach_time", "ahead", "pace")
+)
+"""A round of `rhythm`."""
+_OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *_CLIMB)
 """Groups of single controllers, and of those that climb."""
 _GEOMETRIC = paths_of(GeometricParams, "geometric")
 _SEARCH = (*paths_of(SearchParams, "search"), *_GEOMETRIC)
@@ -146,6 +162,13 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "centre": _without(_CENTRE, *_TURNING),
     "zigzag": _without(_ZIGZAG, *_TURNING),
     "random": _without(_RANDOM, *_TURNING),
+    "climb": (
+        *(*_TABLE, *_BLIND, *_FOLLOW, *_CENTRE, *_OTHER_ESCAPE, *_GEOMETRIC),
+        *("climb.lift", "climb.walk_time"),
+    ),
+    "lifted": _without((*_BODY, "climb.lift"), *_ESCAPE),
+    "rhythm": _without((*_RAISED, *_RHYTHM), *_ESCAPE),
+    "edges": _without(_RAISED, *_ESCAPE),
     "map": (*_TABLE, *_OTHERS, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
 }

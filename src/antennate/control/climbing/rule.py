@@ -145,7 +145,7 @@ class ClimbRule:
     def _misses_ground(self, row: int) -> bool:
         """Both antennae for a while, or one of them, as at an edge that is met aslant."""
         low, high = sorted(self._missed[row].tolist())
-        return low > self._feel.missing_time or high > self._feel.aslant_time
+        return max(low - self._feel.missing_time, high - self._feel.aslant_time) > 0.0
 
     def _probe_up(self, row: int, flex: Floats, steering: int) -> int:
         """Stand, and raise the antennae until both have slipped over the edge."""
