@@ -28,7 +28,7 @@ _SHORT_LINES = 46
 
 _LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--key")
 _LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
-_LATER += ("--readings", "--knows")
+_LATER += ("--readings", "--knows", "--json", "--overwrite")
 """Options that nobody uses first: they come last on the short page."""
 
 
@@ -53,8 +53,8 @@ class Command(NamedTuple):
 def short_page(command: Command) -> str:
     """What people use first: options outside all groups, names first, and the groups' names.
 
-    Where there is no room for all, parameters and the other options have half of it each, or what
-    the other half leaves.
+    Where there is no room for all, parameters have two thirds of it, or what the others
+    leave.
     """
     outside = (option for option in command.parameters if len(option.path) == 1)
     top = sorted(outside, key=lambda o: (_rank(o), not o.metavar.startswith("NAME")))
@@ -64,7 +64,7 @@ def short_page(command: Command) -> str:
     tail.append(f"`{typed(command.name, '--help-all')}` shows every option.")
     room = _SHORT_LINES - len(head) - len(tail)
     needed = len(_section("options:", others))
-    parameters = _cut("parameters:", top, max(room // 2, room - needed))
+    parameters = _cut("parameters:", top, max(2 * room // 3, room - needed))
     options = _cut("options:", others, room - len(parameters))
     return "\n".join([*head, *parameters, *options, *tail]) + "\n"
 

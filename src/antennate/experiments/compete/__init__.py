@@ -1,4 +1,4 @@
-"""Rank controllers on the same scenes, with fresh seeds where they are hidden.
+"""Rank controllers on the same scenes, with public or hidden seeds.
 
 Every controller meets the same draws of every scene, in processes of its own, and has a time limit
 for each decision. A controller that needs what only a simulation knows is given it, and stands

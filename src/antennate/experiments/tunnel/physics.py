@@ -57,8 +57,8 @@ class TunnelConfig(TrialConfig):
         examples=[*BUILT_IN, *PRIVILEGED],
     )
     """Controllers to run: open, timed, paper, closed, closed-1, geometric, follow, centre,
-    schedule, zigzag, random, map, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned
-    policy."""
+    schedule, zigzag, random, climb, lifted, rhythm, map, edges, MODULE:NAME or FILE.py:NAME of your
+    own, or FILE.onnx, a learned policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )
