@@ -179,7 +179,8 @@ class DriveConfig(RobotConfig):
 
     controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
     """Open, timed, paper, closed, closed-1, geometric, follow, centre, schedule, zigzag, random,
-    climb, lifted, rhythm, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
+    climb, lifted, rhythm, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned
+    policy."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
