@@ -62,6 +62,10 @@ class FeelParams(Params):
         0.1, "rad", "fitted: antennate climb; above a step of 15 cm, below walls of 20 cm", ge=-1
     )
     """Elevation of the antennae before a raised head, from the plane of the tail."""
+    tread: float = number(
+        -0.35, "rad", "fitted: antennate climb; it reaches 4 cm below the base", ge=-1.5, le=1.5
+    )
+    """Elevation of the antennae behind an edge, which feel for the tread while the head is up."""
     plane_sweep: float = number(
         math.radians(17.0), "rad", "assumed: 47 deg, as antennae that stay in the plane", ge=-0.8
     )
@@ -120,6 +124,8 @@ class ClimbParams(Params):
     """Time that it walks with its head raised before the plan goes on."""
     sink_rate: float = number(0.05, "m/s", "assumed: 10 cm in the time of a link", gt=0, le=1)
     """Speed at which it comes down behind an edge until the antennae feel the floor."""
+    least: float = number(0.05, "m", "assumed: lower ones need no line", ge=0, le=0.3)
+    """Rise under which no line is lowered while the head is up."""
     lift_time: float = number(1.5, "s", "assumed: the head is up before it walks", ge=0, le=10)
     """Time to stand while the head is raised."""
     carry_gain: float = number(3.0, "1/s", "assumed: a third of a second", ge=0, le=20)

@@ -133,10 +133,10 @@ class Body:
         self.progress[rows] += self._params.pace * self._period
         self.progress[self.progress > self._robot.length + self._params.settle] = np.nan
 
-    def sink(self, rows: Bools) -> None:
-        """Bring the lines behind the head of some rows, shape (B,), nearer to the floor."""
-        lower = np.maximum(self.rise - self._params.sink_rate * self._period, 0.0)
-        self.rise = np.where(rows[:, None] & self.behind, lower, self.rise)
+    def sink(self, rows: Bools, least: float = 0.0) -> None:
+        """Bring the lines of some rows, shape (B,), nearer to the floor, not under a rise [m]."""
+        lower = np.maximum(self.rise - self._params.sink_rate * self._period, least)
+        self.rise = np.where(rows[:, None] & (self.rise > least), lower, self.rise)
 
     def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""

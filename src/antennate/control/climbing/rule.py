@@ -119,8 +119,9 @@ class ClimbRule:
         body = self._body
         body.advance(self._one(row))
         if body.head_is_up[row]:
-            self._pose(row, 0.5 * self._feel.highest)
-            self._since[row] = 0.0
+            self._pose(row, self._feel.tread, self._feel.inwards)
+            if self._since[row] > self._feel.settle_time and self._misses(flex):
+                body.sink(self._one(row), least=self._p.least)
             return Maneuver.FORWARD
         self._pose(row, self._feel.elevation)
         if self._free[row] > self._feel.plane_time and not body.climbs[row]:
@@ -141,6 +142,10 @@ class ClimbRule:
             self._missing[row] = self._missed[row] > 0.0
             self._to(row, Stage.PROBE_DOWN)
         return Maneuver.FORWARD if self.stage[row] == Stage.WALK else Maneuver.HOLD
+
+    def _misses(self, flex: Floats) -> bool:
+        """Whether neither antenna feels anything."""
+        return bool((flex < self._feel.missing).all())
 
     def _misses_ground(self, row: int) -> bool:
         """Both antennae for a while, or one of them, as at an edge that is met aslant."""
