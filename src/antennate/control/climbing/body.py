@@ -17,7 +17,7 @@ from antennate.errors import ConfigError
 from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import Bools, Floats, Ints, JointCommand
+from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
 
 _STEEPEST = 0.8
 """Sine of the steepest slope of a link: 53 degrees (ramps over 50 fail)."""
@@ -67,6 +67,7 @@ class Body:
         sweep: Where the bases are to be turned to [rad], shape (B,).
         nod: Lift of the head beside all plans, negative down [rad], shape (B,).
         held: Rows whose pitch joints are brought to their targets in spite of their load, (B,).
+        still: Rows whose command stands still, as their readings cannot be used, shape (B,).
         measured: Pitch joints as their servos reported them [rad], shape (B, P); NaN if unknown.
     """
 
@@ -83,6 +84,7 @@ class Body:
         self.sweep: Floats = np.zeros(batch)
         self.nod: Floats = np.zeros(batch)
         self.held: Bools = np.zeros(batch, dtype=bool)
+        self.still: Bools = np.zeros(batch, dtype=bool)
         self.measured: Floats = np.full((batch, robot.pitch_count), np.nan)
         self._sag: Floats = np.zeros((batch, robot.pitch_count))
         self._now: Floats = np.zeros((batch, robot.pitch_count + 2))
@@ -141,15 +143,16 @@ class Body:
     def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""
         wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
-        change = self._params.amplitude_rate * self._period
+        change = self._params.amplitude_rate * self._period * (maneuver != int(Maneuver.HOLD))
         self._amplitude += np.clip(wave - self._amplitude, -change, change)
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod
         wanted = np.column_stack([pitch, self.elevation, self.sweep])
         most = np.full(wanted.shape[1], self._params.rate * self._period)
-        self._now += np.clip(wanted - self._now, -most, most)
-        self._carry(wanted[:, :-2])
+        moves = ~self.still[:, None]
+        self._now += np.clip(wanted - self._now, -most, most) * moves
+        self._carry(wanted[:, :-2], moves)
         limit, most = self._robot.pitch.largest, self._robot.elevation.largest
         joints = np.clip(self._now[:, :-2] + self._sag, -limit, limit)
         lowered = np.clip(self._now[:, -2] - self._now[:, :-2].sum(axis=1), -most, most)
@@ -160,13 +163,13 @@ class Body:
             elevation=np.repeat(lowered[:, None], 2, axis=1),
         )
 
-    def _carry(self, wanted: Floats) -> None:
+    def _carry(self, wanted: Floats, moves: Bools) -> None:
         """Integrate what the load takes off the pitch joints of held rows; let go of the others."""
         least = self._params.carry_rate * self._period
         lack = np.nan_to_num(wanted - self.measured)
         back = np.clip(-self._sag, -least, least)
         change = np.where(self.held[:, None], self._params.carry_gain * self._period * lack, back)
-        self._sag = np.clip(self._sag + change, -_MOST_SAG, _MOST_SAG)
+        self._sag = np.clip(self._sag + change * moves, -_MOST_SAG, _MOST_SAG)
 
 
 def require_pitch(robot: RobotSpec) -> None:

@@ -81,7 +81,7 @@ class _LiftedRule:
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         self._body.nod[:] = self._lift
-        return _forward(contact)
+        return _forward(contact, self._body)
 
 
 class _RhythmRule:
@@ -100,7 +100,7 @@ class _RhythmRule:
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         body = self._body
-        known = _forward(contact) == int(Maneuver.FORWARD)
+        known = _forward(contact, body) == int(Maneuver.FORWARD)
         part = np.searchsorted(self._ends, self._time, side="right")
         body.begin(known & (part == 2) & ~body.climbs)
         body.held = body.nose_is_up
@@ -142,12 +142,12 @@ class _EdgesRule:
             self._body.progress = knowledge.edges
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        return _forward(contact)
+        return _forward(contact, self._body)
 
 
-def _forward(contact: Ints) -> Ints:
-    """FORWARD, unless a reading cannot be used."""
-    unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
+def _forward(contact: Ints, body: Body) -> Ints:
+    """FORWARD; where a reading cannot be used, HOLD with a body that stands still."""
+    body.still = unknown = (contact == int(Contact.UNKNOWN)).any(axis=1)
     return np.where(unknown, int(Maneuver.HOLD), int(Maneuver.FORWARD))
 
 

@@ -88,7 +88,7 @@ class ClimbRule:
             act = _ACTS[Stage(self.stage.item(row))]
             maneuver[row] = act(self, row, flex[row], steering.item(row))
         self.ground[~known] = Ground.UNKNOWN
-        self._body.held = self._body.nose_is_up
+        self._body.held, self._body.still = self._body.nose_is_up, ~known
         return maneuver
 
     def _count(self, flex: Floats, known: Bools) -> None:
