@@ -1,0 +1,110 @@
+"""Controllers that leave the plane: the line over an edge, and what lowered antennae make them do."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from antennate.control.climbing.body import line, pitch_angles
+from antennate.control.climbing.rule import Ground, Stage
+from antennate.control.registry import make_controller
+from antennate.errors import ConfigError
+from antennate.params.climb import ClimbParams
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.testing import check_controller
+from antennate.types import AntennaFrame, Maneuver
+
+ROBOT = RobotSpec.named("scuttle3d")
+PARAMS = ClimbParams()
+RISE = 0.12
+
+
+@pytest.mark.parametrize("name", ["climb", "lifted", "rhythm"])
+def test_controllers_that_climb_keep_the_contract(name: str) -> None:
+    check_controller(name, robot=ROBOT)
+
+
+def test_the_line_rises_before_the_edge_and_comes_down_to_the_step() -> None:
+    far = np.array([-2.0, -PARAMS.before - PARAMS.ramp])
+    assert line(PARAMS, far, RISE) == pytest.approx(0.0)
+    top = np.array([-PARAMS.before, 0.0, 0.06])
+    assert line(PARAMS, top, RISE) == pytest.approx(RISE + PARAMS.over)
+    behind = np.array([0.06 + PARAMS.settle, 2.0])
+    assert line(PARAMS, behind, RISE) == pytest.approx(RISE)
+
+
+def angles(*progress: float) -> np.ndarray:
+    """Pitch joints of a robot at these edges [rad], shape (P,)."""
+    rise = np.full((1, len(progress)), RISE)
+    return pitch_angles(PARAMS, ROBOT, np.array([progress]), rise)[0]
+
+
+@pytest.mark.parametrize("progress", [-0.1, 0.0, 0.13, 0.4])
+def test_each_link_does_what_the_link_before_did(progress: float) -> None:
+    """Follow the leader: a link pitch later, each joint has the angle of the joint before it."""
+    later = angles(progress + ROBOT.link_pitch)
+    assert later[1:] == pytest.approx(angles(progress)[:-1], abs=1e-12)
+
+
+def test_slopes_of_links_are_those_of_chords_of_the_line() -> None:
+    """The joints add up to the slope of the head, as the tail is level."""
+    ends = np.array([-0.1 + 0.06, -0.1 - 0.06])
+    front, back = line(PARAMS, ends, RISE)
+    assert angles(-0.1).sum() == pytest.approx(math.asin((front - back) / ROBOT.link_pitch))
+
+
+def test_a_robot_far_from_all_edges_is_level_and_two_edges_add() -> None:
+    assert angles(math.nan, -1.0) == pytest.approx(0.0)
+    assert angles(math.nan, 0.0) == pytest.approx(angles(0.0))
+
+
+def test_planar_robots_are_refused_in_one_line() -> None:
+    with pytest.raises(ConfigError, match="pitch joints and antennae that rise.*without pitch"):
+        make_controller("climb")
+
+
+STRAIGHT, FLOOR, BENT = 1870.0, 1745.0, 1500.0
+"""Counts of an antenna over a drop, on the floor and at a step: datasheet curve of the sensor."""
+
+
+def felt(left: float, right: float, seconds: float = 2.0) -> tuple[int, int, list[int]]:
+    """Stage and ground of `climb` after floor and then these counts, and its maneuvers since."""
+    control = ControlParams()
+    controller = make_controller("climb", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    maneuvers: list[int] = []
+    for tick in range(200 + round(seconds / control.period)):
+        counts = [[FLOOR, FLOOR]] if tick < 200 else [[left, right]]
+        controller.step(AntennaFrame(np.array([tick * control.period]), np.array(counts)))
+        if tick >= 200:
+            maneuvers.append(int(controller.maneuver[0]))
+    rule = controller.rule  # pyright: ignore[reportAttributeAccessIssue]
+    return int(rule.stage[0]), int(rule.ground[0]), maneuvers
+
+
+def test_on_the_floor_it_walks() -> None:
+    stage, ground, maneuvers = felt(FLOOR, FLOOR)
+    assert (stage, ground) == (Stage.WALK, Ground.FLOOR)
+    assert set(maneuvers) == {Maneuver.FORWARD}
+
+
+def test_what_bends_an_antenna_is_probed_standing() -> None:
+    stage, _, maneuvers = felt(BENT, FLOOR, seconds=1.0)
+    assert stage == Stage.PROBE_UP
+    assert maneuvers[-1] == Maneuver.HOLD
+
+
+def test_missing_ground_without_a_floor_within_reach_is_backed_off_from() -> None:
+    stage, ground, maneuvers = felt(STRAIGHT, STRAIGHT, seconds=2.5)
+    assert (stage, ground) == (Stage.BACK, Ground.DROP)
+    assert maneuvers[-1] == Maneuver.REVERSE
+
+
+@pytest.mark.parametrize("counts", [(math.nan, FLOOR), (BENT, math.nan)])
+def test_a_reading_that_is_missing_is_unknown_ground_and_holds(counts: tuple[float, float]) -> None:
+    _, ground, maneuvers = felt(*counts, seconds=0.5)
+    assert ground == Ground.UNKNOWN
+    assert set(maneuvers) == {Maneuver.HOLD}
