@@ -252,6 +252,9 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
         ("--check no.csv", "no.csv: expected a readable file"),
         ("--check no.csv --trials 3", "the file of check says it"),
         ("--engine dask", "--engine"),
+        ("--hidden --seed 5", "seed: expected none beside hidden"),
+        ("--seed 700000", "expected no seed of 700000 to 799999"),
+        ("--hidden --seed 799999", "expected no seed of 700000 to 799999"),
     ],
 )
 def test_bad_input_is_one_line_before_the_first_trial(
@@ -331,12 +334,22 @@ def test_a_hidden_run_that_was_stopped_goes_on_with_its_seed_and_publishes_it(
     seed = settled(CompeteConfig(hidden=True), tmp_path / "run").seed
     assert {row.seed for row in again.rows} == {seed} == {again.summary["seed"]}
     assert seed not in DEVELOPMENT
+    assert all(row.drawn for row in again.rows)
     assert f"hidden seed {seed}" in again.sentence
 
 
-def test_only_a_hidden_run_without_a_seed_draws_one() -> None:
-    assert settled(CompeteConfig(hidden=True, seed=5), None).seed == 5
+def test_only_a_hidden_run_draws_a_seed_and_takes_no_other(tmp_path: Path) -> None:
     assert settled(CompeteConfig(), None).seed == DEVELOPMENT.start
+    for seed in (5, DEVELOPMENT.start):
+        with pytest.raises(ConfigError, match=f"expected none beside hidden.* found {seed}"):
+            settled(CompeteConfig(hidden=True, seed=seed), tmp_path)
+    file = tmp_path / "config.toml"
+    file.write_text("hidden = true\nseed = 5\n")
+    assert settled(CompeteConfig(hidden=True, seed=5), tmp_path).seed == 5
+    file.write_text("hidden = false\nseed = 5\n")  # of a run whose seed was known
+    with pytest.raises(ConfigError, match="found 5"):
+        settled(CompeteConfig(hidden=True, seed=5), tmp_path)
+    assert settled(CompeteConfig(hidden=True), tmp_path).seed != 5
 
 
 # a table that is run again
@@ -371,6 +384,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ("controller,scene\nopen,flat\n", "line 2: expected outcome, found none"),
         ("controller,scene,outcome\nopen,flat,success\n", "line 2: "),
         ("\0\n", "expected a table of trials"),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
+            "line 2: expected no seed of 700000",
+        ),
     ],
 )
 def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from antennate.errors import BadInputError, ConfigError
+from antennate.experiments.compete.config import require_free
 from antennate.experiments.compete.episodes import Episode
 from antennate.files import read_limited
 from antennate.params.faults import describe
@@ -50,9 +51,13 @@ def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
     if lacking := [name for name in ("controller", "scene", "outcome") if not texts[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
     try:
-        return _ROW.validate_python(values)
+        row = _ROW.validate_python(values)
+        require_free(row.seed)
     except ValidationError as error:
         raise ConfigError(f"{path}: line {number}: {describe(error, Episode)}") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: line {number}: {error}") from None
+    return row
 
 
 def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, Any]:

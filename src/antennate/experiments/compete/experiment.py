@@ -16,7 +16,13 @@ from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError
 from antennate.experiments.compete.checking import compared, read_rows
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
-from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
+from antennate.experiments.compete.episodes import (
+    Draw,
+    Episode,
+    all_drawn,
+    lost,
+    run_episodes,
+)
 from antennate.experiments.compete.page import readme, sentence, tables
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.compete.standings import CONTROLLER, standings
@@ -47,7 +53,7 @@ class CompeteOutcome:
             "command": "compete",
             "seed": config.seed if self.theirs is None else None,
             "seeds": seeds,
-            "hidden": config.hidden and config.seed not in DEVELOPMENT,
+            "hidden": all_drawn(self.rows),
             "trials": max((row.trial for row in self.rows), default=-1) + 1,
             "decision_limit_s": config.decision_limit,
             "tie": config.tie,
@@ -78,7 +84,8 @@ def draws(config: CompeteConfig) -> list[Draw]:
     given = {name: "" for name, *_ in keys}
     for name in given:
         given[name] = " ".join(needs_of(_made(name, tunnel_config(keys[0][1], name, 0))))
-    return [Draw(*key, config.decision_limit, given[key[0]]) for key in keys]
+    drawn = config.hidden and config.seed not in DEVELOPMENT
+    return [Draw(*key, config.decision_limit, given[key[0]], drawn) for key in keys]
 
 
 def _made(name: str, config: TunnelConfig) -> Any:

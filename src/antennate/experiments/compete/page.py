@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.control.readings import short_names
 from antennate.control.registry import about
+from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
 from antennate.experiments.compete.standings import CONTROLLER, PAIR
@@ -122,7 +123,8 @@ def sentence(result: Result) -> str:
         for name in ranked
     ]
     seeds = result["seeds"]
-    kind = f"{'hidden' if result['hidden'] else 'public'} seed{'s' * (len(seeds) > 1)}"
+    known = "public" if set(seeds) <= set(DEVELOPMENT) else "chosen"
+    kind = f"{'hidden' if result['hidden'] else known} seed{'s' * (len(seeds) > 1)}"
     ranks = ", ".join(told) or "none, as none lives on its readings"
     return (
         f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
