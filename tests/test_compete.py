@@ -13,12 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import antennate
 from antennate.cli import main
 from antennate.errors import ConfigError
-from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
     RESERVED,
@@ -367,7 +368,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     for changed, said, code in [
         (text, "8 of 8 rows repeat; 0 differ", 0),
         (text.replace(",timeout,", ",success,", 1), "7 of 8 rows repeat; 1 differ, 1 of them", 2),
-        (text.replace("timeout,0.3,", "timeout,0.4,", 1), "1 differ, 0 of them", 0),
+        (text.replace("timeout,0.3,", "timeout,0.4,", 1), "1 differ, 0 of them", 2),
     ]:
         file.write_text(changed)
         assert main(["compete", "--check", str(file), "--no-figures", "--out", "again"]) == code
@@ -395,6 +396,55 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
     with pytest.raises(ConfigError, match=why) as error:
         read_rows(tmp_path / "a.csv")
     assert "\n" not in str(error.value)
+
+
+HERE = Episode("open", "flat", 1, 0, "success", 20.0, progress_m=2.0, engine="e", processor="p")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time_s": 19.99},
+        {"progress_m": 2.01},
+        {"overturned": True},
+        {"limit_s": 200.0},
+        {"given": "map"},
+        {"outcome": "left"},
+    ],
+)
+def test_on_the_same_processor_a_single_row_that_differs_is_refused(change: dict[str, Any]) -> None:
+    ours = [replace(HERE, trial=trial) for trial in range(200)]
+    theirs = [replace(ours[0], **change), *ours[1:]]
+    check = compared(theirs, ours)
+    assert (check["same"], check["broken"]) == (199, 1)
+    assert refused(check, 0.01)
+    assert not refused(compared(ours, ours), 0.01)
+    elsewhere = compared([replace(row, processor="q") for row in theirs], ours)
+    assert refused(elsewhere, 0.01) == bool({"limit_s", "given"} & change.keys())
+
+
+def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean() -> None:
+    """As measured there: a spread of 9.5 s on a limit of 100 s."""
+    noise = np.random.default_rng(1).normal(0.0, 9.5, 200)
+    noise -= noise.mean()
+    ours = [replace(HERE, trial=k, time_s=50.0) for k in range(200)]
+    for forged, wrong in ((0.94, False), (-5.0, True)):
+        theirs = [
+            replace(row, processor="q", time_s=50.0 + forged + float(apart))
+            for row, apart in zip(ours, noise, strict=True)
+        ]
+        check = compared(theirs, ours)
+        assert check["broken"] == 0
+        assert check["mean_share_difference"] == pytest.approx(forged / 100.0)
+        assert refused(check, 0.01) == wrong
+
+
+@pytest.mark.parametrize(("others", "wrong"), [(2, False), (3, True)])
+def test_on_another_processor_a_share_of_the_rows_must_end_alike(others: int, wrong: bool) -> None:
+    ours = [replace(HERE, trial=k) for k in range(200)]
+    theirs = [replace(row, processor="q") for row in ours]
+    theirs[:others] = [replace(row, outcome="left", time_s=100.0) for row in theirs[:others]]
+    assert refused(compared(theirs, ours), 0.01) == wrong
 
 
 def test_rows_that_were_not_run_are_not_compared() -> None:

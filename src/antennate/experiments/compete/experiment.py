@@ -14,7 +14,7 @@ from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError
-from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import (
     Draw,
@@ -169,9 +169,9 @@ def run(
 
 
 def failed(result: Mapping[str, Any]) -> bool:
-    """Whether a table that was checked does not repeat: more rows end otherwise than a tie has."""
+    """Whether a table that was checked does not repeat."""
     check = result["check"]
-    return check is not None and check["other_outcome"] > result["tie"] * check["rows"]
+    return check is not None and refused(check, result["tie"])
 
 
 EXPERIMENT = Experiment.of_folder(

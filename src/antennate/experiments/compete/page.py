@@ -87,13 +87,15 @@ def _pair_table(pairs: Mapping[str, Mapping[str, Any]], short: Mapping[str, str]
 
 
 def _check_table(check: Mapping[str, Any]) -> Table:
-    heads = ("outcome", "here", "time [s]", "here")
+    heads = ("outcome", "here", "time [s]", "here", "way [m]", "here", "on its back", "here")
     lines = [
         (
             f"{row['controller']} in {label(row['scene'])}, {row['seed']}, {row['trial']}",
             [
                 *(row["outcome"], row["outcome_here"]),
                 *(shown(row[key], ".2f") for key in ("time_s", "time_here_s")),
+                *(shown(row[key], ".2f") for key in ("progress_m", "progress_here_m")),
+                *("yes" if row[key] else "no" for key in ("overturned", "overturned_here")),
             ],
         )
         for row in check["differ"]
@@ -111,7 +113,7 @@ def sentence(result: Result) -> str:
     if (check := result["check"]) is not None:
         return (
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
-            f"{check['other_outcome']} of them in how they end."
+            f"{check['other_outcome']} of them in how they end; {check['broken']} should not."
         )
     rows, names = result["controllers"], ordered(result)
     short = short_names(names)
