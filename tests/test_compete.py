@@ -246,10 +246,24 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
         ("--controllers missing.py:Mine", "no file"),
         ("--scenes utrun", "did you mean uturn?"),
         ("--scenes uturn+variation.noise=3", "'uturn+variation.noise=3': "),
-        ("--scenes uturn+control.rate=50", "expected a parameter of tunnel, corridors, robot"),
+        (
+            "--scenes uturn+control.rate=50",
+            "expected a parameter of tunnel, corridors, ground, robot",
+        ),
         ("--scenes uturn+readings=yoked", "expected readings of its own"),
         ("--scenes uturn+readings=delayed:0.015", "whole control periods"),
         ("--scenes uturn uturn", "scenes must differ"),
+        ("--scenes wall+time_limit=2 wall+time_limit=2.0", "'wall+time_limit=2.0', which are the"),
+        ("--scenes uturn uturn+time_limit=100", "which are the same"),
+        ("--scenes uturn+variation=3", "variation"),
+        ("--scenes uturn+variation=3+variation.broken=random", "found 'variation.broken' again"),
+        ("--scenes uturn+variation.broken=left+variation=3", "found 'variation' again"),
+        ("--scenes uturn+time_limit=2+time_limit=3", "found 'time_limit' again"),
+        ("--scenes uturn+readings=a+readings.x=1", "found 'readings.x' again"),
+        ("--scenes uturn+readings.x=1", "readings"),
+        ("--scenes uturn+ground.height=0.05", "it belongs to the scenes"),
+        ("--scenes uturn+variation.x2=1", "variation.x2"),
+        (f"--scenes uturn+time_limit={'[' * 3000}", "time_limit"),
         ("--check no.csv", "no.csv: expected a readable file"),
         ("--check no.csv --trials 3", "the file of check says it"),
         ("--engine dask", "--engine"),
@@ -463,5 +477,6 @@ def test_a_scene_takes_parameters_as_the_configuration_does() -> None:
     assert config.variation.broken == "left"
     assert (config.readings, config.time_limit) == (("delayed:0.02",), 5.0)
     assert (config.scene, config.seed, config.controllers) == ("tunnel", 3, ("closed",))
+    assert tunnel_config("step_up+ground.height=0.05", "open", 0).ground.height == 0.05
     assert label("uturn+variation.broken=left") == "uturn, broken=left"
     assert tunnel_config("a+b.py:Scene+time_limit=1", "open", 0).scene == "a+b.py:Scene"

@@ -24,7 +24,7 @@ from antennate.experiments.compete.episodes import (
     run_episodes,
 )
 from antennate.experiments.compete.page import readme, sentence, tables
-from antennate.experiments.compete.scenes import tunnel_config
+from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
 from antennate.experiments.compete.standings import CONTROLLER, standings
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -104,6 +104,7 @@ def check(config: CompeteConfig) -> None:
         SceneError: A scene cannot be built, or the robot does not fit at its start.
     """
     cells = dict.fromkeys((draw.controller, draw.scene, draw.seed) for draw in draws(config))
+    require_different_scenes(dict.fromkeys(scene for _, scene, _ in cells), next(iter(cells))[0])
     started, decided = set[str](), set[tuple[str, str]]()
     for name, scene, seed in cells:
         settings = tunnel_config(scene, name, seed)
