@@ -105,7 +105,8 @@ of the body)."""
 def raised_links(pitch: Sequence[float], link_pitch: float) -> str:
     """What to hold before torque goes off, in words; empty if no link is higher than RAISED.
 
-    The last link is taken as level and the lowest one as standing: joints tell nothing of the floor.
+    The last link is taken as level and the lowest one as standing, as joints tell nothing of the
+    floor.
 
     Args:
         pitch: Commanded pitch joints, head first [rad], positive where the part in front rises
