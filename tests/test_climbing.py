@@ -1,4 +1,4 @@
-"""Controllers that leave the plane: the line over an edge, and what lowered antennae make them do."""
+"""Controllers that leave the plane: the line over an edge, and what lowered antennae do."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
-from antennate.types import AntennaFrame, Maneuver
+from antennate.types import AntennaFrame, Maneuver, joint_angles
 
 ROBOT = RobotSpec.named("scuttle3d")
 PARAMS = ClimbParams()
@@ -62,8 +62,26 @@ def test_a_robot_far_from_all_edges_is_level_and_two_edges_add() -> None:
 
 
 def test_planar_robots_are_refused_in_one_line() -> None:
-    with pytest.raises(ConfigError, match="pitch joints and antennae that rise.*without pitch"):
+    with pytest.raises(ConfigError, match=r"pitch joints and antennae that rise.*without pitch"):
         make_controller("climb")
+
+
+@pytest.mark.parametrize("name", ["climb", "lifted", "rhythm", "edges"])
+def test_without_readings_no_joint_moves(name: str) -> None:
+    """Whatever it was doing: the command stays as it was, to the bit."""
+    controller = make_controller(name, ControlParams(), ROBOT, 1)
+    controller.reset(np.array([0]))
+    t = iter(np.arange(2000) * 0.01)
+
+    def command(counts: float) -> np.ndarray:
+        frame = AntennaFrame(np.array([next(t)]), np.full((1, 2), counts))
+        return joint_angles(controller.step(frame), ROBOT.command_shapes())
+
+    for tick in range(900):
+        command(BENT if 200 < tick < 260 else FLOOR)
+        if tick % 150 == 100:
+            blind = [command(math.nan) for _ in range(20)]
+            assert (np.array(blind[1:]) == blind[0]).all()
 
 
 STRAIGHT, FLOOR, BENT = 1870.0, 1745.0, 1500.0

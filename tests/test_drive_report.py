@@ -19,7 +19,12 @@ from antennate.control.registry import CONTROLLERS
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import Operator, drive
-from antennate.hardware.driving.report import Report, late_sentence, raised_links
+from antennate.hardware.driving.report import (
+    Report,
+    late_sentence,
+    link_heights,
+    raised_links,
+)
 from antennate.hardware.safety.causes import Cause, State, what_to_do
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
@@ -424,26 +429,55 @@ def test_cures_of_causes_that_come_together_say_each_step_once_and_arming_last()
     assert said.endswith("; then start `drive --arm` again. See docs/causes.md.")
 
 
+TREAD = (0.0, -0.6, 0.0, 0.6, 0.0)
+"""Links 0 and 1 are on a tread, 4 and 5 on the floor, 2 and 3 on the way up."""
+
+
+@pytest.mark.parametrize(
+    ("pitch", "heights"),
+    [
+        ((), (0,)),
+        ((0.0,) * 5, (0, 0, 0, 0, 0, 0)),
+        ((0.35, 0.0, 0.0, 0.0, 0.0), (20.6, 0, 0, 0, 0, 0)),
+        ((-0.35, 0.0, 0.0, 0.0, 0.0), (-20.6, 0, 0, 0, 0, 0)),
+        ((0.0, 0.0, 0.0, 0.0, 0.3), (159.6, 124.1, 88.7, 53.2, 17.7, 0)),
+        (TREAD, (135.5, 135.5, 101.6, 33.9, 0, 0)),
+        ((0.3, -0.3, 0.0, 0.0, 0.0), (-35.5, -17.7, 0, 0, 0, 0)),
+    ],
+    ids=["one link", "level", "head up", "head down", "ramp", "tread", "head below"],
+)
+def test_heights_of_links_add_up_from_a_level_tail(
+    pitch: tuple[float, ...], heights: tuple[float, ...]
+) -> None:
+    """By hand, in mm: 60 sin(0.3) = 17.73, 60 sin(0.35) = 20.57, 60 sin(0.6) = 33.88."""
+    assert 1e3 * link_heights(pitch, 0.12) == pytest.approx(heights, abs=0.06)
+
+
 @pytest.mark.parametrize(
     ("pitch", "said"),
     [
         ((), ""),
-        ((0.0, 0.1, -0.1, 0.0, 0.0), ""),
+        ((0.0,) * 5, ""),
         ((math.nan,) * 5, ""),
+        ((0.33, 0.0, 0.0, 0.0, 0.0), ""),  # 19.4 mm
         ((0.35, 0.0, 0.0, 0.0, 0.0), "link 0 is raised: hold it"),
         ((0.0, 0.35, 0.0, 0.0, 0.0), "links 0 and 1 are raised: hold them"),
-        ((0.0, 0.4, -0.4, 0.0, 0.0), "links 0 and 1 are raised: hold them; link 2 is lowered"),
-        ((-0.2, 0.0, 0.0, 0.0, 0.0), "link 0 is lowered: hold it"),
-        ((0.0, 0.0, 0.0, 0.0, 0.3), "link 5 is raised: hold it"),
-        ((0.3, 0.0, 0.0, 0.3, 0.0), "links 0, 4 and 5 are raised: hold them"),
+        ((0.0, -0.35, 0.35, 0.0, 0.0), "links 0, 1 and 2 are raised: hold them"),
+        ((0.0, 0.0, 0.0, 0.0, 0.3), "links 0, 1, 2 and 3 are raised: hold them"),
+        (TREAD, "links 0, 1, 2 and 3 are raised: hold them"),
+        ((0.3, -0.3, 0.0, 0.0, 0.0), "links 2, 3, 4 and 5 are raised: hold them"),
     ],
 )
-def test_the_shorter_part_at_a_pitch_joint_that_is_bent_is_to_be_held(
+def test_links_that_are_higher_than_the_lowest_are_to_be_held(
     pitch: tuple[float, ...], said: str
 ) -> None:
-    found = raised_links(pitch)
-    assert found.startswith(said)
-    assert bool(found) == bool(said)
+    assert raised_links(pitch, 0.12) == said
+
+
+@pytest.mark.parametrize(("link_pitch", "said"), [(0.11, ""), (0.13, "link 0 is raised: hold it")])
+def test_links_that_are_longer_rise_higher(link_pitch: float, said: str) -> None:
+    """55 sin(0.34) = 18.3 mm, 65 sin(0.34) = 21.7 mm."""
+    assert raised_links((0.34, 0.0, 0.0, 0.0, 0.0), link_pitch) == said
 
 
 def raising(angle: float) -> type:

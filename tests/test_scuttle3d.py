@@ -25,7 +25,7 @@ from antennate.dxl.bus import Bus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.driving.report import Report
+from antennate.hardware.driving.report import Report, link_heights
 from antennate.hardware.joints import CommandError, Joints
 from antennate.hardware.safety.causes import State
 from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
@@ -224,6 +224,17 @@ def test_of_joints_alone_the_robot_is_drawn_on_its_tail_with_its_head_raised(
     axle = ROBOT.leg_radius + ROBOT.leg_eccentricity
     rise = [ROBOT.link_pitch * (0.5 + i) * math.sin(max(pitch)) for i in range(heights)]
     assert z - axle == pytest.approx([*reversed(rise), *[0.0] * (6 - heights)], abs=1e-9)
+
+
+def test_heights_of_links_told_after_a_drive_are_those_of_the_model() -> None:
+    scene = LogScene(Header(controller="open", params=ControlParams(), robot=ROBOT), None)
+    angles = np.zeros(26)
+    angles[PITCH] = [0.1, -0.6, 0.2, 0.5, 0.15]
+    tick: Any = SimpleNamespace(positions=tuple(angles.tolist()))
+    scene.place_joints(tick)
+    z = scene.world.link_places()[:, 2]
+    heights = link_heights(angles[PITCH].tolist(), ROBOT.link_pitch)
+    assert heights == pytest.approx(z - z[-1], abs=1e-9)
 
 
 def test_a_log_names_its_joints_and_is_replayed(

@@ -112,8 +112,12 @@ _BODY = tuple(
     )
 )
 """What raises a body."""
-_RAISED = (*_BODY, "climb.feel.highest")
-"""The same with antennae held up."""
+_CARRY = ("climb.carry_gain", "climb.carry_rate")
+"""What holds a raised head in spite of its load."""
+_RAISED = (*(path for path in _BODY if path not in _CARRY), "climb.feel.highest")
+"""The same with antennae held up, without that."""
+_SWEEP = ("gait.antenna_mean", "gait.antenna_amplitude", "gait.antenna_frequency")
+"""How the gait moves the bases; those that climb move them themselves."""
 _RHYTHM = tuple(
     f"climb.{name}"
     for name in ("walk_time", "retreat_time", "lift_time", "approach_time", "ahead", "pace")
@@ -164,11 +168,11 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "random": _without(_RANDOM, *_TURNING),
     "climb": (
         *(*_TABLE, *_BLIND, *_FOLLOW, *_CENTRE, *_OTHER_ESCAPE, *_GEOMETRIC),
-        *("climb.lift", "climb.walk_time"),
+        *("climb.lift", "climb.walk_time", *_SWEEP),
     ),
-    "lifted": _without((*_BODY, "climb.lift"), *_ESCAPE),
-    "rhythm": _without((*_RAISED, *_RHYTHM), *_ESCAPE),
-    "edges": _without(_RAISED, *_ESCAPE),
+    "lifted": _without(("climb.rate", "climb.lift"), *_ESCAPE, *_SWEEP),
+    "rhythm": _without((*_RAISED, *_CARRY, *_RHYTHM), *_ESCAPE, *_SWEEP),
+    "edges": _without(_RAISED, *_ESCAPE, *_SWEEP),
     "map": (*_TABLE, *_OTHERS, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
 }

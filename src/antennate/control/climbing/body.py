@@ -121,7 +121,9 @@ class Body:
         self.progress[rows] = np.nan
         self.nod[rows] = 0.0
         self._now[rows] = 0.0
-        self._sag[rows], self.held[rows] = 0.0, False
+        self._sag[rows], self.held[rows], self.still[rows] = 0.0, False, False
+        self.rise[rows], self.measured[rows] = self._params.rise, np.nan
+        self.elevation[rows] = self.sweep[rows] = 0.0
 
     def begin(self, rows: Bools) -> None:
         """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one."""
@@ -136,9 +138,15 @@ class Body:
         self.progress[self.progress > self._robot.length + self._params.settle] = np.nan
 
     def sink(self, rows: Bools, least: float = 0.0) -> None:
-        """Bring the lines of some rows, shape (B,), nearer to the floor, not under a rise [m]."""
+        """Bring the lines that the head is on of some rows, shape (B,), nearer to the floor.
+
+        While the head is up these are those that it has not passed, else those behind it; none is
+        brought under a rise `least` [m].
+        """
+        passed = np.where(self.head_is_up[:, None], ~self.behind, self.behind)
         lower = np.maximum(self.rise - self._params.sink_rate * self._period, least)
-        self.rise = np.where(rows[:, None] & (self.rise > least), lower, self.rise)
+        lowered = rows[:, None] & passed & (self.rise > least)
+        self.rise = np.where(lowered, lower, self.rise)
 
     def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
         """As of `Moves`: the targets of maneuver and plans."""

@@ -131,8 +131,7 @@ class _EdgesRule:
     needs: tuple[Kind, ...] = knows
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
-        self._body = body
-        body.elevation[:] = control.climb.feel.highest / 2
+        self._body, self._elevation = body, 0.5 * control.climb.feel.highest
 
     def reset(self, rows: Ints | Bools) -> None:
         pass
@@ -142,6 +141,7 @@ class _EdgesRule:
             self._body.progress = knowledge.edges
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
+        self._body.elevation[:] = self._elevation
         return _forward(contact, self._body)
 
 

@@ -30,6 +30,8 @@ _PATTERN = ("train",) * 5 + ("validation", "test", "test", "test_antenna", "test
 
 _Factor = Annotated[float, Field(gt=0.1, le=3)]
 _Share = Annotated[float, Field(gt=0.2, le=1)]
+_Distance = Annotated[float, Field(gt=0, le=1)]
+_Angle = Annotated[float, Field(ge=-1.5, le=1.5)]
 
 
 def split_of(episode: int) -> str:
@@ -63,11 +65,11 @@ class WalkParams(Params):
     """Windows of an episode; the last one ends with it."""
     stride: float = number(1.5, "s", "assumed: nearly a gait cycle", gt=0)
     """Time from the end of one window to that of the next."""
-    distance: tuple[float, float] = number(
+    distance: tuple[_Distance, _Distance] = number(
         (0.12, 0.24), "m", "assumed: from touch by the legs to out of reach of the antennae"
     )
     """Range of the distance of the head at the start."""
-    angle: tuple[float, float] = number(
+    angle: tuple[_Angle, _Angle] = number(
         (-0.3, 0.3), "rad", "assumed: a robot that follows a wall; more is a collision"
     )
     """Range of the angle of the body to the wall at the start, positive towards the wall."""

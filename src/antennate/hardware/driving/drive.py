@@ -239,7 +239,8 @@ def _off(
         return None
     try:
         if session.actuators.enabled:
-            report.held = raised_links(session.control.command.pitch.ravel().tolist())
+            pitch = session.control.command.pitch.ravel().tolist()
+            report.held = raised_links(pitch, session.actuators.robot.link_pitch)
         if report.held:
             warn(report.held)
         session.stand(stand)

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import numpy as np
+
 from antennate.hardware.safety.causes import DATA, Active, Cause, State
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.supervisor import Outputs
 from antennate.hardware.timing import LoopTiming
-from antennate.types import Maneuver
+from antennate.types import Floats, Maneuver
 
 
 class Walk:
@@ -95,36 +97,46 @@ def late_sentence(result: Mapping[str, Any]) -> list[str]:
     ]
 
 
-RAISED = 0.1
-"""Angle of a pitch joint from which on links may hang in the air [rad] (assumed: a link of 0.12 m
-is 12 mm high then)."""
+RAISED = 0.02
+"""Height above the lowest link from which on a link may hang in the air [m] (assumed: the radius
+of the body)."""
 
 
-def raised_links(pitch: Sequence[float]) -> str:
-    """What to hold before torque goes off, in words; empty if no pitch joint is bent by RAISED.
+def raised_links(pitch: Sequence[float], link_pitch: float) -> str:
+    """What to hold before torque goes off, in words; empty if no link is higher than RAISED.
 
-    Of a joint it is the shorter part, the front one of two that are alike: links in front of it if
-    it is within the front half, else those behind it.
+    The last link is taken as level and the lowest one as standing, as joints tell nothing of the
+    floor.
 
     Args:
-        pitch: Commanded pitch joints, head first [rad], positive where both parts rise.
+        pitch: Commanded pitch joints, head first [rad], positive where the part in front rises
+            against the part behind.
+        link_pitch: Joint spacing [m].
     """
-    parts: dict[str, set[int]] = {"raised": set(), "lowered": set()}
-    count = len(pitch) + 1
-    for joint, angle in enumerate(pitch, start=1):
-        if abs(angle) > RAISED:
-            links = range(joint) if joint <= count - joint else range(joint, count)
-            parts["raised" if angle > 0 else "lowered"] |= {*links}
-    parts["lowered"] -= parts["raised"]
-    return "; ".join(_held(sorted(links), how) for how, links in parts.items() if links)
-
-
-def _held(links: Sequence[int], how: str) -> str:
-    """Links in words, as "links 0 and 1 are raised: hold them"."""
-    if len(links) == 1:
-        return f"link {links[0]} is {how}: hold it"
+    above = link_heights(pitch, link_pitch)
+    links = np.flatnonzero(above - above.min() > RAISED).tolist()
+    if not links:
+        return ""
     *others, last = map(str, links)
-    return f"links {', '.join(others)} and {last} are {how}: hold them"
+    if not others:
+        return f"link {last} is raised: hold it"
+    return f"links {', '.join(others)} and {last} are raised: hold them"
+
+
+def link_heights(pitch: Sequence[float], link_pitch: float) -> Floats:
+    """Heights of the middles of all links over that of the last, which is level [m], head first.
+
+    Args:
+        pitch: Pitch joints, head first [rad], shape (n,): the slope of the link in front of a joint
+            less that of the link behind it.
+        link_pitch: Joint spacing [m].
+
+    Returns:
+        Heights, shape (n + 1,).
+    """
+    slopes = np.cumsum([0.0, *reversed(pitch)])
+    half = np.sin(slopes) * link_pitch / 2  # from the middle of a link to either end
+    return np.cumsum([0.0, *(half[:-1] + half[1:])])[::-1]
 
 
 _FILLING = (Cause.STALE, Cause.LOST)

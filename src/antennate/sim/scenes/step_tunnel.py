@@ -29,11 +29,13 @@ class StepTunnel(Tunnel):
 
     Attributes:
         step: Where the step is along x [m].
-        rise: Its height [m].
+        rise: Its height [m]; walls are as much higher.
+        ground: Height of the ground at the start [m].
     """
 
     step: float
     rise: float
+    ground: float = 0.0
 
     @property
     def edges(self) -> tuple[Edge, ...]:
@@ -48,6 +50,10 @@ class StepTunnel(Tunnel):
     def build(self, spec: mujoco.MjSpec) -> None:
         """Add the tunnel, and raise what is behind the step."""
         super(StepTunnel, self).build(spec)
+        for geom in spec.worldbody.geoms:
+            if geom.name.startswith("wall"):
+                geom.size[2] += self.rise / 2
+                geom.pos[2] += self.rise / 2
         spec.worldbody.add_geom(
             name="step",
             type=mujoco.mjtGeom.mjGEOM_BOX,
