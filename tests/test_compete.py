@@ -403,6 +403,14 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
             "line 2: expected no seed of 700000",
         ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",
+            "line 2: time_s: expected a (finite )?number",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,1.0,0.0\n",
+            "line 2: limit_s: expected a finite number above 0, found 0",
+        ),
     ],
 )
 def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path: Path) -> None:

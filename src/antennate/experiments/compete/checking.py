@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from math import sqrt
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -57,11 +57,24 @@ def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
     try:
         row = _ROW.validate_python(values)
         require_free(row.seed)
+        _require_numbers(row)
     except ValidationError as error:
         raise ConfigError(f"{path}: line {number}: {describe(error, Episode)}") from None
     except ValueError as error:
         raise ConfigError(f"{path}: line {number}: {error}") from None
     return row
+
+
+def _require_numbers(row: Episode) -> None:
+    """Check that numbers are finite and the limit is above 0 s.
+
+    Raises:
+        ValueError: One is not.
+    """
+    for name in ("time_s", "limit_s", "progress_m"):
+        if not isfinite(value := getattr(row, name)) or (name == "limit_s" and value <= 0):
+            least = " above 0" if name == "limit_s" else ""
+            raise ValueError(f"{name}: expected a finite number{least}, found {value:g}")
 
 
 _PLACE = ("version", "engine", "processor")
