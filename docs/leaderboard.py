@@ -14,8 +14,8 @@ from typing import Any
 from generated import finish
 
 from antennate.experiments.compete.checking import read_rows
-from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.config import CompeteConfig
+from antennate.experiments.compete.episodes import Episode, all_drawn
 from antennate.experiments.compete.page import markdown, sentence
 from antennate.experiments.compete.standings import standings
 
@@ -33,7 +33,7 @@ def result_of(rows: Sequence[Episode]) -> dict[str, Any]:
     return {
         **standings(rows, config.tie),
         "seeds": seeds,
-        "hidden": not set(seeds) & set(DEVELOPMENT),
+        "hidden": all_drawn(rows),
         "check": None,
     }
 

@@ -13,12 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import antennate
 from antennate.cli import main
 from antennate.errors import ConfigError
-from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
     RESERVED,
@@ -245,13 +246,30 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
         ("--controllers missing.py:Mine", "no file"),
         ("--scenes utrun", "did you mean uturn?"),
         ("--scenes uturn+variation.noise=3", "'uturn+variation.noise=3': "),
-        ("--scenes uturn+control.rate=50", "expected a parameter of tunnel, corridors, robot"),
+        (
+            "--scenes uturn+control.rate=50",
+            "expected a parameter of tunnel, corridors, ground, robot",
+        ),
         ("--scenes uturn+readings=yoked", "expected readings of its own"),
         ("--scenes uturn+readings=delayed:0.015", "whole control periods"),
         ("--scenes uturn uturn", "scenes must differ"),
+        ("--scenes wall+time_limit=2 wall+time_limit=2.0", "'wall+time_limit=2.0', which are the"),
+        ("--scenes uturn uturn+time_limit=100", "which are the same"),
+        ("--scenes uturn+variation=3", "variation"),
+        ("--scenes uturn+variation=3+variation.broken=random", "found 'variation.broken' again"),
+        ("--scenes uturn+variation.broken=left+variation=3", "found 'variation' again"),
+        ("--scenes uturn+time_limit=2+time_limit=3", "found 'time_limit' again"),
+        ("--scenes uturn+readings=a+readings.x=1", "found 'readings.x' again"),
+        ("--scenes uturn+readings.x=1", "readings"),
+        ("--scenes uturn+ground.height=0.05", "it belongs to the scenes"),
+        ("--scenes uturn+variation.x2=1", "variation.x2"),
+        (f"--scenes uturn+time_limit={'[' * 3000}", "time_limit"),
         ("--check no.csv", "no.csv: expected a readable file"),
         ("--check no.csv --trials 3", "the file of check says it"),
         ("--engine dask", "--engine"),
+        ("--hidden --seed 5", "seed: expected none beside hidden"),
+        ("--seed 700000", "expected no seed of 700000 to 799999"),
+        ("--hidden --seed 799999", "expected no seed of 700000 to 799999"),
     ],
 )
 def test_bad_input_is_one_line_before_the_first_trial(
@@ -331,12 +349,22 @@ def test_a_hidden_run_that_was_stopped_goes_on_with_its_seed_and_publishes_it(
     seed = settled(CompeteConfig(hidden=True), tmp_path / "run").seed
     assert {row.seed for row in again.rows} == {seed} == {again.summary["seed"]}
     assert seed not in DEVELOPMENT
+    assert all(row.drawn for row in again.rows)
     assert f"hidden seed {seed}" in again.sentence
 
 
-def test_only_a_hidden_run_without_a_seed_draws_one() -> None:
-    assert settled(CompeteConfig(hidden=True, seed=5), None).seed == 5
+def test_only_a_hidden_run_draws_a_seed_and_takes_no_other(tmp_path: Path) -> None:
     assert settled(CompeteConfig(), None).seed == DEVELOPMENT.start
+    for seed in (5, DEVELOPMENT.start):
+        with pytest.raises(ConfigError, match=f"expected none beside hidden.* found {seed}"):
+            settled(CompeteConfig(hidden=True, seed=seed), tmp_path)
+    file = tmp_path / "config.toml"
+    file.write_text("hidden = true\nseed = 5\n")
+    assert settled(CompeteConfig(hidden=True, seed=5), tmp_path).seed == 5
+    file.write_text("hidden = false\nseed = 5\n")  # of a run whose seed was known
+    with pytest.raises(ConfigError, match="found 5"):
+        settled(CompeteConfig(hidden=True, seed=5), tmp_path)
+    assert settled(CompeteConfig(hidden=True), tmp_path).seed != 5
 
 
 # a table that is run again
@@ -354,7 +382,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     for changed, said, code in [
         (text, "8 of 8 rows repeat; 0 differ", 0),
         (text.replace(",timeout,", ",success,", 1), "7 of 8 rows repeat; 1 differ, 1 of them", 2),
-        (text.replace("timeout,0.3,", "timeout,0.4,", 1), "1 differ, 0 of them", 0),
+        (text.replace("timeout,0.3,", "timeout,0.4,", 1), "1 differ, 0 of them", 2),
     ]:
         file.write_text(changed)
         assert main(["compete", "--check", str(file), "--no-figures", "--out", "again"]) == code
@@ -371,6 +399,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ("controller,scene\nopen,flat\n", "line 2: expected outcome, found none"),
         ("controller,scene,outcome\nopen,flat,success\n", "line 2: "),
         ("\0\n", "expected a table of trials"),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
+            "line 2: expected no seed of 700000",
+        ),
     ],
 )
 def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path: Path) -> None:
@@ -378,6 +410,55 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
     with pytest.raises(ConfigError, match=why) as error:
         read_rows(tmp_path / "a.csv")
     assert "\n" not in str(error.value)
+
+
+HERE = Episode("open", "flat", 1, 0, "success", 20.0, progress_m=2.0, engine="e", processor="p")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time_s": 19.99},
+        {"progress_m": 2.01},
+        {"overturned": True},
+        {"limit_s": 200.0},
+        {"given": "map"},
+        {"outcome": "left"},
+    ],
+)
+def test_on_the_same_processor_a_single_row_that_differs_is_refused(change: dict[str, Any]) -> None:
+    ours = [replace(HERE, trial=trial) for trial in range(200)]
+    theirs = [replace(ours[0], **change), *ours[1:]]
+    check = compared(theirs, ours)
+    assert (check["same"], check["broken"]) == (199, 1)
+    assert refused(check, 0.01)
+    assert not refused(compared(ours, ours), 0.01)
+    elsewhere = compared([replace(row, processor="q") for row in theirs], ours)
+    assert refused(elsewhere, 0.01) == bool({"limit_s", "given"} & change.keys())
+
+
+def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean() -> None:
+    """As measured there: a spread of 9.5 s on a limit of 100 s."""
+    noise = np.random.default_rng(1).normal(0.0, 9.5, 200)
+    noise -= noise.mean()
+    ours = [replace(HERE, trial=k, time_s=50.0) for k in range(200)]
+    for forged, wrong in ((0.94, False), (-5.0, True)):
+        theirs = [
+            replace(row, processor="q", time_s=50.0 + forged + float(apart))
+            for row, apart in zip(ours, noise, strict=True)
+        ]
+        check = compared(theirs, ours)
+        assert check["broken"] == 0
+        assert check["mean_share_difference"] == pytest.approx(forged / 100.0)
+        assert refused(check, 0.01) == wrong
+
+
+@pytest.mark.parametrize(("others", "wrong"), [(2, False), (3, True)])
+def test_on_another_processor_a_share_of_the_rows_must_end_alike(others: int, wrong: bool) -> None:
+    ours = [replace(HERE, trial=k) for k in range(200)]
+    theirs = [replace(row, processor="q") for row in ours]
+    theirs[:others] = [replace(row, outcome="left", time_s=100.0) for row in theirs[:others]]
+    assert refused(compared(theirs, ours), 0.01) == wrong
 
 
 def test_rows_that_were_not_run_are_not_compared() -> None:
@@ -396,5 +477,6 @@ def test_a_scene_takes_parameters_as_the_configuration_does() -> None:
     assert config.variation.broken == "left"
     assert (config.readings, config.time_limit) == (("delayed:0.02",), 5.0)
     assert (config.scene, config.seed, config.controllers) == ("tunnel", 3, ("closed",))
+    assert tunnel_config("step_up+ground.height=0.05", "open", 0).ground.height == 0.05
     assert label("uturn+variation.broken=left") == "uturn, broken=left"
     assert tunnel_config("a+b.py:Scene+time_limit=1", "open", 0).scene == "a+b.py:Scene"

@@ -29,8 +29,8 @@ def page(tmp_path: Path) -> Path:
         shutil.copy(DOCS / name, tmp_path / name)
     (tmp_path / "images").mkdir()
     rows = [
-        Episode("closed", SCENES_OF_BOARD[0], 5, 0, "success", 20.0, progress_m=2.0),
-        Episode("open", SCENES_OF_BOARD[0], 5, 0, "timeout", 100.0),
+        Episode("closed", SCENES_OF_BOARD[0], 5, 0, "success", 20.0, progress_m=2.0, drawn=True),
+        Episode("open", SCENES_OF_BOARD[0], 5, 0, "timeout", 100.0, drawn=True),
     ]
     (tmp_path / "leaderboard.csv").write_text(to_csv(asdict(row) for row in rows))
     return tmp_path / "leaderboard.md"
@@ -50,6 +50,14 @@ def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -
     assert "hidden seed 5" in text
     assert run(page.parent, "--check").returncode == 0
     assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
+
+
+def test_a_seed_that_was_not_drawn_is_not_told_as_hidden(page: Path) -> None:
+    file = page.with_suffix(".csv")
+    file.write_text(file.read_text().replace("True", "False", 1))
+    assert run(page.parent).returncode == 0
+    assert "chosen seed 5" in page.read_text()
+    assert "hidden seed" not in page.read_text().split("<!-- end of board")[0]
 
 
 def test_the_page_tells_the_public_seeds_as_the_program_has_them() -> None:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.config import require_free
+from antennate.experiments.compete.episodes import Episode, restricted
 from antennate.files import read_limited
 from antennate.params.faults import describe
 from antennate.studies.formats import from_csv
 
 LARGEST = 100_000_000
 """Most bytes of such a table."""
-CLOSE = 1e-6
-"""Times that differ by less are the same [s]: they are told to a microsecond."""
+CLOSE = 5e-7
+"""Times [s] and ways [m] that differ by less are the same: tables have six decimals."""
+BIAS, SPREAD = 0.01, 0.1
+"""Shares of the limit by which times differ on another processor: the largest mean of 200 draws was
+0.94 of 100 s, and the spread of a row 9.5 s (docs/performance.md)."""
 _ROW = TypeAdapter(Episode)
 _TEXTS = [field.name for field in fields(Episode) if field.type == "str"]
 
@@ -50,9 +55,18 @@ def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
     if lacking := [name for name in ("controller", "scene", "outcome") if not texts[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
     try:
-        return _ROW.validate_python(values)
+        row = _ROW.validate_python(values)
+        require_free(row.seed)
     except ValidationError as error:
         raise ConfigError(f"{path}: line {number}: {describe(error, Episode)}") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: line {number}: {error}") from None
+    return row
+
+
+_PLACE = ("version", "engine", "processor")
+_SHOWN = ("outcome", "time_s", "progress_m", "overturned", "limit_s", "given")
+"""What is compared."""
 
 
 def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, Any]:
@@ -61,33 +75,60 @@ def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, An
     Rows that were not run are left out, as after an interruption.
     """
     run = {(row.controller, row.scene, row.seed, row.trial): row for row in ours}
-    differ, other, done = list[dict[str, Any]](), 0, 0
-    for row in theirs:
-        again = run.get((row.controller, row.scene, row.seed, row.trial))
-        if again is None:
-            continue
-        done += 1
-        same = again.outcome == row.outcome
-        other += not same
-        if not same or abs(again.time_s - row.time_s) > CLOSE:
-            differ.append(
-                {
-                    "controller": row.controller,
-                    "scene": row.scene,
-                    "seed": row.seed,
-                    "trial": row.trial,
-                    "outcome": row.outcome,
-                    "outcome_here": again.outcome,
-                    "time_s": row.time_s,
-                    "time_here_s": again.time_s,
-                }
-            )
-    where = {name: sorted({getattr(row, name) for row in theirs}) for name in ("version", "engine")}
+    pairs = [
+        (row, again)
+        for row in theirs
+        if (again := run.get((row.controller, row.scene, row.seed, row.trial))) is not None
+    ]
+    differ = [(row, again) for row, again in pairs if not _alike(row, again)]
+    places = {f"{name}s": sorted({getattr(row, name) for row in theirs}) for name in _PLACE}
     return {
-        "rows": done,
-        "same": done - len(differ),
-        "other_outcome": other,
-        **{f"{name}s": values for name, values in where.items()},
-        "processors": sorted({row.processor for row in theirs}),
-        "differ": differ,
+        "rows": len(pairs),
+        "same": len(pairs) - len(differ),
+        "other_outcome": sum(row.outcome != again.outcome for row, again in differ),
+        "broken": sum(_must_repeat(row, again) for row, again in differ),
+        "mean_share_difference": _mean_difference(pairs),
+        **places,
+        "differ": [_told(row, again) for row, again in differ],
     }
+
+
+def refused(check: Mapping[str, Any], tie: float) -> bool:
+    """Whether a table does not repeat.
+
+    It has a row that differs and must not, or, as on another processor, fewer than a share of
+    1 - `tie` of its rows end alike, or the mean times are further apart than chance makes them.
+    """
+    rows = check["rows"]
+    if not rows:
+        return False
+    far = abs(check["mean_share_difference"]) > BIAS + 2.0 * SPREAD / sqrt(rows)
+    return check["broken"] > 0 or check["other_outcome"] > tie * rows or far
+
+
+def _alike(row: Episode, again: Episode) -> bool:
+    numbers = [(getattr(row, n), getattr(again, n)) for n in ("time_s", "progress_m", "limit_s")]
+    exact = all(getattr(row, n) == getattr(again, n) for n in ("outcome", "overturned", "given"))
+    return exact and all(abs(one - other) <= CLOSE for one, other in numbers)
+
+
+def _must_repeat(row: Episode, again: Episode) -> bool:
+    """Whether rows that differ are of one version, engine and processor, or differ in a rule."""
+    if all(getattr(row, name) == getattr(again, name) for name in _PLACE):
+        return True
+    ran = "invalid" not in (row.outcome, again.outcome)
+    return row.given != again.given or (ran and abs(row.limit_s - again.limit_s) > CLOSE)
+
+
+def _mean_difference(pairs: Sequence[tuple[Episode, Episode]]) -> float:
+    """Mean restricted time of the table less that of here, as a share of the limit; 0 of none."""
+    theirs, ours = (sum(restricted(pair[k] for pair in pairs)) for k in (0, 1))
+    return (theirs - ours) / max(len(pairs), 1)
+
+
+def _told(row: Episode, again: Episode) -> dict[str, Any]:
+    told = {name: getattr(row, name) for name in ("controller", "scene", "seed", "trial")}
+    for name in _SHOWN:
+        here = f"{name[:-2]}_here{name[-2:]}" if name[-2:] in ("_s", "_m") else f"{name}_here"
+        told |= {name: getattr(row, name), here: getattr(again, name)}
+    return told

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import field_validator, model_validator
 
 from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED
+from antennate.errors import ConfigError
 from antennate.params.base import Params, number, read_file, require_different
 from antennate.sim.scenes.registry import SHIPPED, check_name
 from antennate.studies.run_files import CONFIG
@@ -16,7 +17,7 @@ from antennate.studies.run_files import CONFIG
 DEVELOPMENT = range(600_000, 600_100)
 """Public seeds, to tune on; hidden ones are never among them."""
 RESERVED = range(700_000, 800_000)
-"""Seeds that are kept for evaluations by others; hidden ones are never among them."""
+"""Seeds that are kept for evaluations by others; no run may have one of them."""
 _SEEDS = 2**31
 """Hidden seeds lie below that."""
 CONTROLLERS_OF_BOARD = (
@@ -59,7 +60,7 @@ class CompeteConfig(Params):
     seed: int = number(
         DEVELOPMENT.start, "1", "assumed: the first of the public seeds, 600000 to 600099", ge=0
     )
-    """Seed of all chance; with `hidden` the one that was drawn."""
+    """Seed of all chance, not one of 700000 to 799999; with `hidden` the one that was drawn."""
     hidden: bool = number(False, "1", "assumed: to develop on public seeds")
     """Draw the seed from the system's entropy when the run begins; the result publishes it."""
     decision_limit: float = number(
@@ -82,6 +83,11 @@ class CompeteConfig(Params):
         names = ("controllers", "scenes", "trials", "seed", "hidden") if self.check else ()
         return dict.fromkeys(names, "the file of check says it")
 
+    @field_validator("seed")
+    @classmethod
+    def _free_seed(cls, seed: int) -> int:
+        return require_free(seed)
+
     @field_validator("controllers")
     @classmethod
     def _known_controllers(cls, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -101,6 +107,19 @@ class CompeteConfig(Params):
         return self
 
 
+def require_free(seed: int) -> int:
+    """A seed that is not reserved.
+
+    Raises:
+        ValueError: It is.
+    """
+    if seed in RESERVED:
+        raise ValueError(
+            f"expected no seed of {RESERVED[0]} to {RESERVED[-1]}, which are reserved, found {seed}"
+        )
+    return seed
+
+
 def hidden_seed(draw: Callable[[int], int] = secrets.randbelow) -> int:
     """A seed that nobody knew: neither public nor reserved.
 
@@ -115,16 +134,19 @@ def hidden_seed(draw: Callable[[int], int] = secrets.randbelow) -> int:
 def settled(config: CompeteConfig, folder: Path | None) -> CompeteConfig:
     """The configuration with its hidden seed: that of the run that goes on, or a fresh one.
 
-    A hidden run with a seed of its own is one that is known already, and keeps it.
-
     Raises:
-        ConfigError: The configuration in the folder cannot be read.
+        ConfigError: A seed is given beside `hidden` that is not the one of the run in the folder,
+            or the configuration in the folder cannot be read.
     """
-    if not config.hidden or config.seed != DEVELOPMENT.start:
+    if not config.hidden:
         return config
-    known = None if folder is None else folder / CONFIG
-    if known is not None and known.is_file():
-        seed = read_file(known, CompeteConfig).seed
-    else:
-        seed = hidden_seed()
+    file = None if folder is None else folder / CONFIG
+    known = None if file is None or not file.is_file() else read_file(file, CompeteConfig)
+    drawn = known.seed if known is not None and known.hidden else None
+    if "seed" in config.model_fields_set and config.seed != drawn:
+        raise ConfigError(
+            f"seed: expected none beside hidden, which draws one, found {config.seed}; a run that "
+            "was stopped keeps its own with resume"
+        )
+    seed = hidden_seed() if drawn is None else drawn
     return config.model_copy(update={"seed": seed})

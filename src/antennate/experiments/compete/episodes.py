@@ -53,6 +53,7 @@ class Episode:
         progress_m: How far the head came [m].
         overturned: Whether the robot lies on its back at the end.
         given: What the simulation gave to the controller, in words; empty for its readings alone.
+        drawn: Whether the seed was drawn when the run began, so that nobody knew it.
         version: Version of antennate.
         engine: Version of MuJoCo.
         processor: Model of the processor.
@@ -69,6 +70,7 @@ class Episode:
     progress_m: float = 0.0
     overturned: bool = False
     given: str = ""
+    drawn: bool = False
     version: str = __version__
     engine: str = ""
     processor: str = ""
@@ -77,7 +79,10 @@ class Episode:
 
 @dataclass(frozen=True)
 class Draw:
-    """What an episode is run from: its key, the limit of a decision [s], and what it is given."""
+    """What an episode is run from: its key and what decides beside it.
+
+    `decision_limit` is in s; `given` and `drawn` are those of its row.
+    """
 
     controller: str
     scene: str
@@ -85,6 +90,7 @@ class Draw:
     trial: int
     decision_limit: float
     given: str = ""
+    drawn: bool = False
 
 
 class Timed(Wrapped):
@@ -161,6 +167,7 @@ def _row_of(draw: Draw, row: TrialResult) -> Episode:
         progress_m=row.progress_m,
         overturned=row.overturned,
         given=draw.given,
+        drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),
         reason=row.reason,
@@ -172,6 +179,7 @@ def lost(draw: Draw, reason: str) -> Episode:
     return Episode(
         *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", TIME_LIMIT),
         given=draw.given,
+        drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),
         reason=reason,
@@ -181,3 +189,8 @@ def lost(draw: Draw, reason: str) -> Episode:
 def restricted(rows: Iterable[Episode]) -> list[float]:
     """Time of each row as a share of its limit; 1 of a failure."""
     return [row.time_s / row.limit_s if row.outcome == "success" else 1.0 for row in rows]
+
+
+def all_drawn(rows: Sequence[Episode]) -> bool:
+    """Whether the seed of each row was drawn when its run began; False without rows."""
+    return bool(rows) and all(row.drawn for row in rows)

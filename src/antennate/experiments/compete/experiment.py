@@ -14,11 +14,17 @@ from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError
-from antennate.experiments.compete.checking import compared, read_rows
+from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
-from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
+from antennate.experiments.compete.episodes import (
+    Draw,
+    Episode,
+    all_drawn,
+    lost,
+    run_episodes,
+)
 from antennate.experiments.compete.page import readme, sentence, tables
-from antennate.experiments.compete.scenes import tunnel_config
+from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
 from antennate.experiments.compete.standings import CONTROLLER, standings
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -47,7 +53,7 @@ class CompeteOutcome:
             "command": "compete",
             "seed": config.seed if self.theirs is None else None,
             "seeds": seeds,
-            "hidden": config.hidden and config.seed not in DEVELOPMENT,
+            "hidden": all_drawn(self.rows),
             "trials": max((row.trial for row in self.rows), default=-1) + 1,
             "decision_limit_s": config.decision_limit,
             "tie": config.tie,
@@ -78,7 +84,8 @@ def draws(config: CompeteConfig) -> list[Draw]:
     given = {name: "" for name, *_ in keys}
     for name in given:
         given[name] = " ".join(needs_of(_made(name, tunnel_config(keys[0][1], name, 0))))
-    return [Draw(*key, config.decision_limit, given[key[0]]) for key in keys]
+    drawn = config.hidden and config.seed not in DEVELOPMENT
+    return [Draw(*key, config.decision_limit, given[key[0]], drawn) for key in keys]
 
 
 def _made(name: str, config: TunnelConfig) -> Any:
@@ -97,6 +104,7 @@ def check(config: CompeteConfig) -> None:
         SceneError: A scene cannot be built, or the robot does not fit at its start.
     """
     cells = dict.fromkeys((draw.controller, draw.scene, draw.seed) for draw in draws(config))
+    require_different_scenes(dict.fromkeys(scene for _, scene, _ in cells), next(iter(cells))[0])
     started, decided = set[str](), set[tuple[str, str]]()
     for name, scene, seed in cells:
         settings = tunnel_config(scene, name, seed)
@@ -162,9 +170,9 @@ def run(
 
 
 def failed(result: Mapping[str, Any]) -> bool:
-    """Whether a table that was checked does not repeat: more rows end otherwise than a tie has."""
+    """Whether a table that was checked does not repeat."""
     check = result["check"]
-    return check is not None and check["other_outcome"] > result["tie"] * check["rows"]
+    return check is not None and refused(check, result["tie"])
 
 
 EXPERIMENT = Experiment.of_folder(

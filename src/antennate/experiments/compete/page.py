@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.control.readings import short_names
 from antennate.control.registry import about
+from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
 from antennate.experiments.compete.standings import CONTROLLER, PAIR
@@ -86,13 +87,15 @@ def _pair_table(pairs: Mapping[str, Mapping[str, Any]], short: Mapping[str, str]
 
 
 def _check_table(check: Mapping[str, Any]) -> Table:
-    heads = ("outcome", "here", "time [s]", "here")
+    heads = ("outcome", "here", "time [s]", "here", "way [m]", "here", "on its back", "here")
     lines = [
         (
             f"{row['controller']} in {label(row['scene'])}, {row['seed']}, {row['trial']}",
             [
                 *(row["outcome"], row["outcome_here"]),
                 *(shown(row[key], ".2f") for key in ("time_s", "time_here_s")),
+                *(shown(row[key], ".2f") for key in ("progress_m", "progress_here_m")),
+                *("yes" if row[key] else "no" for key in ("overturned", "overturned_here")),
             ],
         )
         for row in check["differ"]
@@ -110,7 +113,7 @@ def sentence(result: Result) -> str:
     if (check := result["check"]) is not None:
         return (
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
-            f"{check['other_outcome']} of them in how they end."
+            f"{check['other_outcome']} of them in how they end; {check['broken']} should not."
         )
     rows, names = result["controllers"], ordered(result)
     short = short_names(names)
@@ -122,7 +125,8 @@ def sentence(result: Result) -> str:
         for name in ranked
     ]
     seeds = result["seeds"]
-    kind = f"{'hidden' if result['hidden'] else 'public'} seed{'s' * (len(seeds) > 1)}"
+    known = "public" if set(seeds) <= set(DEVELOPMENT) else "chosen"
+    kind = f"{'hidden' if result['hidden'] else known} seed{'s' * (len(seeds) > 1)}"
     ranks = ", ".join(told) or "none, as none lives on its readings"
     return (
         f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
 from typing import Any
 
 from antennate.control.readings import YOKED
@@ -16,9 +17,13 @@ from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import shown
 from antennate.params.base import from_values
+from antennate.sim.trial import draw_scene, scene_of, time_limit_of
 
-_NEXT = re.compile(r"\+(?=[a-z_.]+=)")
-_GROUPS = ("tunnel", "corridors", "robot", "variation", "physics", "readings", "time_limit")
+_NEXT = re.compile(r"\+(?=[a-z0-9_.]+=)")
+_GROUPS = (
+    *("tunnel", "corridors", "ground", "robot", "variation", "physics"),
+    *("readings", "time_limit"),
+)
 """What may be set: fields of `TunnelConfig`."""
 
 
@@ -26,22 +31,19 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
     """The run of one controller in such a scene.
 
     Raises:
-        ConfigError: A parameter is unknown, cannot be set here, or has a value out of bounds.
+        ConfigError: A parameter is unknown, stands twice, cannot be set here, or has a value out of
+            bounds.
     """
     scene, *parts = _NEXT.split(text)
     values: dict[str, Any] = {"scene": scene, "seed": seed, "controllers": (controller,)}
     for part in parts:
         path, _, value = part.partition("=")
-        *groups, name = path.split(".")
         if path.partition(".")[0] not in _GROUPS:
             raise ConfigError(
                 f"scenes: expected a parameter of {', '.join(_GROUPS)}, found {shown(path)} in "
                 f"{shown(text)}"
             )
-        place = values
-        for group in groups:
-            place = place.setdefault(group, {})
-        place[name] = _value(value)
+        _put(values, path, _value(value), text)
     if "readings" in values:
         values["readings"] = (values["readings"],)
         if values["readings"] == (YOKED,):
@@ -52,11 +54,52 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
         raise ConfigError(f"scenes: {shown(text)}: {error}") from None
 
 
+def _put(values: dict[str, Any], path: str, value: Any, text: str) -> None:
+    """Set a value at its dotted path.
+
+    Raises:
+        ConfigError: One stands there, or at a part of the path.
+    """
+    *groups, name = path.split(".")
+    place: Any = values
+    for group in groups:
+        place = place.setdefault(group, {}) if isinstance(place, dict) else None
+    if not isinstance(place, dict) or name in place:
+        raise ConfigError(
+            f"scenes: expected each parameter once, as a group or as a value, found {shown(path)} "
+            f"again in {shown(text)}"
+        )
+    place[name] = value
+
+
+def require_different_scenes(texts: Iterable[str], controller: str) -> None:
+    """Check that no two texts are the same scene with the same parameters.
+
+    Args:
+        texts: The scenes.
+        controller: One that runs in all of them.
+
+    Raises:
+        ConfigError: Two are, or one cannot be read.
+        SceneError: One cannot be built.
+    """
+    seen: dict[str, str] = {}
+    for text in texts:
+        config = tunnel_config(text, controller, 0)
+        limit = time_limit_of(draw_scene(config, scene_of(config), 0), config.time_limit)
+        key = config.model_copy(update={"time_limit": limit}).model_dump_json()
+        if (other := seen.setdefault(key, text)) != text:
+            raise ConfigError(
+                f"scenes: expected different ones, found {shown(other)} and {shown(text)}, which "
+                "are the same"
+            )
+
+
 def _value(text: str) -> Any:
     """A value as TOML has it, else the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # no TOML, a number that is too long, or too deep
         return text
 
 
