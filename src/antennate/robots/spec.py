@@ -221,8 +221,9 @@ class RobotSpec(Params):
             if known == name:
                 return slice(first, first + count)
             first += count
-        known_names = ", ".join(name for name, _, _ in self.groups)
-        raise ConfigError(f"name: expected one of {known_names}, found {shown(name)}")
+        *others, last = (known for known, _, _ in self.groups)
+        names = f"{', '.join(others)} or {last}"
+        raise ConfigError(f"name: expected {names}, found {shown(name)}")
 
     def command_shapes(self, batch: int = 1) -> dict[str, tuple[int, ...]]:
         """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""
