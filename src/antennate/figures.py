@@ -46,6 +46,9 @@ CONTROLLER_COLOURS = {
     "schedule": "#D55E00",
     "zigzag": "#009E73",
     "random": "#56B4E9",
+    "climb": "#661100",
+    "lifted": "#999933",
+    "rhythm": "#44AA99",
 }
 CONTROLLER_LINES = {
     "open": (0, (4, 1.5)),
@@ -59,6 +62,9 @@ CONTROLLER_LINES = {
     "schedule": (0, (5, 1.5)),
     "zigzag": (0, (1, 1.2)),
     "random": (0, (2, 2)),
+    "climb": (0, (12, 1.5)),
+    "lifted": (0, (1, 3)),
+    "rhythm": (0, (3, 3)),
 }
 """A second mark beside the colour, for print in grey."""
 
