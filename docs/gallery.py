@@ -42,6 +42,7 @@ SCRIPTS = {
     "replay.png": "replay.py",
     "corridors.png": "scenes.py",
     "hard.png": "scenes.py",
+    "leaderboard-ranks.png": "leaderboard.py",
 }
 """What draws the pictures that no single command draws."""
 FEW = {

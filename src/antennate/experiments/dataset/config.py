@@ -31,6 +31,7 @@ _PATTERN = ("train",) * 5 + ("validation", "test", "test", "test_antenna", "test
 _Factor = Annotated[float, Field(gt=0.1, le=3)]
 _Share = Annotated[float, Field(gt=0.2, le=1)]
 _Distance = Annotated[float, Field(gt=0, le=1)]
+_Turn = Annotated[float, Field(gt=0, le=1.5)]
 _Angle = Annotated[float, Field(ge=-1.5, le=1.5)]
 
 
@@ -113,7 +114,7 @@ class PushParams(Params):
         (0.4, 1.0), "1", "assumed: nearer contacts hardly bend the flex sensor"
     )
     """Range of the place of the first contact, over the length of the antenna."""
-    depth: tuple[float, float] = number(
+    depth: tuple[_Turn, _Turn] = number(
         (0.1, 0.3), "rad", "assumed: less hardly bends it, more lets it slip off"
     )
     """Range of the turn of the head after the first contact."""
