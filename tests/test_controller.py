@@ -10,6 +10,7 @@ import pytest
 from antennate.control.registry import BUILT_IN, make_controller
 from antennate.errors import ConfigError
 from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Maneuver
 
 FEELING = ("open", "paper", "closed")
@@ -45,10 +46,19 @@ def streams(ticks: int, rows: int) -> np.ndarray:
     return counts
 
 
+FLOOR = 1745.0
+"""Counts of an antenna that is lowered to the floor; `climb` takes a straight one for a drop."""
+
+
+def robot_of(name: str) -> RobotSpec:
+    """A robot that the controller can walk."""
+    return RobotSpec.named("scuttle3d" if name in ("climb", "lifted", "rhythm") else "scuttle")
+
+
 def run(name: str, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
     """All that a fresh controller says to counts of shape (ticks, B, 2)."""
     batch = counts.shape[1]
-    control = make_controller(name, PARAMS, batch=batch)
+    control = make_controller(name, PARAMS, robot_of(name), batch)
     control.reset(np.arange(batch), phase)
     said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
     for i, reading in enumerate(counts):
@@ -116,7 +126,7 @@ def test_a_reading_that_is_no_number_stops_the_robot_at_once(
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_a_robot_walks_again_once_the_window_has_passed_a_gap(name: str) -> None:
-    counts = np.full((60, 1, 2), STRAIGHT)
+    counts = np.full((60, 1, 2), FLOOR if name == "climb" else STRAIGHT)
     counts[20, 0, 0] = np.nan
     holding = run(name, counts)["maneuver"][:, 0] == Maneuver.HOLD
     assert np.flatnonzero(holding).tolist() == list(range(20, 30))  # T_avg is ten samples
@@ -150,7 +160,7 @@ def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_a_row_that_is_reset_says_what_a_new_controller_says(name: str) -> None:
     counts = streams(900, 2)
-    control = make_controller(name, PARAMS, batch=2)
+    control = make_controller(name, PARAMS, robot_of(name), 2)
     control.reset(np.arange(2))
     for i in range(777):  # any number that leaves the rings mid-way
         control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))
