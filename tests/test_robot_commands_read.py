@@ -17,7 +17,7 @@ import pytest
 from doctor_rig import Patient
 from lockstep import BoardPort, LockstepClock, SimulatedWire
 from log_ticks import HEADER
-from recorded import act, leaves, recorded
+from recorded import act, leaves, meet_ground, recorded
 from setup_rig import Box, Script
 from worlds import recorded as logged
 from worlds import simulated
@@ -124,9 +124,11 @@ def driven(
         told(patch, drive.teleop, drive.TeleopOptions(arm=True, out=out, **PORTS), config)
         return
     told(patch, drive.command, drive.DriveOptions(arm=True, out=out, **PORTS), config)
-    for name in BUILT_IN if config.control.rate < 100.0 else ():
-        climbs = name in ("climb", "lifted", "rhythm")
-        act(name, config.control, RobotSpec.named("scuttle3d") if climbs else config.robot)
+    if config.control.rate < 100.0:
+        climbing = ("climb", "lifted", "rhythm")
+        for name in (name for name in BUILT_IN if name not in climbing):
+            act(name, config.control, config.robot)
+        meet_ground(config.control, RobotSpec.named("scuttle3d"))
 
 
 def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:

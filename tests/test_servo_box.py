@@ -305,7 +305,7 @@ def test_only_what_servos_alone_read_is_taken_beside_them() -> None:
     """Everything that could be changed is refused, but for what the other tests here use."""
     parameters = {path.partition(".")[0] for path in leaves(TwinConfig)}
     refused = {flag.strip("-").partition("=")[0].partition(".")[0] for flag in OF_A_ROBOT}
-    by_its_scene = {"corridors"}
+    by_its_scene = {"corridors", "ground"}
     assert parameters - refused == {"duration", "fault", "push", "plugged"} | by_its_scene
 
 
