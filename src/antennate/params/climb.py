@@ -13,17 +13,17 @@ class FeelParams(Params):
     elevation: float = number(
         math.radians(-20.0),
         "rad",
-        "fitted: antennate climb; the floor then bends them by 0.21 to 0.38",
+        "fitted: trials of seed 0; the floor then bends them by 0.21 to 0.38",
         ge=-1.5,
         le=1.5,
     )
     """Elevation of antennae that feel for the ground."""
     missing: float = number(
-        0.14, "1", "fitted: antennate climb; over a drop 0.06, on the floor 0.21", ge=0, le=1
+        0.14, "1", "fitted: trials of seed 0; over a drop 0.06, on the floor 0.21", ge=0, le=1
     )
     """Flex under which there is no ground."""
     touch: float = number(
-        0.5, "1", "fitted: antennate climb; the floor gives 0.38 at most", ge=0, le=2
+        0.5, "1", "fitted: trials of seed 0; the floor gives 0.38 at most", ge=0, le=2
     )
     """Flex above which something stands ahead."""
     touch_time: float = number(
@@ -31,11 +31,11 @@ class FeelParams(Params):
     )
     """How long something is to be felt."""
     missing_time: float = number(
-        0.15, "s", "fitted: antennate climb; the bases are past the edge then, to probe it", ge=0
+        0.15, "s", "fitted: trials of seed 0; the bases are past the edge then, to probe it", ge=0
     )
     """How long both antennae are to miss the ground."""
     aslant_time: float = number(
-        0.35, "s", "fitted: antennate climb; the base is past an edge that is met aslant", ge=0
+        0.35, "s", "fitted: trials of seed 0; the base is past an edge that is met aslant", ge=0
     )
     """How long one antenna is to miss it."""
     settle_time: float = number(0.5, "s", "assumed: the antennae come down in it", ge=0, le=5)
@@ -51,7 +51,7 @@ class FeelParams(Params):
     )
     """Pitch of the head in a probe downwards."""
     clear: float = number(
-        0.3, "1", "fitted: antennate climb; an antenna that slips over an edge falls below", ge=0
+        0.3, "1", "fitted: trials of seed 0; an antenna that slips over an edge falls below", ge=0
     )
     """Flex under which a probe upwards has passed the edge."""
     inwards: float = number(
@@ -59,11 +59,11 @@ class FeelParams(Params):
     )
     """Sweep of the bases in a probe."""
     check: float = number(
-        0.1, "rad", "fitted: antennate climb; above a step of 15 cm, below walls of 20 cm", ge=-1
+        0.1, "rad", "fitted: trials of seed 0; above a step of 15 cm, below walls of 20 cm", ge=-1
     )
     """Elevation of the antennae before a raised head, from the plane of the tail."""
     tread: float = number(
-        -0.35, "rad", "fitted: antennate climb; it reaches 4 cm below the base", ge=-1.5, le=1.5
+        -0.35, "rad", "fitted: trials of seed 0; it reaches 4 cm below the base", ge=-1.5, le=1.5
     )
     """Elevation of the antennae behind an edge, which feel for the tread while the head is up."""
     plane_sweep: float = number(
@@ -85,19 +85,23 @@ class ClimbParams(Params):
 
     feel: FeelParams = FeelParams()
     rise: float = number(
-        0.17, "m", "fitted: antennate climb; 0.15 is to be climbed, and the body sags", gt=0, le=0.3
+        0.17,
+        "m",
+        "fitted: trials of seed 0; 0.15 is to be climbed, and the body sags",
+        gt=0,
+        le=0.3,
     )
     """Step for which it is raised, whatever the height."""
-    ramp: float = number(0.24, "m", "fitted: antennate climb, true position", gt=0.05, le=1)
+    ramp: float = number(0.24, "m", "fitted: trials of seed 0, true position", gt=0.05, le=1)
     """Length over which the line rises."""
-    before: float = number(0.03, "m", "fitted: antennate climb, true position", ge=0, le=0.3)
+    before: float = number(0.03, "m", "fitted: trials of seed 0, true position", ge=0, le=0.3)
     """How far before the edge it has risen."""
-    over: float = number(0.03, "m", "fitted: antennate climb, true position", ge=0, le=0.1)
+    over: float = number(0.03, "m", "fitted: trials of seed 0, true position", ge=0, le=0.1)
     """How much higher than the step it is there."""
     settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
     """Length over which it comes down to the step."""
     amplitude: float = number(
-        math.radians(20.0), "rad", "fitted: antennate climb; bent less, links rise higher", ge=0
+        math.radians(20.0), "rad", "fitted: trials of seed 0; bent less, links rise higher", ge=0
     )
     """Amplitude of the yaw joints while it climbs, at most that of the gait."""
     amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
@@ -105,7 +109,7 @@ class ClimbParams(Params):
     pace: float = number(
         0.035,
         "m/s",
-        "fitted: antennate climb; at 0.05 a robot that slips back loses the edge",
+        "fitted: trials of seed 0; at 0.05 a robot that slips back loses the edge",
         gt=0,
         le=0.5,
     )
@@ -113,13 +117,13 @@ class ClimbParams(Params):
     ahead: float = number(
         0.10,
         "m",
-        "fitted: antennate climb; felt at 0.14, less what it walks on at once",
+        "fitted: trials of seed 0; felt at 0.14, less what it walks on at once",
         gt=0,
         le=1,
     )
     """Distance of the edge from the middle of the head when it is felt."""
     approach_time: float = number(
-        1.0, "s", "fitted: antennate climb; the robot comes up to the edge in it", ge=0, le=10
+        1.0, "s", "fitted: trials of seed 0; the robot comes up to the edge in it", ge=0, le=10
     )
     """Time that it walks with its head raised before the plan goes on."""
     sink_rate: float = number(0.05, "m/s", "assumed: 10 cm in the time of a link", gt=0, le=1)

@@ -14,6 +14,10 @@ from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, Maneuver
 
 
+_NEARLY = 0.02
+"""How near to its lowest elevation an antenna has come down [rad]."""
+
+
 class Stage(IntEnum):
     """What a robot is doing."""
 
@@ -218,7 +222,7 @@ class ClimbRule:
             self.height[row] = self._above(self._body.raised[row])
             self._blind[row] = self._p.drop_time
             self._to(row, Stage.WALK)
-        elif self._body.raised[row] <= self._feel.lowest + 0.02:
+        elif self._body.raised[row] <= self._feel.lowest + _NEARLY:
             self.height[row] = -math.inf
             self._to(row, Stage.BACK)
         return Maneuver.HOLD
