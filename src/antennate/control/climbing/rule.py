@@ -13,7 +13,6 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, Maneuver
 
-
 _NEARLY = 0.02
 """How near to its lowest elevation an antenna has come down [rad]."""
 
