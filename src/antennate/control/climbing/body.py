@@ -156,11 +156,11 @@ class Body:
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod
-        wanted = np.column_stack([pitch, self.elevation, self.sweep])
-        most = np.full(wanted.shape[1], self._params.rate * self._period)
+        goals = np.column_stack([pitch, self.elevation, self.sweep])
+        most = np.full(goals.shape[1], self._params.rate * self._period)
         moves = ~self.still[:, None]
-        self._now += np.clip(wanted - self._now, -most, most) * moves
-        self._carry(wanted[:, :-2], moves)
+        self._now += np.clip(goals - self._now, -most, most) * moves
+        self._carry(goals[:, :-2], moves)
         limit, most = self._robot.pitch.largest, self._robot.elevation.largest
         joints = np.clip(self._now[:, :-2] + self._sag, -limit, limit)
         lowered = np.clip(self._now[:, -2] - self._now[:, :-2].sum(axis=1), -most, most)
@@ -171,10 +171,10 @@ class Body:
             elevation=np.repeat(lowered[:, None], 2, axis=1),
         )
 
-    def _carry(self, wanted: Floats, moves: Bools) -> None:
+    def _carry(self, goals: Floats, moves: Bools) -> None:
         """Integrate what the load takes off the pitch joints of held rows; let go of the others."""
         least = self._params.carry_rate * self._period
-        lack = np.nan_to_num(wanted - self.measured)
+        lack = np.nan_to_num(goals - self.measured)
         back = np.clip(-self._sag, -least, least)
         change = np.where(self.held[:, None], self._params.carry_gain * self._period * lack, back)
         self._sag = np.clip(self._sag + change * moves, -_MOST_SAG, _MOST_SAG)

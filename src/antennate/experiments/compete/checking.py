@@ -102,7 +102,7 @@ def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, An
         "broken": sum(_must_repeat(row, again) for row, again in differ),
         "mean_share_difference": _mean_difference(pairs),
         **places,
-        "differ": [_told(row, again) for row, again in differ],
+        "differ": [_compared_row(row, again) for row, again in differ],
     }
 
 
@@ -139,9 +139,9 @@ def _mean_difference(pairs: Sequence[tuple[Episode, Episode]]) -> float:
     return (theirs - ours) / max(len(pairs), 1)
 
 
-def _told(row: Episode, again: Episode) -> dict[str, Any]:
-    told = {name: getattr(row, name) for name in ("controller", "scene", "seed", "trial")}
+def _compared_row(row: Episode, again: Episode) -> dict[str, Any]:
+    columns = {name: getattr(row, name) for name in ("controller", "scene", "seed", "trial")}
     for name in _SHOWN:
-        here = f"{name[:-2]}_here{name[-2:]}" if name[-2:] in ("_s", "_m") else f"{name}_here"
-        told |= {name: getattr(row, name), here: getattr(again, name)}
-    return told
+        repeated = f"{name[:-2]}_here{name[-2:]}" if name[-2:] in ("_s", "_m") else f"{name}_here"
+        columns |= {name: getattr(row, name), repeated: getattr(again, name)}
+    return columns

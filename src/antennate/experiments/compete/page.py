@@ -40,8 +40,8 @@ def tables(result: Result) -> Sequence[Table]:
     short = short_names(names)
     rows = {short[name]: result["controllers"][name] for name in names}
     privileged = [name for name, row in rows.items() if row["given"]]
-    given = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
-    note = _NOTE.format(given=given)
+    privileges = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
+    note = _NOTE.format(given=privileges)
     parts = [
         Table.of("Controllers", rows, CONTROLLER, note, about(names)),
         Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
@@ -56,11 +56,11 @@ def tables(result: Result) -> Sequence[Table]:
 def _scene_lines(result: Result, names: Sequence[str]) -> list[tuple[str, list[str]]]:
     lines = []
     for scene, cells in result["scenes"].items():
-        told = [
+        counts = [
             f"{cells[n]['successes']}/{cells[n]['episodes']}" if cells[n]["episodes"] else "-"
             for n in names
         ]
-        lines.append((label(scene), told))
+        lines.append((label(scene), counts))
     return lines
 
 
@@ -119,7 +119,7 @@ def sentence(result: Result) -> str:
     short = short_names(names)
     ranked = [name for name in names if rows[name]["rank"] is not None]
     scenes = len(result["scenes"])
-    told = [
+    entries = [
         f"{short[name]} {rows[name]['rank']} ({shown(rows[name]['rank_95'], '.0f')}; "
         f"{rows[name]['successes']} of {rows[name]['episodes']})"
         for name in ranked
@@ -127,7 +127,7 @@ def sentence(result: Result) -> str:
     seeds = result["seeds"]
     known = "public" if set(seeds) <= set(DEVELOPMENT) else "chosen"
     kind = f"{'hidden' if result['hidden'] else known} seed{'s' * (len(seeds) > 1)}"
-    ranks = ", ".join(told) or "none, as none lives on its readings"
+    ranks = ", ".join(entries) or "none, as none lives on its readings"
     return (
         f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
         f"{', '.join(map(str, seeds))}: {ranks}."
