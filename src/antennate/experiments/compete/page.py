@@ -40,8 +40,8 @@ def tables(result: Result) -> Sequence[Table]:
     short = short_names(names)
     rows = {short[name]: result["controllers"][name] for name in names}
     privileged = [name for name, row in rows.items() if row["given"]]
-    privileges = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
-    note = _NOTE.format(given=privileges)
+    words = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
+    note = _NOTE.format(given=words)
     parts = [
         Table.of("Controllers", rows, CONTROLLER, note, about(names)),
         Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
