@@ -1,7 +1,7 @@
 """Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
 
-They are made of docs/science/climb.csv, the trials.csv of the run that the page names; with --check
-the page is only compared.
+They are made of docs/science/climb.csv and climb_fresh.csv, the trials.csv of the runs that the page
+names; with --check the page is only compared.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from antennate.studies.measures import Table
 
 HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
+FRESH, SHOWN = HERE / "climb_fresh.csv", ("Climbed", "Trial by trial")
+"""A run on draws on which nothing was tuned, and the tables of it that the page shows."""
 REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
 
 
@@ -35,6 +37,9 @@ def main() -> None:
         text += "\n".join(map(markdown, tables(result)))
         if "--check" not in sys.argv[1:]:
             FIGURE.write_bytes(render(success(result["climbing"]))["png"])
+        fresh = outcome_of(FRESH).result()
+        text += f"\n### On fresh draws\n\n{sentence(fresh)}\n\n"
+        text += "\n".join(markdown(t) for t in tables(fresh) if t.title.startswith(SHOWN))
     page = PAGE.read_text()
     new = REGION.sub(lambda found: f"{found[1]}\n{text}\n{found[2]}", page)
     if "--check" in sys.argv[1:] and new != page:
