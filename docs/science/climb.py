@@ -1,7 +1,7 @@
 """Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
 
-They are made of docs/science/climb.csv and climb_fresh.csv, the trials.csv of the runs that the page
-names; with --check the page is only compared.
+They are made of docs/science/climb.csv and climb_fresh.csv, the trials.csv of the runs that the
+page names; with --check the page is only compared.
 """
 
 from __future__ import annotations
