@@ -63,6 +63,11 @@ def leaves(model: type[Params], path: tuple[str, ...] = ()) -> Iterator[str]:
             yield ".".join((*path, name))
 
 
+def robot_for(name: str) -> RobotSpec:
+    """A robot that a controller can walk."""
+    return RobotSpec.named("scuttle3d" if name in ("climb", "lifted", "rhythm") else "scuttle")
+
+
 def act(name: str, control: ControlParams, robot: RobotSpec) -> None:
     """Let a controller be pressed for longer than any of its times."""
     press(make_controller(name, control, robot, 1), control)

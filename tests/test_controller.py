@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from recorded import robot_for
 
 from antennate.control.registry import BUILT_IN, make_controller
 from antennate.errors import ConfigError
 from antennate.params.control import ControlParams
-from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Maneuver
 
 FEELING = ("open", "paper", "closed")
@@ -50,15 +50,10 @@ FLOOR = 1745.0
 """Counts of an antenna that is lowered to the floor; `climb` takes a straight one for a drop."""
 
 
-def robot_of(name: str) -> RobotSpec:
-    """A robot that the controller can walk."""
-    return RobotSpec.named("scuttle3d" if name in ("climb", "lifted", "rhythm") else "scuttle")
-
-
 def run(name: str, counts: np.ndarray, phase: float = 0.0) -> dict[str, np.ndarray]:
     """All that a fresh controller says to counts of shape (ticks, B, 2)."""
     batch = counts.shape[1]
-    control = make_controller(name, PARAMS, robot_of(name), batch)
+    control = make_controller(name, PARAMS, robot_for(name), batch)
     control.reset(np.arange(batch), phase)
     said: dict[str, list[np.ndarray]] = {"b": [], "maneuver": [], "yaw": [], "leg": []}
     for i, reading in enumerate(counts):
@@ -160,7 +155,7 @@ def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_a_row_that_is_reset_says_what_a_new_controller_says(name: str) -> None:
     counts = streams(900, 2)
-    control = make_controller(name, PARAMS, robot_of(name), 2)
+    control = make_controller(name, PARAMS, robot_for(name), 2)
     control.reset(np.arange(2))
     for i in range(777):  # any number that leaves the rings mid-way
         control.step(AntennaFrame(t=np.full(2, i * PERIOD), counts=np.full((2, 2), 100.0 + i)))

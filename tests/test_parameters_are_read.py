@@ -301,7 +301,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
             if name == "tunnel" and config.control.rate < 50.0:
                 for one in config.controllers:
                     act(one, config.control, config.robot)
-            if name == "climb":
+            if name == "climb" or "climb" in getattr(config, "controllers", ()):
                 meet_ground(config.control, config.robot)
         read |= found
     every = set(leaves(experiment.config))

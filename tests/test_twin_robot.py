@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from recorded import robot_for
 from twin_rig import Decisions, on_twin, simulated
 
 from antennate.control.gait import targets
@@ -148,12 +149,13 @@ def test_B14_what_is_not_refused_lies_within_one_turn_but_for_legs(
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
-    joints, params = Joints(ROBOT), ControlParams()
+    robot, params = robot_for(name), ControlParams()
+    joints = Joints(robot)
     offset = max(params.gait.turn_offset, params.escape.turn_offset)
     for sign in (-1.0, 1.0):
         for phase in np.linspace(0.0, 2 * math.pi, 100):
-            joints.ticks(targets(params.gait, ROBOT, np.array([phase]), np.array([sign * offset])))
-    control = make_controller(name, params)
+            joints.ticks(targets(params.gait, robot, np.array([phase]), np.array([sign * offset])))
+    control = make_controller(name, params, robot)
     rng = np.random.default_rng(3)
     for tick in range(1000):
         counts = rng.uniform(0.0, 4095.0, (1, 2))

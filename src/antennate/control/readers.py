@@ -37,6 +37,8 @@ HARDWARE_ALONE = (
     "robot.release",
 )
 """Parameters that only the robot's hardware, or its twin, reads; the simulation alone does not."""
+KEPT_BY_CLIMBERS = ("robot.pitch.limit", "robot.elevation.limit")
+"""Those of them that controllers that climb keep, in a simulation too."""
 SIMULATION_ALONE = (
     *(
         f"robot.{name}"
@@ -210,6 +212,14 @@ def unread_by_all(
     paths = set.intersection(*(unread(name, control, knows) for name in names))
     reasons = {f"control.{path}": who for path in sorted(paths)}
     return reasons | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
+
+
+def unread_limits(names: Sequence[str]) -> dict[str, str]:
+    """Limits of joints that none of these controllers keeps, and why."""
+    climbers = {"climb", "lifted", "rhythm", "edges"}
+    if not set(names) <= set(UNREAD) - climbers:
+        return {}
+    return dict.fromkeys(KEPT_BY_CLIMBERS, "only controllers that climb read it in a simulation")
 
 
 def unread_lift(robot: RobotSpec, gait: str) -> dict[str, str]:

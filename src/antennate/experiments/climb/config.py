@@ -9,7 +9,13 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, field_validator, model_validator
 
 from antennate.control.climbing.body import require_pitch
-from antennate.control.readers import HARDWARE_ALONE, unread_by_all, unused
+from antennate.control.readers import (
+    HARDWARE_ALONE,
+    KEPT_BY_CLIMBERS,
+    unread_by_all,
+    unread_limits,
+    unused,
+)
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.base import (
@@ -61,8 +67,6 @@ LEVEL = ("flat", BUMPY)
 """Grounds without an edge, on which every climb is a false one."""
 
 
-_LIMITS = ("robot.pitch.limit", "robot.elevation.limit")
-"""Limits of joints that these controllers keep."""
 _OF_OTHERS = tuple(
     f"control.{path}"
     for path in (
@@ -105,7 +109,7 @@ class ClimbConfig(Params):
     """Everything that decides the outcome of `antennate climb`."""
 
     unread: ClassVar[tuple[str, ...]] = (
-        *(path for path in HARDWARE_ALONE if path not in _LIMITS),
+        *(path for path in HARDWARE_ALONE if path not in KEPT_BY_CLIMBERS),
         *_OF_OTHERS,
     )
     trials: int = number(
@@ -166,7 +170,11 @@ class ClimbConfig(Params):
         )
         names = [name for name in dict.fromkeys(CONTROLLERS.values()) if name in used]
         knows = ("edges",) if "edges" in used else ()
-        reasons = {**unused(self.robot), **unread_by_all(names, self.control, self.robot, knows)}
+        reasons = {
+            **unread_limits(names),
+            **unused(self.robot),
+            **unread_by_all(names, self.control, self.robot, knows),
+        }
         if "locked" in self.conditions:
             reasons.pop("robot.pitch.stiffness", None)
         return reasons | {_DIVISOR: "divisors says it"}

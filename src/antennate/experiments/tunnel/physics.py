@@ -17,7 +17,12 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.knowledge import KNOWABLE, Kind
-from antennate.control.readers import HARDWARE_ALONE, unread_by_all
+from antennate.control.readers import (
+    HARDWARE_ALONE,
+    KEPT_BY_CLIMBERS,
+    unread_by_all,
+    unread_limits,
+)
 from antennate.control.readings import (
     KINDS,
     OWN,
@@ -44,7 +49,9 @@ if TYPE_CHECKING:
 class TunnelConfig(TrialConfig):
     """Everything that decides the outcome of `antennate tunnel`."""
 
-    unread: ClassVar[tuple[str, ...]] = HARDWARE_ALONE
+    unread: ClassVar[tuple[str, ...]] = tuple(
+        path for path in HARDWARE_ALONE if path not in KEPT_BY_CLIMBERS
+    )
     trials: int = number(
         30, "1", "assumed: the paper's ten leave an interval of half the range", ge=1, le=100000
     )
@@ -95,7 +102,7 @@ class TunnelConfig(TrialConfig):
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
         control = unread_by_all(self.controllers, self.control, self.robot, self.knows)
-        return {**super().unread_here(), **control}
+        return {**unread_limits(self.controllers), **super().unread_here(), **control}
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
