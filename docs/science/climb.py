@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
-from antennate.experiments.climb.experiment import ClimbOutcome
+from antennate.experiments.climb.experiment import ClimbOutcome, tables
 from antennate.experiments.climb.figure import success
-from antennate.experiments.climb.measures import sentence, tables
+from antennate.experiments.climb.measures import sentence
 from antennate.experiments.climb.physics import ClimbRow
 from antennate.figures import render
 from antennate.studies.formats import from_csv
@@ -59,6 +59,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
     felt = [row for row in rows if row.part == "sensing"]
     config = ClimbConfig(
         trials=max(row.trial for row in climbs) + 1,
+        grounds=tuple(dict.fromkeys(row.ground for row in rows if row.part == "ground")),
         heights=tuple(dict.fromkeys(row.height_m for row in climbs if row.height_m)),
         conditions=tuple(n for n in CONTROLLERS if any(row.condition == n for row in climbs)),
         divisors=tuple(dict.fromkeys(row.divisor for row in climbs)),
