@@ -69,16 +69,16 @@ def success(
         entries: As of `climbing`.
         grounds: As of `crossing`; without gaps in them there is one column.
     """
-    gaps = [_gaps(entry["grounds"]) for entry in grounds]
-    columns = 2 if any(any(rows.values()) for rows in gaps) else 1
+    gaps = {entry["divisor"]: _gaps(entry["grounds"]) for entry in grounds}
+    columns = 2 if any(any(rows.values()) for rows in gaps.values()) else 1
     figure = style.canvas(style.WIDTH, 0.9 + 2.5 * len(entries))
     panels = figure.subplots(len(entries), columns, squeeze=False, sharex="col", sharey=True)
-    for i, (row, entry) in enumerate(zip(panels, entries, strict=True)):
+    for row, entry in zip(panels, entries, strict=True):
         _draw_success(row[0], entry["heights"], "height_m")
         row[0].set(ylabel="success [%]", title=f"gain divisor {entry['divisor']:g}")
         row[0].set_ylim(-4, 104)
         if columns == 2:
-            _draw_success(row[1], gaps[i], "size")
+            _draw_success(row[1], gaps.get(entry["divisor"], {}), "size")
     for panel, label in zip(panels[-1], _AXES, strict=False):
         panel.set_xlabel(label)
     handles, labels = panels[0, 0].get_legend_handles_labels()
