@@ -114,7 +114,8 @@ def _draw_success(
             label=name,
         )
     marks = sorted({100 * row[size] for rows in by_name.values() for row in rows})
-    panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    if marks:
+        panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
 
 
 @style.styled
