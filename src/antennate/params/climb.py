@@ -54,6 +54,22 @@ class FeelParams(Params):
         0.3, "1", "fitted: trials of seed 0; an antenna that slips over an edge falls below", ge=0
     )
     """Flex under which a probe upwards has passed the edge."""
+    level_height: float = number(
+        0.024,
+        "m",
+        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        ge=-0.5,
+        le=0.5,
+    )
+    """Height of an edge that the later antenna slips over when it is level."""
+    height_slope: float = number(
+        0.061,
+        "m/rad",
+        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        ge=0,
+        le=1,
+    )
+    """How much higher an edge is for each radian that it is raised further."""
     inwards: float = number(
         math.radians(-30.0), "rad", "assumed: straight ahead, where it reaches highest", ge=-0.8
     )
@@ -106,6 +122,14 @@ class ClimbParams(Params):
     """Amplitude of the yaw joints while it climbs, at most that of the gait."""
     amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
     """Largest change of that amplitude."""
+    frequency: float = number(
+        0.3,
+        "Hz",
+        "fitted: see docs/science/climb.md; legs that push less turn it less aside",
+        gt=0,
+        le=5,
+    )
+    """Frequency of the gait while the plan goes on, at most that of the gait."""
     pace: float = number(
         0.035,
         "m/s",
