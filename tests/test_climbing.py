@@ -9,6 +9,7 @@ import pytest
 
 from antennate.control.climbing.body import line, pitch_angles
 from antennate.control.climbing.rule import Ground, Stage
+from antennate.control.knowledge import Knowledge
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.params.climb import ClimbParams
@@ -82,6 +83,41 @@ def test_without_readings_no_joint_moves(name: str) -> None:
         if tick % 150 == 100:
             blind = [command(math.nan) for _ in range(20)]
             assert (np.array(blind[1:]) == blind[0]).all()
+
+
+def test_a_plan_that_is_told_goes_on_at_its_pace_and_back_with_the_robot() -> None:
+    control = ControlParams()
+    controller = make_controller("edges", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    plans = []
+    for tick, place in enumerate([-0.2] * 10 + [0.2] * 400 + [-0.15] * 10):
+        knowledge = Knowledge(edges=np.array([[place, math.nan, math.nan, math.nan]]))
+        controller.know(knowledge)  # pyright: ignore[reportAttributeAccessIssue]
+        controller.step(AntennaFrame(np.array([0.01 * tick]), np.full((1, 2), FLOOR)))
+        body = controller.body  # pyright: ignore[reportAttributeAccessIssue]
+        plans.append(body.progress[0].copy())
+    first = np.array(plans)[:, 0]
+    assert first[9] == -0.2
+    assert first[109] - first[11] == pytest.approx(0.98 * control.climb.pace)
+    assert first[-1] == -0.15
+    assert np.isnan(np.array(plans)[:, 1:]).all()
+
+
+def test_legs_go_slower_while_the_plan_goes_on() -> None:
+    """A leg makes one turn in each period of the gait, and of the slower one while it climbs."""
+    control = ControlParams()
+    walk, climb = control.gait.frequency, control.climb.frequency
+    assert climb < walk
+    controller = make_controller("rhythm", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    legs = [
+        controller.step(AntennaFrame(np.array([0.01 * i]), np.full((1, 2), FLOOR))).leg[0, 0, 0]
+        for i in range(1500)
+    ]
+    for begin, frequency in ((100, walk), (1000, climb)):
+        period = 1.0 / (0.01 * frequency)
+        end = np.interp(begin + period, np.arange(1500), legs)
+        assert abs(end - legs[begin]) == pytest.approx(2.0 * math.pi, abs=0.01)
 
 
 STRAIGHT, FLOOR, BENT = 1870.0, 1745.0, 1500.0

@@ -78,6 +78,8 @@ class Body:
         self._gait.amplitude = np.full(batch, control.gait.amplitude)
         self._amplitude: Floats = self._gait.amplitude
         self._usual = control.gait.amplitude
+        self._fast = control.gait.frequency
+        self._slow = min(control.climb.frequency, self._fast)
         self.progress: Floats = np.full((batch, EDGES), np.nan)
         self.rise: Floats = np.full((batch, EDGES), control.climb.rise)
         self.elevation: Floats = np.zeros(batch)
@@ -153,6 +155,8 @@ class Body:
         wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
         change = self._params.amplitude_rate * self._period * (maneuver != int(Maneuver.HOLD))
         self._amplitude += np.clip(wave - self._amplitude, -change, change)
+        slow = np.logical_or.reduce(self.progress > -self._params.ahead, axis=1)
+        self._gait.frequency = np.where(slow, self._slow, self._fast)
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod
