@@ -226,7 +226,7 @@ def killed(left):
                 if left == 0:
                     os.kill(os.getpid(), signal.SIGKILL)
     sys.addaudithook(watch)
-    os._exit(main(WORDS))
+    sys.exit(main(WORDS))
 main([*WORDS[:3], "--out", "imported"])  # all that the others import
 codes = []
 while 0 not in codes:  # until one meets its end
