@@ -30,11 +30,11 @@ def test_controllers_that_climb_keep_the_contract(name: str) -> None:
 
 def test_the_line_rises_before_the_edge_and_comes_down_to_the_step() -> None:
     far = np.array([-2.0, -PARAMS.before - PARAMS.ramp])
-    assert line(PARAMS, far, RISE) == pytest.approx(0.0)
+    assert line(PARAMS, ROBOT, far, RISE) == pytest.approx(0.0)
     top = np.array([-PARAMS.before, 0.0, 0.06])
-    assert line(PARAMS, top, RISE) == pytest.approx(RISE + PARAMS.over)
+    assert line(PARAMS, ROBOT, top, RISE) == pytest.approx(RISE + PARAMS.over)
     behind = np.array([0.06 + PARAMS.settle, 2.0])
-    assert line(PARAMS, behind, RISE) == pytest.approx(RISE)
+    assert line(PARAMS, ROBOT, behind, RISE) == pytest.approx(RISE)
 
 
 def angles(*progress: float) -> np.ndarray:
@@ -53,7 +53,7 @@ def test_each_link_does_what_the_link_before_did(progress: float) -> None:
 def test_slopes_of_links_are_those_of_chords_of_the_line() -> None:
     """The joints add up to the slope of the head, as the tail is level."""
     ends = np.array([-0.1 + 0.06, -0.1 - 0.06])
-    front, back = line(PARAMS, ends, RISE)
+    front, back = line(PARAMS, ROBOT, ends, RISE)
     assert angles(-0.1).sum() == pytest.approx(math.asin((front - back) / ROBOT.link_pitch))
 
 

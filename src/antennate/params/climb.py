@@ -117,7 +117,7 @@ class ClimbParams(Params):
     settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
     """Length over which it comes down to the step."""
     amplitude: float = number(
-        math.radians(20.0), "rad", "fitted: trials of seed 0; bent less, links rise higher", ge=0
+        math.radians(15.0), "rad", "fitted: trials of seed 3; bent less, it turns less aside", ge=0
     )
     """Amplitude of the yaw joints while it climbs, at most that of the gait."""
     amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
