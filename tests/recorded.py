@@ -104,9 +104,10 @@ def climb_all(control: ControlParams, robot: RobotSpec) -> None:
         before, even = stage, visits[stage] % 2 == 0
         level = tick < 0.5 * ticks  # later it is stopped by what it climbs
         even &= level
+        slipped = visits[stage] == 1 and controller.body.raised[0] > 0.3  # over a low step
         counts = {
             Stage.WALK: straight if even or (level and controller.body.climbs[0]) else bent,
-            Stage.PROBE_UP: straight if visits[stage] == 1 else bent,
+            Stage.PROBE_UP: straight if slipped or visits[stage] == 2 else bent,
             Stage.PROBE_DOWN: straight if even else bent,
             Stage.CHECK: bent if visits[stage] == 2 else floor,
         }.get(Stage(stage), floor)
