@@ -184,9 +184,11 @@ class ClimbRule:
         return axle + self._robot.antenna.length * math.sin(angle)
 
     def _raise(self, row: int) -> None:
-        """Begin a climb."""
+        """Begin a climb, by the height of the probe if it is low and nothing speaks against it."""
+        low = self.height[row] < self._p.low and not (self._climbs[row] or self._close[row])
+        rise = self.height[row] + self._p.spare if low else self._p.rise
         self._climbs[row] += not self._body.climbs[row]
-        self._body.begin(self._one(row))
+        self._body.begin(self._one(row), rise)
         self._to(row, Stage.LIFT)
 
     def _lift(self, row: int, flex: Floats, steering: int) -> int:
