@@ -94,7 +94,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
         )
         for row in from_csv(path.read_text())
     ]
-    climbs = [row for row in rows if row.part == "climbing"]
+    climbs = [row for row in rows if row.part != "sensing"]
     felt = [row for row in rows if row.part == "sensing"]
     config = ClimbConfig(
         trials=max(row.trial for row in climbs) + 1,

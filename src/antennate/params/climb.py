@@ -46,6 +46,14 @@ class FeelParams(Params):
     """Elevation at which a probe upwards ends."""
     lowest: float = number(math.radians(-75.0), "rad", "assumed: nearly down", ge=-1.57, le=0)
     """Elevation at which a probe downwards ends."""
+    creep_time: float = number(
+        0.4,
+        "s",
+        "fitted: trials of seed 0; a head before the edge cannot bow, at 0.55 s robots tip over",
+        ge=0,
+        le=2,
+    )
+    """How long it walks on before a probe downwards."""
     bow: float = number(
         -0.5, "rad", "assumed: one link down; it reaches 14 cm below the ground", ge=-1, le=0
     )

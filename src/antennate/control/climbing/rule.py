@@ -217,8 +217,12 @@ class ClimbRule:
         self._to(row, Stage.STEER)
 
     def _probe_down(self, row: int, flex: Floats, steering: int) -> int:
-        """Stand, and lower head and antennae until they find ground."""
-        angle = self._feel.elevation - self._feel.sweep_rate * self._since[row]
+        """Creep until the head is past the edge, and lower it with the antennae to find ground."""
+        since = self._since[row] - self._feel.creep_time
+        if since < 0.0:
+            self._pose(row, self._feel.elevation)
+            return Maneuver.FORWARD
+        angle = self._feel.elevation - self._feel.sweep_rate * since
         self._pose(row, angle, self._feel.inwards, self._feel.bow)
         if (flex > self._feel.clear)[self._missing[row]].all():
             self.height[row] = self._tip(self._body.raised[row])
@@ -237,9 +241,9 @@ class ClimbRule:
         return Maneuver.REVERSE
 
     def _back(self, row: int, flex: Floats, steering: int) -> int:
-        """Back off from a drop."""
+        """Back off from a drop, and before that over the way that it crept."""
         self._pose(row, self._feel.elevation)
-        if self._since[row] > self._p.back_time:
+        if self._since[row] > self._p.back_time + self._feel.creep_time:
             self._to(row, Stage.TURN)
         return Maneuver.REVERSE
 
