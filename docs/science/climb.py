@@ -63,8 +63,10 @@ def main() -> None:
 
 
 def first_of(result: Mapping[str, Any]) -> list[Table]:
-    """Tables of success over the height of steps, one each divisor."""
-    return [table for table in step_tables(result) if table.title.startswith("Climbed")]
+    """Tables of success over the height of steps, one each divisor that has trials."""
+    shown = [entry for entry in result["climbing"] if entry["conditions"]["climb"]["trials"]]
+    found = step_tables({**result, "climbing": shown})
+    return [table for table in found if table.title.startswith("Climbed")]
 
 
 def plane() -> Table:
