@@ -70,7 +70,7 @@ class Teacher:
 
     def __init__(self, config: EnvConfig, batch: int) -> None:
         self._config, self._scene = config, scene_of(config)
-        self._routes: list[np.ndarray] = [np.zeros((2, 2))] * batch
+        self.routes: list[np.ndarray] = [np.zeros((2, 2))] * batch
         self._heads = np.full((batch, CYCLE + 1, 3), np.nan)
         self.order = np.full(batch, FORWARD)
         self._for = np.zeros(batch, np.int64)
@@ -80,7 +80,7 @@ class Teacher:
         for row in np.flatnonzero(rows).tolist():
             seed, number = (int(infos[name][row]) for name in ("seed", "episode_number"))
             config = self._config.model_copy(update={"seed": seed})
-            self._routes[row] = np.asarray(draw_scene(config, self._scene, number).route)
+            self.routes[row] = np.asarray(draw_scene(config, self._scene, number).route)
         self._heads[rows] = np.nan
         self.order[rows], self._for[rows] = FORWARD, 0
 
@@ -119,7 +119,7 @@ class Teacher:
         """Angle from the mean heading to a point ahead on the route [rad], positive to the left."""
         heads = self._heads[row][~np.isnan(self._heads[row, :, 0])][-CYCLE:]
         heading = mean_direction(heads[:, 2].tolist())
-        return angle_ahead(self._routes[row], heads[-1, :2], heading, SIDE_AHEAD)
+        return angle_ahead(self.routes[row], heads[-1, :2], heading, SIDE_AHEAD)
 
     def _is_jammed(self, row: int) -> bool:
         """Whether the head has hardly moved in a gait cycle."""
