@@ -55,7 +55,7 @@ ROWS, SEGMENT = 12, 25
 """Robots of each scene; decisions for which one of the two walks."""
 ROUND = 50
 """Decisions of each robot between two trainings."""
-TEACHING = 0.3
+TEACHING = 0.45
 """Share of the time in which the teacher walks less and less, down to never."""
 UNITS, BATCH, RATE, EPOCHS = 64, 256, 1e-3, 2
 
@@ -314,7 +314,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument("--scene", nargs="+", default=["uturn", "room"], choices=[*SCENES])
     parser.add_argument("--readings", default="own", choices=["own", "none"])
-    parser.add_argument("--decisions", type=int, default=30_000)
+    parser.add_argument("--decisions", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     print(teach(parser.parse_args()))
 
