@@ -1,15 +1,15 @@
-"""Teach a network to escape by touch, by imitation of a search, and write it as ONNX.
+"""Teach a network to escape by touch, by imitation of one who knows the way; write it as ONNX.
 
     python examples/imitate.py --out my_policy                   # 20 minutes on one core
     antennate tunnel --scene uturn --controllers timed closed my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 
-The teacher is the search of `closed`, in the time scale of a faster gait. It learns on what the
-student does (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): the student walks, at first
-in turns with the teacher; the teacher says at each decision what it would do; the student learns
-all that it was told. What the teacher wants stands until the student does it, and its clock stands
-still meanwhile. So it says how to go on from wherever the student has brought itself.
+The teacher knows the route, as no robot does: it says when to back off and to which side to turn.
+The student has its antennae and what it did itself. It learns on its own episodes (DAgger: Ross,
+Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in turns with the teacher; the teacher
+says at each decision how to go on from where the student has brought itself; the student learns
+all that it was told.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from antennate.sim.trial import draw_scene, scene_of
 SCENES = {scene: name for name, scene in antennate.envs.ids().items()}
 FREQUENCY = 1.0
 """Gait cycles a second [Hz]."""
-INTERFACE = {"action": "gait", "ticks": 20, "history": 60, "memory_time": 15.0}
+INTERFACE = {"action": "gait", "ticks": 20, "history": 60, "memory_time": 30.0}
 """A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last 12 s."""
 CYCLE, BACK, SHORTEST, TURN, LONGEST = 5, 7, 3, 8, 23
 """Decisions of a gait cycle and of backing off; of turns: the least, to a wrong side, the most."""
@@ -72,8 +72,9 @@ class Teacher:
         self._config, self._scene = config, scene_of(config)
         self.routes: list[np.ndarray] = [np.zeros((2, 2))] * batch
         self._heads = np.full((batch, CYCLE + 1, 3), np.nan)
-        self.order = np.full(batch, FORWARD)
+        self._done = np.full(batch, FORWARD)
         self._for = np.zeros(batch, np.int64)
+        self._turn = np.zeros(batch, np.int64)
 
     def begin(self, rows: np.ndarray, infos: dict[str, Any]) -> None:
         """Episodes begin in some rows, shape (B,)."""
@@ -82,38 +83,29 @@ class Teacher:
             config = self._config.model_copy(update={"seed": seed})
             self.routes[row] = np.asarray(draw_scene(config, self._scene, number).route)
         self._heads[rows] = np.nan
-        self.order[rows], self._for[rows] = FORWARD, 0
+        self._done[rows], self._for[rows], self._turn[rows] = FORWARD, 0, 0
 
     def advise(self, heads: np.ndarray, done: np.ndarray) -> np.ndarray:
         """What to do next, shape (B,): heads (B, 3) are there after maneuvers (B,)."""
         self._heads = np.concatenate([self._heads[:, 1:], heads[:, None]], axis=1)
-        for row in range(len(done)):
-            self._advise(row, int(done[row]))
-        return self.order.copy()
+        self._for = np.where(done == self._done, self._for + 1, 1)
+        self._turn = np.where((done == TURN_L) | (done == TURN_R), done, self._turn)
+        self._done = done.copy()
+        return np.array([self._advice(row) for row in range(len(done))])
 
-    def _advise(self, row: int, done: int) -> None:
-        order = int(self.order[row])
-        if {order, done} == {TURN_L, TURN_R}:  # another side than told: it goes on with that one
-            order = self.order[row] = done
-        if order != done:
-            self._for[row] *= order != FORWARD
-            return
-        self._for[row] += 1
-        since, angle = int(self._for[row]), self._angle(row)
-        turn = TURN_L if angle > 0.0 else TURN_R
-        if order == FORWARD:
+    def _advice(self, row: int) -> int:
+        done, since, angle = int(self._done[row]), int(self._for[row]), self._angle(row)
+        turn, astray = TURN_L if angle > 0.0 else TURN_R, abs(angle) > ASTRAY
+        if astray and self._turn[row]:  # back from where it turned to last
+            turn = TURN_L if self._turn[row] == TURN_R else TURN_R
+        if done == FORWARD:
             if since > CYCLE and self._is_jammed(row):
-                self._give(row, REVERSE)
-            elif since > CYCLE and abs(angle) > ASTRAY:
-                self._give(row, turn)
-        elif order == REVERSE:
-            if since >= BACK:
-                self._give(row, turn)
-        elif since >= (SHORTEST if abs(angle) < ALIGNED else TURN if order != turn else LONGEST):
-            self._give(row, FORWARD)
-
-    def _give(self, row: int, order: int) -> None:
-        self.order[row], self._for[row] = order, 0
+                return REVERSE
+            return turn if since > CYCLE and astray else FORWARD
+        if done == REVERSE:
+            return turn if since >= BACK else REVERSE
+        least = SHORTEST if abs(angle) < ALIGNED else LONGEST if done == turn or astray else TURN
+        return FORWARD if since >= least else done
 
     def _angle(self, row: int) -> float:
         """Angle from the mean heading to a point ahead on the route [rad], positive to the left."""
@@ -259,7 +251,7 @@ class Lessons:
         given, told = torch.cat(self._given), torch.cat(self._told)
         network, right = self._network, 0
         network.mean.copy_(given.mean(0))
-        network.scale.copy_(given.std(0).clamp(min=0.05))
+        network.scale.copy_(given.std(0).clamp(min=0.02))
         self._optimiser.param_groups[0]["lr"] = rate
         for _ in range(epochs):
             right = 0

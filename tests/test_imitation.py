@@ -68,18 +68,24 @@ def test_a_robot_that_gets_on_is_told_to_walk(imitate: Any) -> None:
         assert advice(teacher, (0.05 * i, 0.0, 0.3), imitate.FORWARD) == imitate.FORWARD
 
 
-def test_an_order_stands_until_it_is_done_and_a_turn_to_the_other_side_is_gone_on_with(
-    imitate: Any,
+def test_a_turn_to_the_wrong_side_is_gone_on_with_for_its_time(imitate: Any) -> None:
+    teacher = teacher_on_a_straight_route(imitate)
+    told = [advice(teacher, (1.0, 0.0, 0.9), imitate.TURN_L) for _ in range(imitate.TURN)]
+    assert told == [imitate.TURN_L] * (imitate.TURN - 1) + [imitate.FORWARD]
+
+
+@pytest.mark.parametrize(("last", "side"), [("TURN_L", "TURN_R"), ("TURN_R", "TURN_L")])
+def test_a_robot_that_walks_back_is_told_to_undo_its_last_turn(
+    imitate: Any, last: str, side: str
 ) -> None:
     teacher = teacher_on_a_straight_route(imitate)
-    orders = [advice(teacher, (1.0, 0.0, 0.9), imitate.FORWARD) for _ in range(30)]
-    assert set(orders[imitate.CYCLE + 1 :]) == {imitate.REVERSE}
-    for _ in range(imitate.BACK):
-        order = advice(teacher, (1.0, 0.0, 0.9), imitate.REVERSE)
-    assert order == imitate.TURN_R
-    assert advice(teacher, (1.0, 0.0, 0.9), imitate.TURN_L) == imitate.TURN_L
-    left = [advice(teacher, (1.0, 0.0, 0.9), imitate.TURN_L) for _ in range(imitate.TURN)]
-    assert left.count(imitate.TURN_L) == imitate.TURN - 2
+    for _ in range(4):
+        advice(teacher, (3.0, 0.0, np.pi), getattr(imitate, last))
+    walked = [
+        advice(teacher, (3.0 - 0.05 * i, 0.0, np.pi), imitate.FORWARD)
+        for i in range(imitate.CYCLE + 1)
+    ]
+    assert walked == [imitate.FORWARD] * imitate.CYCLE + [getattr(imitate, side)]
 
 
 class Gait:
