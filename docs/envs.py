@@ -25,15 +25,24 @@ on the twin and behind the supervisor of the real robot.
 ```bash
 uv sync --extra gym --extra onnx
 uv pip install torch
-uv run --no-sync python examples/train_ppo.py --out my_policy
-uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --seed 5
+uv run --no-sync python examples/imitate.py --out my_policy
+uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --scene uturn
 ```
 
-The third line takes 20 minutes on one core; `--workers 8` uses eight, `--scene uturn` another
-scene, `--readings none` trains the same network without touch, which is what it has to beat. It
-says how many of the last hundred episodes got out. The fourth line compares the policy with two of
-our controllers in thirty tunnels that it has not seen. `examples/train_ppo.py` is PPO on PyTorch
-alone, in one file to be read and changed.
+The third line takes some 10 minutes on one core. A teacher that knows the route tells a network
+with two antennae how to escape, in the scenes `uturn` and `room`; `--scene` names others,
+`--decisions 40000` teaches for longer, and `--readings none` the same network without touch, which
+is what it has to beat. It says how many of its last episodes alone got out. The fourth line
+compares the policy with two of our controllers in thirty scenes that it has not seen. Such a policy
+is in a clone:
+
+```bash
+uv run --extra onnx antennate tunnel --scene uturn \\
+    --controllers timed entries/apprentice/policy.onnx
+```
+
+`examples/train_ppo.py` learns from the reward instead, by PPO: `--workers 8` uses eight cores.
+Either is one file on PyTorch, to be read and changed.
 
 ## Use one
 
