@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 
 from antennate import envs
+from antennate.control.policy.controller import Policy
 from antennate.control.policy.interface import PolicyInterface
 from antennate.control.policy.observer import Observer
+from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
+from antennate.testing import check_controller
 from antennate.types import AntennaFrame
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -145,3 +148,25 @@ def test_the_example_teaches_and_its_policy_walks(tmp_path: Path) -> None:
     config = TunnelConfig(time_limit=3.0, scene="uturn", controllers=(str(path),))
     run_trials(config, str(path), [0], lambda r: rows.append(r[0]))
     assert rows[0].outcome != "invalid"
+
+
+ENTRY = Path(__file__).parents[1] / "entries/apprentice"
+
+
+def test_the_entry_keeps_the_protocol_of_controllers() -> None:
+    pytest.importorskip("onnxruntime")
+    path = str(ENTRY / "policy.onnx")
+    check_controller(lambda c, r, b: make_controller(path, c, r, b))
+
+
+def test_its_blind_twin_answers_alike_whatever_is_felt_and_it_does_not() -> None:
+    pytest.importorskip("onnxruntime")
+    rng = np.random.default_rng(8)
+    for name, alike in (("blind", True), ("policy", False)):
+        policy = Policy(ENTRY / f"{name}.onnx")
+        felt = [i for i, q in enumerate(policy.contract.observations) if q.name.startswith("flex")]
+        own = rng.normal(0.0, 1.0, (50, len(policy.contract.observations))).astype(np.float32)
+        other = own.copy()
+        other[:, felt] = rng.normal(0.5, 1.0, (50, len(felt)))
+        answers = [[policy.answer(x[None], {})[0] for x in seen] for seen in (own, other)]
+        assert np.array_equal(*answers) == alike

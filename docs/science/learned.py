@@ -20,6 +20,7 @@ COMPARED = (
     ("uturn", FRESH, "blind"),
     ("uturn", KNOWN, "closed"),
     ("uturn", KNOWN, "geometric"),
+    ("room", KNOWN, "blind"),
     ("room", KNOWN, "closed"),
     ("room", KNOWN, "geometric"),
 )
