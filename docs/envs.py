@@ -71,7 +71,7 @@ environment for your [own scene](scenes.md).
   of its own.
 - An episode in which the robot has no room at its start is left out, and the next one begins.
 - **Ends**: terminated are `success` (the head is out by the exit), `left` (out another way),
-  `overturned` and `invalid` (the physics or the scene failed; `info["reason"]` says how).
+  `overturned`, `fell` and `invalid` (the physics or the scene failed; `info["reason"]` says how).
   Truncated is `timeout`, at the scene's limit, `time_limit` or `max_episode_steps`.
 - Ends are looked for at the beginning of a control tick, as in a trial: what happens in the last
   tick of a decision ends the episode at the first one of the next, which then moves nothing.

@@ -15,13 +15,9 @@ from antennate.control.climbing.rule import Ground, Stage
 from antennate.errors import BadInputError
 from antennate.experiments.climb import measures
 from antennate.experiments.climb.config import ClimbConfig, cells, config_of
+from antennate.experiments.climb.criterion import is_over
 from antennate.experiments.climb.experiment import EXPERIMENT, every, run
-from antennate.experiments.climb.physics import (
-    ClimbRow,
-    carry_out,
-    has_fallen,
-    is_over,
-)
+from antennate.experiments.climb.physics import ClimbRow, carry_out
 from antennate.experiments.climb.sensing import Verdict
 from antennate.sim.trial import draw_trial, scene_of
 
@@ -30,6 +26,7 @@ TINY = {
     "heights": (0.05, 0.08),
     "conditions": ("locked", "edges"),
     "divisors": (128.0,),
+    "grounds": ("step_tunnel:0.08",),
     "sensing": 0,
     "time_limit": 0.3,
 }
@@ -48,7 +45,8 @@ def test_it_is_registered_with_all_its_cells():
     table = cells(config)
     climbs = [cell for cell in table.values() if cell.part == "climbing"]
     assert len(climbs) == 6 * 5 * 2
-    assert len(every(config)) == 2 * len(climbs) + len(table) - len(climbs)
+    assert len([cell for cell in table.values() if cell.part == "ground"]) == 6 * 7 * 2
+    assert len(every(config)) == len(table)
     robots = {cell.condition: config_of(config, cell).robot for cell in climbs}
     assert [n for n, robot in robots.items() if not robot.pitch_count] == ["locked"]
     divisors = {config_of(config, c).robot.servos.xc430_w240.gain_divisor for c in climbs}
@@ -93,12 +91,6 @@ def test_a_robot_is_over_when_all_links_stand_behind_and_above(x, y, z, over):
     links = world.link_places()
     assert links[-1, 0] == pytest.approx(edge + x)
     assert is_over(links, edge, scene.top, robot.link_pitch) is over
-
-
-def test_a_link_has_fallen_below_half_a_drop():
-    links = np.array([[0.1, 0.0, 0.19], [0.0, 0.0, 0.38]])
-    assert not has_fallen(links, 0.35, 0.35)
-    assert has_fallen(links - [0.0, 0.0, 0.02], 0.35, 0.35)
 
 
 def test_a_verdict_is_that_of_the_first_probe():
@@ -181,7 +173,7 @@ def test_rows_are_the_same_on_two_workers():
     config = ClimbConfig(**TINY)
     one, two = run(config, 1), run(config, 2)
     assert one.rows == two.rows
-    assert [r.outcome for r in one.rows] == ["timeout"] * 4
+    assert [r.outcome for r in one.rows] == ["timeout"] * 6
     assert one.result() == two.result()
 
 
@@ -189,12 +181,14 @@ def test_a_run_leaves_its_tables_and_figures(tmp_path):
     out = tmp_path / "run"
     words = ["climb", "--trials", "1", "--heights", "0.05", "--conditions", "climb", "level"]
     words += ["--divisors", "256", "--time-limit", "0.3", "--sensing", "1", "--workers", "1"]
+    words += ["--grounds", "flat", "gap:0.1"]
     assert main([*words, "--out", str(out)]) == 0
     with (out / "trials.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 + 14
+    assert len(rows) == 2 + 2 * 2 + 14
     result = json.loads((out / "result.json").read_text())
     assert result["climbing"][0]["conditions"]["climb"]["timeouts"] == 1
+    assert result["grounds"][0]["grounds"]["climb"][0]["ground"] == "gap:0.1"
     names = {path.stem for path in (out / "figures").iterdir()}
     assert names == {"success", "side", "plan", "felt"}
 

@@ -9,6 +9,7 @@ import pytest
 
 from antennate.control.climbing.body import line, pitch_angles
 from antennate.control.climbing.rule import Ground, Stage
+from antennate.control.knowledge import Knowledge
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.params.climb import ClimbParams
@@ -29,11 +30,11 @@ def test_controllers_that_climb_keep_the_contract(name: str) -> None:
 
 def test_the_line_rises_before_the_edge_and_comes_down_to_the_step() -> None:
     far = np.array([-2.0, -PARAMS.before - PARAMS.ramp])
-    assert line(PARAMS, far, RISE) == pytest.approx(0.0)
+    assert line(PARAMS, ROBOT, far, RISE) == pytest.approx(0.0)
     top = np.array([-PARAMS.before, 0.0, 0.06])
-    assert line(PARAMS, top, RISE) == pytest.approx(RISE + PARAMS.over)
+    assert line(PARAMS, ROBOT, top, RISE) == pytest.approx(RISE + PARAMS.over)
     behind = np.array([0.06 + PARAMS.settle, 2.0])
-    assert line(PARAMS, behind, RISE) == pytest.approx(RISE)
+    assert line(PARAMS, ROBOT, behind, RISE) == pytest.approx(RISE)
 
 
 def angles(*progress: float) -> np.ndarray:
@@ -52,7 +53,7 @@ def test_each_link_does_what_the_link_before_did(progress: float) -> None:
 def test_slopes_of_links_are_those_of_chords_of_the_line() -> None:
     """The joints add up to the slope of the head, as the tail is level."""
     ends = np.array([-0.1 + 0.06, -0.1 - 0.06])
-    front, back = line(PARAMS, ends, RISE)
+    front, back = line(PARAMS, ROBOT, ends, RISE)
     assert angles(-0.1).sum() == pytest.approx(math.asin((front - back) / ROBOT.link_pitch))
 
 
@@ -82,6 +83,41 @@ def test_without_readings_no_joint_moves(name: str) -> None:
         if tick % 150 == 100:
             blind = [command(math.nan) for _ in range(20)]
             assert (np.array(blind[1:]) == blind[0]).all()
+
+
+def test_a_plan_that_is_told_goes_on_at_its_pace_and_back_with_the_robot() -> None:
+    control = ControlParams()
+    controller = make_controller("edges", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    plans = []
+    for tick, place in enumerate([-0.2] * 10 + [0.2] * 400 + [-0.15] * 10):
+        knowledge = Knowledge(edges=np.array([[place, math.nan, math.nan, math.nan]]))
+        controller.know(knowledge)  # pyright: ignore[reportAttributeAccessIssue]
+        controller.step(AntennaFrame(np.array([0.01 * tick]), np.full((1, 2), FLOOR)))
+        body = controller.body  # pyright: ignore[reportAttributeAccessIssue]
+        plans.append(body.progress[0].copy())
+    first = np.array(plans)[:, 0]
+    assert first[9] == -0.2
+    assert first[109] - first[11] == pytest.approx(0.98 * control.climb.pace)
+    assert first[-1] == -0.15
+    assert np.isnan(np.array(plans)[:, 1:]).all()
+
+
+def test_legs_go_slower_while_the_plan_goes_on() -> None:
+    """A leg makes one turn in each period of the gait, and of the slower one while it climbs."""
+    control = ControlParams()
+    walk, climb = control.gait.frequency, control.climb.frequency
+    assert climb < walk
+    controller = make_controller("rhythm", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    legs = [
+        controller.step(AntennaFrame(np.array([0.01 * i]), np.full((1, 2), FLOOR))).leg[0, 0, 0]
+        for i in range(1500)
+    ]
+    for begin, frequency in ((100, walk), (1000, climb)):
+        period = 1.0 / (0.01 * frequency)
+        end = np.interp(begin + period, np.arange(1500), legs)
+        assert abs(end - legs[begin]) == pytest.approx(2.0 * math.pi, abs=0.01)
 
 
 STRAIGHT, FLOOR, BENT = 1870.0, 1745.0, 1500.0

@@ -31,7 +31,10 @@ SWEEP = {f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency")}
 CARRY = {"climb.carry_gain", "climb.carry_rate"}
 LINE = {
     f"climb.{name}"
-    for name in ("rise", "ramp", "before", "over", "settle", "amplitude", "amplitude_rate")
+    for name in (
+        *("rise", "ramp", "before", "over", "settle", "amplitude", "amplitude_rate"),
+        *("frequency", "ahead"),
+    )
 }
 NO_EFFECT = {
     "climb": SWEEP,

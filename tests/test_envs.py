@@ -166,6 +166,15 @@ def test_a_robot_on_its_back_has_overturned() -> None:
     assert (ended, cut, info["outcome"]) == (True, False, "overturned")
 
 
+def test_a_robot_that_walks_into_a_wide_gap_has_fallen() -> None:
+    env = single("Gap", robot=RobotSpec.named("scuttle3d"), ground={"width": 0.5})
+    env.reset(seed=1)
+    ended, cut, info = False, False, {}
+    while not (ended or cut):
+        *_, ended, cut, info = env.step(0)
+    assert (ended, cut, info["outcome"]) == (True, False, "fell")
+
+
 def test_an_action_that_is_no_number_is_hold() -> None:
     env = single("Flat", action="gait")
     env.reset(seed=1)

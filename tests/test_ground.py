@@ -12,6 +12,8 @@ import pytest
 
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import SimulationError
+from antennate.experiments.tunnel.experiment import run
+from antennate.experiments.tunnel.measures import tables
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
@@ -220,6 +222,46 @@ def test_robots_on_their_backs_have_overturned_where_the_ground_is_not_flat(
     monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
     assert monitor.look(world, 0.1, 0) is None
     assert monitor.look(on_its_back(world, share), 0.2, 0) == outcome
+
+
+@pytest.mark.parametrize(
+    ("name", "lower", "outcome"),
+    [
+        ("gap", 0.15, None),  # as low as after a step that is walked down
+        ("gap", 0.18 + AXLE, "fell"),
+        ("step_down", 0.18 + AXLE, "fell"),
+        ("flat", 0.3, None),
+        ("tunnel", 0.3, None),
+    ],
+)
+def test_a_robot_with_one_link_far_below_the_ground_where_it_began_has_fallen(
+    name: str, lower: float, outcome: str | None
+) -> None:
+    """The criterion, on its tail that is lowered by hand; flat floors have nothing below them."""
+    scene = make_scene(name).draw(ROBOT, np.random.default_rng(0))
+    world = make_world(PhysicsParams(), ROBOT, scene)
+    place_at_start(world, scene, GaitParams())
+    mujoco.mj_kinematics(world.model, world.data)
+    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
+    assert monitor.look(world, 0.1, 0) is None
+    world.data.xpos[world.places.links[-1], 2] -= lower
+    assert monitor.look(world, 0.2, 0) == outcome
+
+
+def test_who_walks_into_a_wide_gap_falls_and_that_is_a_failure_of_the_table() -> None:
+    config = TunnelConfig(
+        scene="gap",
+        robot=ROBOT,
+        trials=2,
+        controllers=("open",),
+        time_limit=30.0,
+        ground=GroundParams(width=0.5),
+    )
+    result = run(config).result()
+    row = result["controllers"]["open"]
+    assert (row["fell"], row["successes"], row["success_share"]) == (2, 0, 0.0)
+    assert row["restricted_mean_time_s"] == 30.0
+    assert ("fell", ["2"]) in tables(result)[0].rows
 
 
 def test_who_is_out_has_succeeded_on_its_back_too() -> None:

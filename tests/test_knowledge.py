@@ -22,6 +22,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.knowledge import (
     Truths,
     angle_ahead,
+    edges_near,
     is_facing,
     is_free,
     mean_direction,
@@ -346,3 +347,17 @@ def test_a_log_says_what_was_known_and_is_not_replayed(tmp_path: Path) -> None:
 def test_simulate_gives_nothing() -> None:
     with pytest.raises(ConfigError, match="map"):
         simulate("map", time_limit=0.1)
+
+
+def test_an_edge_keeps_its_place_while_others_come_and_go() -> None:
+    edges, length = np.arange(12) * 0.3 + 1.0, 0.72
+    before = edges_near(edges, 0.0, length)
+    assert not (before > -length).any()
+    for x in np.arange(0.3, 6.0, 0.07):
+        now = edges_near(edges, x, length)
+        told = now[np.isfinite(now)]
+        assert np.isin(np.round(told, 9), np.round(x - edges, 9)).all()
+        both = np.isfinite(now) & np.isfinite(before)
+        moved = (now - before)[both] % 1.2  # another edge takes the place of one that is gone
+        assert np.minimum(moved, 1.2 - moved) == pytest.approx(0.07 if x > 0.31 else 0.3)
+        before = now

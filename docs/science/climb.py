@@ -1,22 +1,27 @@
 """Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
 
-They are made of docs/science/climb.csv and climb_fresh.csv, the trials.csv of the runs that the
-page names; with --check the page is only compared.
+They are made of docs/science/climb.csv, climb_fresh.csv, climb_ground.csv and climb_plane.csv, the
+trials.csv of the runs that the page names; with --check the page is only compared.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
-from antennate.experiments.climb.experiment import ClimbOutcome
+from antennate.experiments.climb.crossing import ground_tables
+from antennate.experiments.climb.experiment import ClimbOutcome, tables
 from antennate.experiments.climb.figure import success
-from antennate.experiments.climb.measures import sentence, tables
+from antennate.experiments.climb.measures import sentence, step_tables
 from antennate.experiments.climb.physics import ClimbRow
+from antennate.experiments.tunnel.measures import CONTROLLER, paired, summary
+from antennate.experiments.tunnel.physics import TrialResult
 from antennate.figures import render
+from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies.formats import from_csv
 from antennate.studies.measures import Table
 
@@ -24,6 +29,16 @@ HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
 FRESH, SHOWN = HERE / "climb_fresh.csv", ("Climbed", "Trial by trial")
 """A run on draws on which nothing was tuned, and the tables of it that the page shows."""
+GROUND = HERE / "climb_ground.csv"
+"""A run on other grounds, and on steps that are too high."""
+PLANE = HERE / "climb_plane.csv"
+"""Two runs of `tunnel`, one after the other: `scuttle3d` and `scuttle`."""
+CROSSED = [
+    measure
+    for measure in CONTROLLER
+    if measure.name.startswith(("success", "wilson", "timeouts", "left", "speed", "restricted"))
+]
+"""Measures of those that the page shows."""
 REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
 
 
@@ -36,15 +51,44 @@ def main() -> None:
         text = f"{sentence(result)}\n\n![Success over the height of the step](climb.png)\n\n"
         text += "\n".join(map(markdown, tables(result)))
         if "--check" not in sys.argv[1:]:
-            FIGURE.write_bytes(render(success(result["climbing"]))["png"])
+            grounds = outcome_of(GROUND).result()["grounds"]
+            FIGURE.write_bytes(render(success(result["climbing"], grounds))["png"])
         fresh = outcome_of(FRESH).result()
         text += f"\n### On fresh draws\n\n{sentence(fresh)}\n\n"
         text += "\n".join(markdown(t) for t in tables(fresh) if t.title.startswith(SHOWN))
+        ground = outcome_of(GROUND).result()
+        text += "\n### On other grounds\n\n"
+        text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
+        text += f"\n### In the plane\n\n{markdown(plane())}"
     page = PAGE.read_text()
     new = REGION.sub(lambda found: f"{found[1]}\n{text}\n{found[2]}", page)
     if "--check" in sys.argv[1:] and new != page:
         sys.exit("docs/science/climb.md is out of date: run `uv run python docs/science/climb.py`")
     PAGE.write_text(new)
+
+
+def first_of(result: Mapping[str, Any]) -> list[Table]:
+    """Tables of success over the height of steps, one each divisor."""
+    return [table for table in step_tables(result) if table.title.startswith(SHOWN[0])]
+
+
+def plane() -> Table:
+    """Two robots in the same tunnels, and the pair of them."""
+    rows = [TrialResult(**{**row, "reason": ""}) for row in from_csv(PLANE.read_text())]
+    half = len(rows) // 2
+    robots = {"scuttle3d": rows[:half], "scuttle": rows[half:]}
+    columns = {name: summary(own, TIME_LIMIT) for name, own in robots.items()}
+    pair = paired(robots, TIME_LIMIT)["scuttle3d-scuttle"]
+    low, high = pair["time_difference_95"]
+    note = (
+        f"`closed` in {half} tunnels, seed {rows[0].seed}. Only scuttle3d crossed "
+        f"{pair['only_first']}, only scuttle {pair['only_second']}; McNemar p "
+        f"{pair['mcnemar_p']:.3g}. Time, a failure as the limit: {pair['time_difference_s']:+.1f} "
+        f"s ({low:+.1f} to {high:+.1f})."
+    )
+    return Table.of(
+        "Tunnels crossed by robots with pitch joints and without", columns, CROSSED, note
+    )
 
 
 def outcome_of(path: Path) -> ClimbOutcome:
@@ -59,6 +103,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
     felt = [row for row in rows if row.part == "sensing"]
     config = ClimbConfig(
         trials=max(row.trial for row in climbs) + 1,
+        grounds=tuple(dict.fromkeys(row.ground for row in rows if row.part == "ground")),
         heights=tuple(dict.fromkeys(row.height_m for row in climbs if row.height_m)),
         conditions=tuple(n for n in CONTROLLERS if any(row.condition == n for row in climbs)),
         divisors=tuple(dict.fromkeys(row.divisor for row in climbs)),

@@ -110,6 +110,7 @@ class Gait:
         offset: Yaw offset [rad], shape (B,).
         sweep: Phase of the antenna bases [rad], shape (B,).
         amplitude: Amplitude of the yaw joints [rad], shape (B,); that of the gait if None.
+        frequency: Frequency [Hz], shape (B,); that of the gait if None.
     """
 
     def __init__(
@@ -121,6 +122,8 @@ class Gait:
         self.offset: Floats = np.zeros(batch)
         self.sweep: Floats = np.zeros(batch)
         self.amplitude: Floats | None = None
+        self.frequency: Floats | None = None
+        self._period = period
         self._advance = 2.0 * math.pi * params.frequency * period
         self._slew = params.offset_rate * period
         self._swing = 2.0 * math.pi * params.antenna_frequency * period
@@ -152,7 +155,10 @@ class Gait:
         change = goal - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * moves
-        self.phase += DIRECTION[maneuver] * self._advance
+        advance: Floats | float = self._advance
+        if self.frequency is not None:
+            advance = 2.0 * math.pi * self.frequency * self._period
+        self.phase += DIRECTION[maneuver] * advance
         self.sweep += moves * self._swing
         command = targets(
             self.params,

@@ -110,7 +110,7 @@ _BODY = tuple(
     f"climb.{name}"
     for name in (
         *("rise", "ramp", "before", "over", "settle", "amplitude", "amplitude_rate", "rate"),
-        *("carry_gain", "carry_rate"),
+        *("carry_gain", "carry_rate", "frequency", "ahead"),
     )
 )
 """What raises a body."""
@@ -121,8 +121,7 @@ _RAISED = (*(path for path in _BODY if path not in _CARRY), "climb.feel.highest"
 _SWEEP = ("gait.antenna_mean", "gait.antenna_amplitude", "gait.antenna_frequency")
 """How the gait moves the bases; those that climb move them themselves."""
 _RHYTHM = tuple(
-    f"climb.{name}"
-    for name in ("walk_time", "retreat_time", "lift_time", "approach_time", "ahead", "pace")
+    f"climb.{name}" for name in ("walk_time", "retreat_time", "lift_time", "approach_time", "pace")
 )
 """A round of `rhythm`."""
 _OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *_CLIMB)
@@ -174,7 +173,7 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     ),
     "lifted": _without(("climb.rate", "climb.lift"), *_ESCAPE, *_SWEEP),
     "rhythm": _without((*_RAISED, *_CARRY, *_RHYTHM), *_ESCAPE, *_SWEEP),
-    "edges": _without(_RAISED, *_ESCAPE, *_SWEEP),
+    "edges": _without((*_RAISED, "climb.pace"), *_ESCAPE, *_SWEEP),
     "map": (*_TABLE, *_OTHERS, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
 }

@@ -26,6 +26,7 @@ from antennate.sim.trial import (
     Judge,
     Trial,
     draw_trial,
+    mishap,
     progress_of,
     require_room,
     scene_of,
@@ -256,6 +257,7 @@ class Episodes:
             outcome = episode.judge.look(world.head[:2])
         except SceneError as error:
             return "invalid", str(error)
+        outcome = outcome or mishap(episode.scene, world)
         return outcome or ("overturned" if world.overturned else None), ""
 
     def _end(self, row: int, truth: Truth, outcome: Outcome, reason: str) -> None:

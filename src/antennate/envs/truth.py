@@ -10,8 +10,8 @@ import numpy as np
 from antennate.envs.reward import TERMS
 from antennate.types import Bools, Floats, Ints
 
-Outcome = Literal["success", "timeout", "left", "overturned", "invalid"]
-OUTCOMES: tuple[Outcome, ...] = ("success", "timeout", "left", "overturned", "invalid")
+Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
+OUTCOMES: tuple[Outcome, ...] = ("success", "timeout", "left", "overturned", "fell", "invalid")
 
 
 @dataclass(slots=True)

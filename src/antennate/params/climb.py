@@ -54,6 +54,22 @@ class FeelParams(Params):
         0.3, "1", "fitted: trials of seed 0; an antenna that slips over an edge falls below", ge=0
     )
     """Flex under which a probe upwards has passed the edge."""
+    level_height: float = number(
+        0.024,
+        "m",
+        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        ge=-0.5,
+        le=0.5,
+    )
+    """Height of an edge that the later antenna slips over when it is level."""
+    height_slope: float = number(
+        0.061,
+        "m/rad",
+        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        ge=0,
+        le=1,
+    )
+    """How much higher an edge is for each radian that it is raised further."""
     inwards: float = number(
         math.radians(-30.0), "rad", "assumed: straight ahead, where it reaches highest", ge=-0.8
     )
@@ -63,7 +79,7 @@ class FeelParams(Params):
     )
     """Elevation of the antennae before a raised head, from the plane of the tail."""
     tread: float = number(
-        -0.35, "rad", "fitted: trials of seed 0; it reaches 4 cm below the base", ge=-1.5, le=1.5
+        -0.5, "rad", "fitted: trials of seed 3; it reaches 6 cm below the base", ge=-1.5, le=1.5
     )
     """Elevation of the antennae behind an edge, which feel for the tread while the head is up."""
     plane_sweep: float = number(
@@ -101,11 +117,19 @@ class ClimbParams(Params):
     settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
     """Length over which it comes down to the step."""
     amplitude: float = number(
-        math.radians(20.0), "rad", "fitted: trials of seed 0; bent less, links rise higher", ge=0
+        math.radians(15.0), "rad", "fitted: trials of seed 3; bent less, it turns less aside", ge=0
     )
     """Amplitude of the yaw joints while it climbs, at most that of the gait."""
     amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
     """Largest change of that amplitude."""
+    frequency: float = number(
+        0.3,
+        "Hz",
+        "fitted: trials of seed 3; legs that push less turn it less aside",
+        gt=0,
+        le=5,
+    )
+    """Frequency of the gait while the plan goes on, at most that of the gait."""
     pace: float = number(
         0.035,
         "m/s",
@@ -126,7 +150,9 @@ class ClimbParams(Params):
         1.0, "s", "fitted: trials of seed 0; the robot comes up to the edge in it", ge=0, le=10
     )
     """Time that it walks with its head raised before the plan goes on."""
-    sink_rate: float = number(0.05, "m/s", "assumed: 10 cm in the time of a link", gt=0, le=1)
+    sink_rate: float = number(
+        0.025, "m/s", "fitted: trials of seed 3; at 0.05 it lies on its belly at 15 cm", gt=0, le=1
+    )
     """Speed at which it comes down behind an edge until the antennae feel the floor."""
     least: float = number(0.05, "m", "assumed: lower ones need no line", ge=0, le=0.3)
     """Rise under which no line is lowered while the head is up."""

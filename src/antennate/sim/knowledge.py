@@ -121,14 +121,18 @@ class Truths:
 def edges_near(edges: Floats, x: float, length: float) -> Floats:
     """Distance of a head at x past the edges that its body is on, or will be next [m], (EDGES,).
 
+    An edge keeps its place in the array for as long as it is told.
+
     Args:
-        edges: Where the ground rises along x [m], shape (n,).
+        edges: Where the ground rises along x [m], in their order along the way, shape (n,).
         x: Of the head [m].
         length: Of the robot; farther behind, an edge is left out [m].
     """
-    past = np.sort(x - edges)
-    near = past[(past < 1.5 * length) & (past > -length)][-EDGES:]
-    return np.concatenate([near, np.full(EDGES - len(near), math.nan)])
+    past = x - edges
+    near = np.flatnonzero((past < 1.5 * length) & (past > -length))[:EDGES]
+    told = np.full(EDGES, math.nan)
+    told[near % EDGES] = past[near]
+    return told
 
 
 def mean_direction(headings: Sequence[float]) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -40,6 +40,9 @@ LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
+FALL = 0.175
+"""How far a link has fallen that is lower than the ground at the start [m] (assumed: half the depth
+of a gap; robots walk down steps of 16 cm, docs/science/climb.md)."""
 MEMBERS = ("start", "length", "exit", "build", "progress", "left")
 """What a SceneInstance has."""
 
@@ -258,6 +261,19 @@ def _errors_of(name: str) -> Iterator[None]:
         raise SceneError(f"scene {name!r} failed: {raised(error)}") from error
 
 
+class Walker(Protocol):
+    """A robot in its scene, on the CPU or in a batch on a device."""
+
+    @property
+    def overturned(self) -> bool:
+        """Whether the undersides of most links point up."""
+        ...
+
+    def link_places(self) -> Floats:
+        """Positions of the links, head first [m], shape (L, 3)."""
+        ...
+
+
 def progress_of(scene: SceneInstance, head: Floats) -> float:
     """What a scene says of how far a head at this position, shape (2,), has come [m].
 
@@ -301,9 +317,24 @@ class Judge:
         return self._crossings > 0
 
 
-def is_uneven(scene: SceneInstance) -> bool:
-    """Whether the ground of a scene is not flat, so that robots that have overturned are told."""
-    return hasattr(scene, "ground")
+def has_fallen(links: Floats, ground: float) -> bool:
+    """Whether the centre of any link is lower than the ground at the start by more than FALL.
+
+    Args:
+        links: Places of the links [m], shape (L, 3).
+        ground: Height of that ground [m].
+    """
+    return bool(links[:, 2].min() < ground - FALL)
+
+
+def mishap(scene: SceneInstance, world: Walker) -> Literal["overturned", "fell"] | None:
+    """What ends a trial on ground that is not flat: a robot on its back, or a fall."""
+    ground = getattr(scene, "ground", None)
+    if ground is None:
+        return None
+    if world.overturned:
+        return "overturned"
+    return "fell" if has_fallen(world.link_places(), float(ground)) else None
 
 
 def _exit_of(scene: SceneInstance) -> Floats:

@@ -23,7 +23,7 @@ from antennate.sim.trial import (
     Trial,
     TrialConfig,
     draw_trial,
-    is_uneven,
+    mishap,
     require_own_curves,
     require_room,
     scene_of,
@@ -58,7 +58,7 @@ def simulate(
             physics.
 
     Returns:
-        The series; `meta["outcome"]` is success, timeout, left, overturned or
+        The series; `meta["outcome"]` is success, timeout, left, overturned, fell or
         invalid.
 
     Raises:
@@ -166,8 +166,6 @@ class _Walk:
         self.outcome = "invalid" if self._robot.failures else "timeout"
         if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
             world, scene = self._start.world, self._start.scene
-            fallen = is_uneven(scene) and world.overturned
-            self.outcome = self._judge.look(world.head[:2]) or (
-                "overturned" if fallen else "timeout"
-            )
+            ended = self._judge.look(world.head[:2]) or mishap(scene, world)
+            self.outcome = ended or "timeout"
         return self.outcome == "timeout" and self._start.world.t < self._time_limit

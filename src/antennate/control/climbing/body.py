@@ -23,16 +23,19 @@ _STEEPEST = 0.8
 """Sine of the steepest slope of a link: 53 degrees (ramps over 50 fail)."""
 _MOST_SAG = 0.4
 """Most that a target is changed against its load [rad]."""
-_LEVEL = 0.06
-"""How far behind an edge the line begins to come down [m]: half a link."""
 
 
-def line(params: ClimbParams, u: Floats, rise: Floats | float) -> Floats:
+def line(params: ClimbParams, robot: RobotSpec, u: Floats, rise: Floats | float) -> Floats:
     """Height of the centre line at distances u past an edge of a rise [m], the same shape."""
     top = rise + params.over
     up = np.clip((u + params.before + params.ramp) / params.ramp, 0.0, 1.0)
-    down = np.clip((u - _LEVEL) / params.settle, 0.0, 1.0)
+    down = np.clip((u - _level(robot)) / params.settle, 0.0, 1.0)
     return top * _smooth(up) - params.over * _smooth(down)
+
+
+def _level(robot: RobotSpec) -> float:
+    """How far behind an edge the line begins to come down [m]: half a link."""
+    return 0.5 * robot.link_pitch
 
 
 def _smooth(x: Floats) -> Floats:
@@ -49,7 +52,8 @@ def pitch_angles(params: ClimbParams, robot: RobotSpec, progress: Floats, rise: 
         rise: Height for which it is raised at each edge [m], shape (B, K).
     """
     ends = progress[:, :, None] + robot.link_pitch * (0.5 - np.arange(robot.links + 1))
-    heights = np.nansum(np.where(np.isnan(ends), 0.0, line(params, ends, rise[:, :, None])), axis=1)
+    over = line(params, robot, ends, rise[:, :, None])
+    heights = np.nansum(np.where(np.isnan(ends), 0.0, over), axis=1)
     rise = (heights[:, :-1] - heights[:, 1:]) / robot.link_pitch
     slopes = np.arcsin(np.clip(rise, -_STEEPEST, _STEEPEST))
     return slopes[:, :-1] - slopes[:, 1:]
@@ -73,11 +77,14 @@ class Body:
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
         self._params, self._robot, self._period = control.climb, robot, control.period
+        self._level = _level(robot)
         self._gait = Gait(control.gait, robot, batch, control.period)
         self.phase: Floats = self._gait.phase
         self._gait.amplitude = np.full(batch, control.gait.amplitude)
         self._amplitude: Floats = self._gait.amplitude
         self._usual = control.gait.amplitude
+        self._fast = control.gait.frequency
+        self._slow = min(control.climb.frequency, self._fast)
         self.progress: Floats = np.full((batch, EDGES), np.nan)
         self.rise: Floats = np.full((batch, EDGES), control.climb.rise)
         self.elevation: Floats = np.zeros(batch)
@@ -97,17 +104,17 @@ class Body:
     @property
     def head_is_up(self) -> Bools:
         """Rows whose head is on its way over an edge, by the plan, shape (B,)."""
-        return np.logical_or.reduce(self.progress < _LEVEL + self._params.settle, axis=1)
+        return np.logical_or.reduce(self.progress < self._level + self._params.settle, axis=1)
 
     @property
     def nose_is_up(self) -> Bools:
         """Rows whose head has yet to come down behind an edge, by the plan, shape (B,)."""
-        return np.logical_or.reduce(self.progress < _LEVEL, axis=1)
+        return np.logical_or.reduce(self.progress < self._level, axis=1)
 
     @property
     def behind(self) -> Bools:
         """Edges that the head has passed, by the plan, shape (B, K)."""
-        return self.progress >= _LEVEL + self._params.settle
+        return self.progress >= self._level + self._params.settle
 
     @property
     def raised(self) -> Floats:
@@ -153,6 +160,8 @@ class Body:
         wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
         change = self._params.amplitude_rate * self._period * (maneuver != int(Maneuver.HOLD))
         self._amplitude += np.clip(wave - self._amplitude, -change, change)
+        slow = np.logical_or.reduce(self.progress > -self._params.ahead, axis=1)
+        self._gait.frequency = np.where(slow, self._slow, self._fast)
         command = self._gait.step(maneuver, turn_offset)
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod

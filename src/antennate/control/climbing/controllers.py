@@ -124,21 +124,27 @@ _ROUND = np.array(
 
 
 class _EdgesRule:
-    """FORWARD; a simulation tells where the edges are."""
+    """FORWARD; a simulation tells where the edges are.
+
+    Its plan goes on as slowly as that of `climb`, and goes back with a robot that slips back.
+    """
 
     turn_offset = 0.0
     knows: tuple[Kind, ...] = ("edges",)
     needs: tuple[Kind, ...] = knows
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
-        self._body, self._elevation = body, 0.5 * control.climb.feel.highest
+        p = control.climb
+        self._body, self._elevation = body, 0.5 * p.feel.highest
+        self._most, self._ahead = p.pace * control.period, p.ahead
 
     def reset(self, rows: Ints | Bools) -> None:
         pass
 
     def know(self, knowledge: Knowledge) -> None:
         if knowledge.edges is not None:
-            self._body.progress = knowledge.edges
+            most = np.fmax(self._body.progress + self._most, -self._ahead)
+            self._body.progress = np.minimum(knowledge.edges, most)
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         self._body.elevation[:] = self._elevation

@@ -163,7 +163,9 @@ class ClimbRule:
         self._passed[row] = np.where(flex > self._feel.clear, np.nan, lower)
         if angle < self._feel.highest:
             return Maneuver.HOLD
-        self.height[row] = self._above(self._passed[row].max())
+        passed = float(self._passed[row].max())
+        rise = self._feel.level_height + self._feel.height_slope * passed
+        self.height[row] = math.inf if math.isnan(passed) else rise
         self.ground[row] = Ground.STEP_UP
         if self._climbs[row] >= self._p.attempts:
             self._wall(row)
@@ -176,11 +178,10 @@ class ClimbRule:
             self._raise(row)
         return Maneuver.HOLD
 
-    def _above(self, angle: float) -> float:
-        """Height of the tip of a straight antenna at an elevation [m]; infinite if it is NaN."""
+    def _tip(self, angle: float) -> float:
+        """Height of the tip of a straight antenna at an elevation [m]."""
         axle = self._robot.leg_radius + self._robot.leg_eccentricity
-        tip = axle + self._robot.antenna.length * math.sin(angle)
-        return math.inf if math.isnan(angle) else tip
+        return axle + self._robot.antenna.length * math.sin(angle)
 
     def _raise(self, row: int) -> None:
         """Begin a climb."""
@@ -218,7 +219,7 @@ class ClimbRule:
         angle = self._feel.elevation - self._feel.sweep_rate * self._since[row]
         self._pose(row, angle, self._feel.inwards, self._feel.bow)
         if (flex > self._feel.clear)[self._missing[row]].all():
-            self.height[row] = self._above(self._body.raised[row])
+            self.height[row] = self._tip(self._body.raised[row])
             self._blind[row] = self._p.drop_time
             self._to(row, Stage.WALK)
         elif self._body.raised[row] <= self._feel.lowest + _NEARLY:

@@ -17,6 +17,7 @@ from antennate.control.readers import (
     unused,
 )
 from antennate.errors import ConfigError
+from antennate.experiments.climb.grounds import FLAT, FLAT_TIME, USUAL, Terrain
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.base import (
     Params,
@@ -84,11 +85,12 @@ class Cell:
     """One cell of the table: who meets which ground.
 
     Attributes:
-        part: `climbing` or `sensing`.
+        part: `climbing`, `ground` or `sensing`.
         condition: Who.
-        ground: Name of the ground, a key of GROUND; the height in words where it is climbed.
+        ground: The height in words where a step is climbed, a word of `grounds`, or a key of
+            GROUND where it is felt.
         scene: Name of its scene.
-        height: Height of its edge [m], None without one.
+        height: Height of its edge [m]; None without one, and in the part `ground`.
         divisor: Gain divisor of the body's servos.
     """
 
@@ -113,9 +115,9 @@ class ClimbConfig(Params):
         *_OF_OTHERS,
     )
     trials: int = number(
-        2, "1", "assumed: shows how it works in minutes; 25 tell something", ge=1, le=100_000
+        1, "1", "assumed: shows how it works in minutes; 25 tell something", ge=1, le=100_000
     )
-    """Trials of each condition, height and divisor."""
+    """Trials of each condition, ground and divisor."""
     heights: tuple[Annotated[float, Field(gt=0, le=0.5)], ...] = number(
         (0.05, 0.08, 0.10, 0.12, 0.15),
         "m",
@@ -124,6 +126,14 @@ class ClimbConfig(Params):
         max_length=50,
     )
     """Heights of the steps."""
+    grounds: tuple[str, ...] = number(
+        USUAL,
+        "1",
+        "assumed: one of each kind, and a gap that is too wide",
+        max_length=50,
+    )
+    """Other grounds: flat, gap:WIDTH, step_down:HEIGHT, stairs:HEIGHT or step_tunnel:HEIGHT [m], or
+    ramp:SLOPE [deg]."""
     conditions: tuple[Condition, ...] = number(
         ("locked", "level", "lifted", "rhythm", "climb", "edges"),
         "1",
@@ -146,7 +156,7 @@ class ClimbConfig(Params):
     time_limit: float = number(
         60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
     )
-    """Time after which a trial has failed."""
+    """Time after which a trial on one step has failed; on stairs and in tunnels twice it."""
     seed: int = number(2711, "1", "assumed: any but 0, by which the controllers were tuned", ge=0)
     """Seed of all chance."""
     robot: RobotSpec = RobotSpec.named(ROBOT)
@@ -154,6 +164,11 @@ class ClimbConfig(Params):
     control: ControlParams = ControlParams()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
+
+    @field_validator("grounds")
+    @classmethod
+    def _known(cls, words: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(Terrain.of(word).word for word in words)
 
     @field_validator("robot", mode="before")
     @classmethod
@@ -181,19 +196,27 @@ class ClimbConfig(Params):
 
     @model_validator(mode="after")
     def _agree(self) -> ClimbConfig:
-        for name in ("heights", "conditions", "divisors"):
+        for name in ("heights", "grounds", "conditions", "divisors"):
             require_different(name, getattr(self, name))
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         try:
             require_pitch(self.robot)
         except ConfigError as error:
             raise ValueError(f"robot: {error}") from None
-        if (highest := max(self.heights)) > self.robot.length:
-            raise ValueError(
-                f"heights: expected at most the length of the robot, {self.robot.length:g} m, "
-                f"found {highest:g}"
-            )
+        lengths = [("heights", max(self.heights))]
+        lengths += [(f"grounds: {t.scene}", t.length) for t in self.terrains]
+        for name, length in lengths:
+            if length > self.robot.length:
+                raise ValueError(
+                    f"{name}: expected at most the length of the robot, {self.robot.length:g} m, "
+                    f"found {length:g}"
+                )
         return self
+
+    @property
+    def terrains(self) -> tuple[Terrain, ...]:
+        """The other grounds."""
+        return tuple(map(Terrain.of, self.grounds))
 
 
 def cells(config: ClimbConfig) -> Mapping[str, Cell]:
@@ -204,21 +227,38 @@ def cells(config: ClimbConfig) -> Mapping[str, Cell]:
         for condition in config.conditions
         for height in config.heights
     ]
+    crosses = [
+        Cell("ground", condition, terrain.word, terrain.scene, None, divisor)
+        for divisor in config.divisors
+        for condition in config.conditions
+        for terrain in config.terrains
+    ]
     feels = [
         Cell("sensing", "climb", ground, scene, height, divisor)
         for divisor in config.divisors
         for ground, (scene, height) in GROUND.items()
         if config.sensing
     ]
-    return {cell.name: cell for cell in (*climbs, *feels)}
+    return {cell.name: cell for cell in (*climbs, *crosses, *feels)}
 
 
 def seed_of(config: ClimbConfig, cell: Cell) -> int:
-    """Seed of the trials of a cell: the same for all who meet this height, and for no other one.
+    """Seed of the trials of a cell: the same for all who meet this ground, and for no other one.
 
     So trials of several heights are independent of one another, and can be pooled.
     """
+    if cell.part == "ground":
+        return config.seed + Terrain.of(cell.ground).seed
     return config.seed + round(10_000 * (cell.height or 0.0))
+
+
+def limit_of(config: ClimbConfig, cell: Cell) -> float:
+    """Time limit of the trials of a cell [s]."""
+    if cell.part != "ground":
+        return config.time_limit
+    if cell.scene == FLAT:
+        return min(config.time_limit, FLAT_TIME)
+    return config.time_limit * Terrain.of(cell.ground).patience
 
 
 def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
@@ -230,10 +270,13 @@ def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
     }
     if cell.condition == "locked":
         changes["pitch"] = robot.pitch.model_copy(update={"kind": "locked"})
-    ground = {} if cell.height is None else {"ground": {"height": cell.height}}
-    scene = from_values(
-        TunnelConfig, {"scene": cell.scene, "seed": seed_of(config, cell), **ground}
-    )
+    values: dict[str, Any] = {"scene": cell.scene, "seed": seed_of(config, cell)}
+    sizes = {} if cell.height is None else {"height": cell.height}
+    if cell.part == "ground":
+        sizes = Terrain.of(cell.ground).values
+    if sizes:
+        values["ground"] = sizes
+    scene = from_values(TunnelConfig, values)
     return scene.model_copy(
         update={
             "robot": robot.model_copy(update=changes),
@@ -241,6 +284,6 @@ def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
             "variation": config.variation,
             "physics": config.physics,
             "controllers": (CONTROLLERS[cell.condition],),
-            "time_limit": config.time_limit,
+            "time_limit": limit_of(config, cell),
         }
     )

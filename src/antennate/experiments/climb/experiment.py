@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig, cells, config_of
+from antennate.experiments.climb.crossing import crossing, ground_tables
 from antennate.experiments.climb.measures import (
     COLUMNS,
     climbing,
+    felt_tables,
     sensing,
     sentence,
-    tables,
+    step_tables,
 )
 from antennate.experiments.climb.physics import ClimbPath, ClimbRow, carry_out, lost_row
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.sim.world import World
 from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
+from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Controller
@@ -47,6 +50,7 @@ class ClimbOutcome:
             "heights_m": list(config.heights),
             "interrupted": self.interrupted,
             "climbing": climbing(config, self.rows),
+            "grounds": crossing(config, self.rows),
             "sensing": sensing(config, self.rows),
         }
 
@@ -56,7 +60,7 @@ def every(config: ClimbConfig) -> list[Trial]:
     return [
         (name, trial)
         for name, cell in cells(config).items()
-        for trial in range(config.trials if cell.part == "climbing" else config.sensing)
+        for trial in range(config.sensing if cell.part == "sensing" else config.trials)
     ]
 
 
@@ -108,15 +112,21 @@ def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
     }
 
 
+def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+    """Steps, other grounds, and what is felt."""
+    return [*step_tables(result), *ground_tables(result), *felt_tables(result)]
+
+
 def none_valid(result: dict[str, Any]) -> bool:
     """Whether every trial of some condition is invalid."""
     summaries = [s for entry in result["climbing"] for s in entry["conditions"].values()]
+    summaries += [s for e in result["grounds"] for some in e["grounds"].values() for s in some]
     return any(s["trials"] and s["trials"] == s["invalid"] for s in summaries)
 
 
 CAPTIONS = {
-    "success": "Success over the height of the step with Wilson's 95 % interval, a panel for each "
-    "gain divisor.",
+    "success": "Success over the height of the step and the width of the gap with Wilson's 95 % "
+    "interval, a row of panels for each gain divisor.",
     "side": "One climb from the side: the links at six moments, and where the plan has the head.",
     "plan": "Error of the plan when the centre of each link crosses the edge: 5, 50 and 95 % of "
     "the trials; the band is the aim.",

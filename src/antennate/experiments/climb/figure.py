@@ -26,13 +26,14 @@ _LOOKS: Mapping[Condition, tuple[str, str]] = {
 """Colour and marker of each condition."""
 _MOMENTS = 6
 _APART = 0.006
-"""Between two conditions at one height, so that intervals stand beside one another [m]."""
+"""Between two conditions at one size, so that intervals stand beside one another [m]."""
+_AXES = ("height of the step [cm]", "width of the gap [cm]")
 
 
 def figures(outcome: ClimbOutcome) -> dict[str, Figure]:
     """The figures of a run; one climb and the plan only where `climb` climbs."""
     result = outcome.result()
-    drawn = {"success": success(result["climbing"])}
+    drawn = {"success": success(result["climbing"], result["grounds"])}
     path = example(outcome)
     if path is not None:
         drawn["side"] = side(path)
@@ -59,26 +60,46 @@ def example(outcome: ClimbOutcome) -> ClimbPath | None:
 
 
 @style.styled
-def success(entries: Sequence[Mapping[str, Any]]) -> Figure:
-    """Success over height, a panel for each divisor."""
+def success(
+    entries: Sequence[Mapping[str, Any]], grounds: Sequence[Mapping[str, Any]] = ()
+) -> Figure:
+    """Success over the height of steps, beside it over the width of gaps; a row each divisor.
+
+    Args:
+        entries: As of `climbing`.
+        grounds: As of `crossing`; without gaps in them there is one column.
+    """
+    gaps = {entry["divisor"]: _gaps(entry["grounds"]) for entry in grounds}
+    columns = 2 if any(any(rows.values()) for rows in gaps.values()) else 1
     figure = style.canvas(style.WIDTH, 0.9 + 2.5 * len(entries))
-    panels = figure.subplots(len(entries), 1, squeeze=False, sharex=True)[:, 0]
-    for panel, entry in zip(panels, entries, strict=True):
-        _draw_success(panel, entry["heights"])
-        panel.set(ylabel="success [%]", title=f"gain divisor {entry['divisor']:g}")
-        panel.set_ylim(-4, 104)
-    panels[-1].set_xlabel("height of the step [cm]")
-    handles, labels = panels[0].get_legend_handles_labels()
+    panels = figure.subplots(len(entries), columns, squeeze=False, sharex="col", sharey=True)
+    for row, entry in zip(panels, entries, strict=True):
+        _draw_success(row[0], entry["heights"], "height_m")
+        row[0].set(ylabel="success [%]", title=f"gain divisor {entry['divisor']:g}")
+        row[0].set_ylim(-4, 104)
+        if columns == 2:
+            _draw_success(row[1], gaps.get(entry["divisor"], {}), "size")
+    for panel, label in zip(panels[-1], _AXES, strict=False):
+        panel.set_xlabel(label)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 
-def _draw_success(panel: Axes, heights: Mapping[Any, Sequence[Mapping[str, Any]]]) -> None:
-    for i, (name, rows) in enumerate(heights.items()):
+def _gaps(grounds: Mapping[Any, Sequence[Mapping[str, Any]]]) -> dict[Any, list[Mapping[str, Any]]]:
+    """Gaps of each condition by their width."""
+    gaps = {name: [row for row in rows if row["scene"] == "gap"] for name, rows in grounds.items()}
+    return {name: sorted(rows, key=lambda row: row["size"]) for name, rows in gaps.items()}
+
+
+def _draw_success(
+    panel: Axes, by_name: Mapping[Any, Sequence[Mapping[str, Any]]], size: str
+) -> None:
+    for i, (name, rows) in enumerate(by_name.items()):
         colour, marker = _LOOKS[name]
         known = [row for row in rows if row["wilson95"] is not None]
-        shift = _APART * (i - (len(heights) - 1) / 2) / 3
-        x = [100 * (row["height_m"] + shift) for row in known]
+        shift = _APART * (i - (len(by_name) - 1) / 2) / 3
+        x = [100 * (row[size] + shift) for row in known]
         y = np.array([100 * row["success_share"] for row in known])
         ends = 100 * np.array([row["wilson95"] for row in known]).reshape(-1, 2).T
         panel.errorbar(
@@ -92,8 +113,9 @@ def _draw_success(panel: Axes, heights: Mapping[Any, Sequence[Mapping[str, Any]]
             elinewidth=0.8,
             label=name,
         )
-    marks = sorted({100 * row["height_m"] for rows in heights.values() for row in rows})
-    panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    marks = sorted({100 * row[size] for rows in by_name.values() for row in rows})
+    if marks:
+        panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
 
 
 @style.styled

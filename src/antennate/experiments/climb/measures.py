@@ -70,7 +70,7 @@ FALSE = (
 )
 
 
-def summary(rows: Sequence[ClimbRow]) -> dict[str, Any]:
+def summary(rows: Sequence[ClimbRow], more: Sequence[Measure] = ()) -> dict[str, Any]:
     """Some trials of one condition; invalid ones are counted and left out of all else."""
     valid = [row for row in rows if row.outcome != "invalid"]
     won = [row for row in valid if row.outcome == "success"]
@@ -78,7 +78,7 @@ def summary(rows: Sequence[ClimbRow]) -> dict[str, Any]:
         "trials": len(rows),
         "invalid": len(rows) - len(valid),
         "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
-        **summarise(CONDITION, valid),
+        **summarise([*CONDITION, *more], valid),
         "success_share": len(won) / len(valid) if valid else None,
         "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
         "success_time_s": _known("time_s", won),
@@ -111,7 +111,7 @@ def _with_divisor(config: ClimbConfig, divisor: float, rows: Sequence[ClimbRow])
 
 
 def pairs(by_name: Mapping[str, Sequence[ClimbRow]]) -> dict[str, Any]:
-    """`climb` beside each other condition, trial by trial, over all heights."""
+    """`climb` beside each other condition, trial by trial, over all grounds of these rows."""
     tests: dict[str, Any] = {}
     first = _valid(by_name.get("climb", ()))
     for name in by_name:
@@ -130,8 +130,8 @@ def pairs(by_name: Mapping[str, Sequence[ClimbRow]]) -> dict[str, Any]:
     return tests
 
 
-def _valid(rows: Iterable[ClimbRow]) -> dict[tuple[float | None, int], ClimbRow]:
-    return {(row.height_m, row.trial): row for row in rows if row.outcome != "invalid"}
+def _valid(rows: Iterable[ClimbRow]) -> dict[tuple[str, int], ClimbRow]:
+    return {(row.ground, row.trial): row for row in rows if row.outcome != "invalid"}
 
 
 def plan_errors(rows: Sequence[ClimbRow]) -> list[dict[str, Any]]:
@@ -247,8 +247,8 @@ def poisson95(number: int) -> tuple[float, float]:
     return low, 0.5 * float(stats.chi2.ppf(0.975, 2 * number + 2))
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """Success over heights, what climbing costs, pairs and plan; then what is felt."""
+def step_tables(result: Mapping[str, Any]) -> list[Table]:
+    """Success over heights, what climbing costs, pairs and plan, with each divisor."""
     shown_tables: list[Table] = []
     for entry in result["climbing"]:
         where = f", gain divisor {entry['divisor']:g}"
@@ -257,6 +257,12 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
             shown_tables.append(_pairs(entry, where))
         if entry["plan"]:
             shown_tables.append(_plan(entry, where))
+    return shown_tables
+
+
+def felt_tables(result: Mapping[str, Any]) -> list[Table]:
+    """What is felt, with each divisor."""
+    shown_tables: list[Table] = []
     for entry in result["sensing"]:
         where = f", gain divisor {entry['divisor']:g}"
         shown_tables += [_confusion(entry, where), _probes(entry, where), _rates(entry, where)]
@@ -265,7 +271,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 def _success(entry: Mapping[str, Any], where: str, result: Mapping[str, Any]) -> Table:
     heights = [f"{100 * h:g} cm" for h in result["heights_m"]]
-    rows = [(name, [_briefly(row) for row in some]) for name, some in entry["heights"].items()]
+    rows = [(name, [briefly(row) for row in some]) for name, some in entry["heights"].items()]
     note = (
         f"Successes of valid trials, and the Wilson 95 % interval [%]; within "
         f"{result['time_limit_s']:g} s, seed {result['seed']}.\nAll conditions meet the same "
@@ -275,7 +281,7 @@ def _success(entry: Mapping[str, Any], where: str, result: Mapping[str, Any]) ->
     return Table(f"Climbed{where}", heights, rows, note, preface=about)
 
 
-def _briefly(row: Mapping[str, Any]) -> str:
+def briefly(row: Mapping[str, Any]) -> str:
     """Successes and interval, so short that five heights fit into a terminal."""
     valid = row["trials"] - row["invalid"]
     return f"{row['successes']}/{valid} {shown(row['wilson95'], '.0f', 100.0, '-')}"

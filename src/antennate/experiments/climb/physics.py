@@ -11,14 +11,14 @@ import numpy as np
 
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.experiments.climb.config import (
-    CLIFF,
-    LEVEL,
     Cell,
     ClimbConfig,
     cells,
     config_of,
     seed_of,
 )
+from antennate.experiments.climb.criterion import Criterion
+from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.load import PitchLoad
 from antennate.experiments.climb.sensing import Touch, Verdict
 from antennate.experiments.tunnel.batch import BATCH, Watch, run_trials
@@ -26,11 +26,6 @@ from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World
 from antennate.types import Controller, Floats, Ints
 
-HALF_WIDTH = 2.5
-"""Farther to the side, or behind the start, a robot has left [m]: the ground ends at 3 m."""
-AFTER = 15.0
-"""Time for which a robot at a cliff is watched on after it felt it [s]: it backs off and turns in
-7 s, and could still fall."""
 DRAWN = 1
 """Trials of each cell whose course is kept for the figure."""
 _EVERY = 0.2
@@ -46,16 +41,16 @@ class ClimbRow:
     Attributes:
         seed: Seed of the trials of this height; with `trial` it decides all chance.
         cell: Name of the cell: part, condition, ground and divisor.
-        part: climbing or sensing.
+        part: climbing, ground or sensing.
         condition: Who.
-        ground: Name of the ground.
+        ground: Name of the ground; in the part `ground` its word.
         height_m: Height of its edge [m], None without one.
         divisor: Gain divisor of the body's servos.
-        outcome: success, timeout, overturned, left, fell, stopped (at a cliff), felt (the trial was
-            there for a verdict, and ended with it) or invalid.
+        outcome: success, timeout, overturned, left, fell, stopped (before a drop), felt (the trial
+            was there for a verdict, and ended with it), walked (the flat floor) or invalid.
         time_s: Time to the end [s]; the limit for a timeout.
         climb_time_s: Time from a link pitch before the first edge on [s], None if it never came
-            there; `speed_m_s` is how fast the middle of the robot got on in it.
+            there; `speed_m_s` is how fast the middle of the robot got on in it, or on a flat floor.
         torque_rms_n_m: RMS torque of the pitch motor with the largest one, while it climbs.
         torque_peak_n_m: Largest torque of any of them.
         above_half: Share of that time in which any of them gives more than half its stall torque.
@@ -121,29 +116,6 @@ class ClimbPath:
     height: float
 
 
-def is_over(links: Floats, edge: float, top: float, pitch: float) -> bool:
-    """Whether all links stand behind and above an edge.
-
-    Args:
-        links: Places of the links [m], shape (L, 3).
-        edge: Where the last edge is along x [m].
-        top: Height of the ground behind it [m].
-        pitch: Distance by which each link has to be past it [m].
-    """
-    past = links[:, 0].min() > edge + pitch
-    return bool(past and abs(links[:, 1]).max() < HALF_WIDTH and links[:, 2].min() > top)
-
-
-def has_left(links: Floats) -> bool:
-    """Whether a robot is beside or behind the ground of its trial; places of shape (L, 3) [m]."""
-    return bool(abs(links[:, 1]).max() > HALF_WIDTH or links[:, 0].min() < -HALF_WIDTH)
-
-
-def has_fallen(links: Floats, ground: float, drop: float) -> bool:
-    """Whether any link is more than half a drop below the ground where it began [m]."""
-    return bool(links[:, 2].min() < ground - 0.5 * drop)
-
-
 class ClimbMonitor:
     """Watches one trial.
 
@@ -172,6 +144,7 @@ class ClimbMonitor:
         edges = getattr(scene, "edges", ())
         self._edge = edges[0] if edges else None
         self._pitch = config.robot.link_pitch
+        self._criterion = Criterion(cell, scene, self._pitch, time_limit)
         self._verdict = Verdict()
         self._touch: Touch | None = None
         self._load: PitchLoad | None = None
@@ -179,7 +152,8 @@ class ClimbMonitor:
         self._errors: dict[int, float | None] = {}
         self._climbs, self._climbing = 0, False
         self._began: tuple[float, float] | None = None
-        self._way, self._last = 0.0, (-math.inf, np.zeros(2))
+        self._way, self._walked = 0.0, 0.0
+        self._last = (-math.inf, np.zeros(2))
         self._course: list[tuple[float, Floats, float]] = []
 
     def bend(self, world: World) -> None:
@@ -237,31 +211,13 @@ class ClimbMonitor:
         if t - self._last[0] >= _STRIDE:
             if self._last[0] >= 0.0:
                 self._way += float(np.hypot(*(middle - self._last[1])))
+                self._walked += t - self._last[0]
             self._last = (t, middle)
         if self.trial < DRAWN and (not self._course or t - self._course[-1][0] > _EVERY - 1e-6):
             edge = math.nan if self._edge is None else self._edge.x
             plan = self._plan(links[0, 0] - edge, getattr(self._controller(), "body", None))
             self._course.append((t, links, plan))
-        return self._end(world, links, t) or ("timeout" if t >= self.time_limit else None)
-
-    def _end(self, world: World, links: Floats, t: float) -> str | None:
-        if world.overturned:
-            return "overturned"
-        if has_left(links):
-            return "left"
-        scene: Any = self.scene
-        if self._cell.part == "climbing":
-            over = is_over(links, scene.edges[-1].x, scene.top, self._pitch)
-            return "success" if over else None
-        if self._cell.ground in LEVEL:
-            past = links[-1, 0] > scene.length if self._cell.scene == "rubble" else False
-            return "felt" if past or t >= self.time_limit else None
-        if self._cell.scene == "step_down" and has_fallen(links, scene.ground, scene.ground):
-            return "fell"
-        told, felt_at = self._verdict.told, self._verdict.felt_at
-        if self._cell.ground == CLIFF:
-            return "stopped" if told and felt_at is not None and t > felt_at + AFTER else None
-        return "felt" if told or links[0, 0] > scene.edges[0].x + self._pitch else None
+        return self._criterion.look(world, links, self._verdict)
 
     def result(self, world: World, outcome: str, reason: str, ticks: Ints) -> ClimbRow:
         """The row of a trial that ended so."""
@@ -276,11 +232,7 @@ class ClimbMonitor:
             outcome=outcome,
             time_s=round(self.time_limit if outcome == "timeout" else world.t, 6),
             climb_time_s=_rounded(took),
-            speed_m_s=_rounded(
-                None
-                if took is None or self._began is None
-                else (float(links[:, 0].mean()) - self._began[1]) / took
-            ),
+            speed_m_s=_rounded(self._speed(links, took)),
             **({} if self._load is None else self._load.columns()),
             climbs=self._climbs,
             walked_m=round(self._way, 6),
@@ -295,6 +247,14 @@ class ClimbMonitor:
             ),
             reason=reason,
         )
+
+    def _speed(self, links: Floats, took: float | None) -> float | None:
+        """Speed over the edge [m/s], on the flat floor that of all its way."""
+        if self._cell.scene == FLAT:
+            return self._way / self._walked if self._walked else None
+        if took is None or self._began is None:
+            return None
+        return (float(links[:, 0].mean()) - self._began[1]) / took
 
     def path(self, world: World) -> ClimbPath | None:
         """The course of the first trials of a cell that is climbed."""

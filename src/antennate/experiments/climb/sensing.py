@@ -8,6 +8,9 @@ from antennate.control.climbing.rule import Ground as Felt
 from antennate.control.climbing.rule import Stage
 from antennate.sim.world import World
 
+_HIGHER = ("level1", "step")
+"""Names of what is higher behind the edge: a level of ground, or the step of a tunnel."""
+
 
 class Touch:
     """When the antennae first meet the edge of a scene; asked after every tick.
@@ -25,7 +28,8 @@ class Touch:
             np.flatnonzero(places.own & np.char.startswith(names, f"antenna_{side}_"))
             for side in ("l", "r")
         ]
-        self._step = model.geom("level1").id if rises else -1
+        ids = [geom.id for geom in map(model.geom, range(model.ngeom)) if geom.name in _HIGHER]
+        self._step = ids[0] if rises else -1
         self._edge = edge
         self.since: float | None = None
 

@@ -202,6 +202,7 @@ def ending(row: TrialResult, config: TunnelConfig) -> str:
         "timeout": "stuck" if row.stuck > row.recovered else f"not {there}",
         "left": "left the scene",
         "overturned": "overturned",
+        "fell": "fell",
         "invalid": "invalid",
     }
     return f"{words[row.outcome]} after {row.time_s:.3g} s"

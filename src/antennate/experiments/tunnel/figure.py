@@ -40,6 +40,7 @@ _OUTCOMES = {
     "timeout": "out of time, {:.0f} s",
     "left": "left the scene",
     "overturned": "overturned",
+    "fell": "fell",
     "invalid": "invalid",
 }
 

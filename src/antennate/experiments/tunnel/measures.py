@@ -53,8 +53,10 @@ _SHARES = Measure(
     scale=100.0,
     interval="restricted_mean_share_95",
 )
-_OVERTURNED = Measure("overturned", "overturned", of=count("outcome", "overturned"), form="d")
-"""Of results that have such trials, as scenes of ground may; others do not name it."""
+_LOST = tuple(
+    Measure(name, name, of=count("outcome", name), form="d") for name in ("overturned", "fell")
+)
+"""Of results that have such trials, as scenes of ground may; others do not name them."""
 CONTROLLER = (
     Measure("trials", "trials", form="d"),
     Measure("successes", "successes", of=count("outcome", "success"), form="d"),
@@ -137,14 +139,14 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
     if limit is not None:
         restricted, ends = statistics.mean95(times, 0.0, limit, restricted=True)
     progress = sum(row.progress_m for row in valid)
-    overturned = [_OVERTURNED] if any(row.outcome == "overturned" for row in valid) else []
+    lost = [m for m in _LOST if any(row.outcome == m.name for row in valid)]
     speed, speeds = statistics.mean95(np.array([r.progress_m / r.time_s for r in won]), 0.0)
     offset, offsets = statistics.mean95(np.array([r.offset_m for r in won]), 0.0)
     return {
         "trials": len(rows),
         "invalid": len(rows) - len(valid),
         "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
-        **summarise([*CONTROLLER, *overturned], valid),
+        **summarise([*CONTROLLER, *lost], valid),
         "success_share": len(won) / len(valid) if valid else None,
         "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
         "speed_m_s": speed if won else None,
@@ -210,9 +212,9 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
     controllers, pairs = result["controllers"], result["paired"]
     limit = result["time_limit_s"]
     one, two = measures_of(limit)
-    if any(_OVERTURNED.name in row for row in controllers.values()):
-        at = next(i for i, measure in enumerate(one) if measure.name == "left") + 1
-        one = (*one[:at], _OVERTURNED, *one[at:])
+    at = next(i for i, measure in enumerate(one) if measure.name == "left") + 1
+    lost = [m for m in _LOST if any(m.name in row for row in controllers.values())]
+    one = (*one[:at], *lost, *one[at:])
     until = "its limit, of each trial its own" if limit is None else f"the time limit, {limit:g} s"
     short = short_names(controllers)
     counts = sorted({row["trials"] for row in controllers.values()})

@@ -37,7 +37,7 @@ from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
-from antennate.sim.trial import Judge, TrialConfig, is_uneven, progress_of, require_own_curves
+from antennate.sim.trial import Judge, TrialConfig, mishap, progress_of, require_own_curves
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -123,7 +123,7 @@ class TunnelConfig(TrialConfig):
         return self
 
 
-Outcome = Literal["success", "timeout", "left", "overturned", "invalid"]
+Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
 
 STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
@@ -145,7 +145,8 @@ class TrialResult:
         seed: Seed of the run; with `trial` it decides all chance.
         controller: Name of the controller.
         outcome: success (the head crossed the exit from inside), timeout, left (out another way),
-            overturned (most links on their backs; on ground that is not flat alone) or invalid.
+            overturned (most links on their backs), fell (a link is lower than the ground at the
+            start by more than `FALL`), both on ground that is not flat alone, or invalid.
         time_s: Time to exit [s]; the limit for every failure.
         progress_m: How far the head came, within 0 and the length of the scene [m].
         stuck: Episodes of being stuck; `recovered` of them ended by getting on.
@@ -261,10 +262,8 @@ class TrialMonitor:
         progress = progress_of(self.scene, head)
         self._note_progress(progress, t)
         self._note_offset(progress, head)
-        if outcome := self._judge.look(head):
+        if outcome := self._judge.look(head) or mishap(self.scene, world):
             return outcome
-        if is_uneven(self.scene) and world.overturned:
-            return "overturned"
         return "timeout" if t >= self.time_limit else None
 
     def _note_progress(self, progress: float, t: float) -> None:

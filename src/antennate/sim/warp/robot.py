@@ -161,6 +161,11 @@ class WarpRow:
         self._follow()
         return self.world.links()
 
+    def link_places(self) -> Floats:
+        """Positions of the links, head first [m], shape (L, 3)."""
+        self._follow()
+        return self.world.link_places()
+
     def parts(self) -> list[Floats]:
         """Polygons of all parts of the robot in plan [m], each (n, 2)."""
         self._follow()
