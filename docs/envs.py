@@ -29,12 +29,11 @@ uv run --no-sync python examples/imitate.py --out my_policy
 uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --scene uturn
 ```
 
-The third line takes some 10 minutes on one core. A teacher that knows the route tells a network
-with two antennae how to escape, in the scenes `uturn` and `room`; `--scene` names others,
-`--decisions 40000` teaches for longer, and `--readings none` the same network without touch, which
-is what it has to beat. It says how many of its last episodes alone got out. The fourth line
-compares the policy with two of our controllers in thirty scenes that it has not seen. Such a policy
-is in a clone:
+The third line takes some 10 minutes on one core. The search of `closed` tells a network what to do,
+in the scenes `uturn` and `room`; `--scene` names others, `--decisions 40000` teaches for longer,
+and `--readings none` the same network without touch, which is what it has to beat. It says how many
+of its last episodes alone got out. The fourth line compares the policy with two of our controllers
+in thirty scenes that it has not seen. Such a policy is in a clone:
 
 ```bash
 uv run --extra onnx antennate tunnel --scene uturn \\

@@ -1,15 +1,14 @@
-"""Teach a network to escape by touch, by imitation of one who knows the way; write it as ONNX.
+"""Teach a network to escape by touch, by imitation of `closed`; write it as ONNX.
 
     python examples/imitate.py --out my_policy                   # 20 minutes on one core
     antennate tunnel --scene uturn --controllers timed closed my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 
-The teacher knows the route, as no robot does: it says when to back off and to which side to turn.
-The student has its antennae and what it did itself. It learns on its own episodes (DAgger: Ross,
-Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in turns with the teacher; the teacher
-says at each decision how to go on from where the student has brought itself; the student learns
-all that it was told.
+The teacher is the search of `closed`, in the time scale of a faster gait. The student learns on its
+own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in turns
+with the teacher; the teacher says at each decision how to go on after what the student did; the
+student learns all that it was told.
 """
 
 from __future__ import annotations
@@ -17,10 +16,8 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import math
 import time
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -28,21 +25,19 @@ import torch
 from torch import nn
 
 import antennate.envs  # registers the environments
+from antennate.control.conditioning import RepetitionDetector
+from antennate.control.escape import Search
 from antennate.control.policy.contract import contract_of
 from antennate.control.policy.writer import write_policy
-from antennate.envs.config import EnvConfig
-from antennate.sim.knowledge import JAM_GAIN, SIDE_AHEAD, angle_ahead, mean_direction
-from antennate.sim.trial import draw_scene, scene_of
+from antennate.params.control import ControlParams, SearchParams
 
 SCENES = {scene: name for name, scene in antennate.envs.ids().items()}
 FREQUENCY = 1.0
 """Gait cycles a second [Hz]."""
 INTERFACE = {"action": "gait", "ticks": 20, "history": 60, "memory_time": 30.0}
 """A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last 12 s."""
-CYCLE, BACK, SHORTEST, TURN, LONGEST = 5, 7, 3, 8, 23
-"""Decisions of a gait cycle and of backing off; of turns: the least, to a wrong side, the most."""
-ALIGNED, ASTRAY = math.radians(25.0), math.radians(120.0)
-"""Angle to the route at which a turn ends; angle from which on the robot goes back [rad]."""
+DECISION, WINDOW, PATIENCE = 0.2, 0.8, 3
+"""Time of a decision [s]; gait cycles in which readings repeat; decisions of another will."""
 HISTORY, CHANNELS = INTERFACE["history"], 7
 FORWARD, TURN_L, TURN_R, REVERSE = range(4)
 SIZE = 0.7153
@@ -60,62 +55,64 @@ TEACHING = 0.45
 UNITS, BATCH, RATE, EPOCHS = 64, 256, 1e-3, 2
 
 
-class Teacher:
-    """Knows the route, as no robot does, and escapes with it: backs off, and turns to the route.
+def faster(search: SearchParams, factor: float) -> SearchParams:
+    """A search whose times fit a gait that many times as fast."""
+    times = {n: getattr(search, n) / factor for n in type(search).model_fields if n != "growth"}
+    return search.model_copy(update=times)
+
+
+class Teacher(Search):
+    """The search of `closed`, told what the student did.
+
+    Its clock stands still while the student does something else than it was told. After PATIENCE
+    decisions of that it goes on as if it had wanted that itself.
 
     Args:
-        config: What decides the episodes.
+        control: All numbers of the control.
         batch: Number of robots B.
     """
 
-    def __init__(self, config: EnvConfig, batch: int) -> None:
-        self._config, self._scene = config, scene_of(config)
-        self.routes: list[np.ndarray] = [np.zeros((2, 2))] * batch
-        self._heads = np.full((batch, CYCLE + 1, 3), np.nan)
-        self._done = np.full(batch, FORWARD)
-        self._for = np.zeros(batch, np.int64)
-        self._turn = np.zeros(batch, np.int64)
+    def __init__(self, control: ControlParams, batch: int) -> None:
+        super().__init__(faster(control.search, FREQUENCY / control.gait.frequency), batch)
+        repetition = control.repetition.model_copy(update={"window_cycles": WINDOW})
+        self._pressure = repetition.pressure
+        self._detector = RepetitionDetector(repetition, batch, DECISION, FREQUENCY)
+        self._t = np.zeros(batch)
+        self._astray = np.zeros(batch, np.int64)
 
-    def begin(self, rows: np.ndarray, infos: dict[str, Any]) -> None:
+    def begin(self, rows: np.ndarray) -> None:
         """Episodes begin in some rows, shape (B,)."""
-        for row in np.flatnonzero(rows).tolist():
-            seed, number = (int(infos[name][row]) for name in ("seed", "episode_number"))
-            config = self._config.model_copy(update={"seed": seed})
-            self.routes[row] = np.asarray(draw_scene(config, self._scene, number).route)
-        self._heads[rows] = np.nan
-        self._done[rows], self._for[rows], self._turn[rows] = FORWARD, 0, 0
+        self.reset(rows)
+        self._detector.reset(rows)
+        self._t[rows], self._astray[rows] = 0.0, 0
 
-    def advise(self, heads: np.ndarray, done: np.ndarray) -> np.ndarray:
-        """What to do next, shape (B,): heads (B, 3) are there after maneuvers (B,)."""
-        self._heads = np.concatenate([self._heads[:, 1:], heads[:, None]], axis=1)
-        self._for = np.where(done == self._done, self._for + 1, 1)
-        self._turn = np.where((done == TURN_L) | (done == TURN_R), done, self._turn)
-        self._done = done.copy()
-        return np.array([self._advice(row) for row in range(len(done))])
+    def advise(self, flex: np.ndarray, done: np.ndarray) -> np.ndarray:
+        """What to do next, shape (B,), after flex (B, 2) was felt and a maneuver (B,) was done."""
+        obeyed = done == self.maneuver
+        self._astray = np.where(obeyed, 0, self._astray + 1)
+        late = self._astray >= PATIENCE
+        self._adopt(late, done)
+        obeyed |= late
+        stuck = self._detector.step(flex, (done == FORWARD) & obeyed)
+        seen = np.where(obeyed[:, None], flex, np.nan)  # of a row with NaN the clock stands still
+        self.step(self._t, seen, stuck, (flex > self._pressure).any(axis=1))
+        self._t = self._t + DECISION
+        return self.maneuver.copy()
 
-    def _advice(self, row: int) -> int:
-        done, since, angle = int(self._done[row]), int(self._for[row]), self._angle(row)
-        turn, astray = TURN_L if angle > 0.0 else TURN_R, abs(angle) > ASTRAY
-        if astray and self._turn[row]:  # back from where it turned to last
-            turn = TURN_L if self._turn[row] == TURN_R else TURN_R
-        if done == FORWARD:
-            if since > CYCLE and self._is_jammed(row):
-                return REVERSE
-            return turn if since > CYCLE and astray else FORWARD
-        if done == REVERSE:
-            return turn if since >= BACK else REVERSE
-        least = SHORTEST if abs(angle) < ALIGNED else LONGEST if done == turn or astray else TURN
-        return FORWARD if since >= least else done
-
-    def _angle(self, row: int) -> float:
-        """Angle from the mean heading to a point ahead on the route [rad], positive to the left."""
-        heads = self._heads[row][~np.isnan(self._heads[row, :, 0])][-CYCLE:]
-        heading = mean_direction(heads[:, 2].tolist())
-        return angle_ahead(self.routes[row], heads[-1, :2], heading, SIDE_AHEAD)
-
-    def _is_jammed(self, row: int) -> bool:
-        """Whether the head has hardly moved in a gait cycle."""
-        return bool(np.hypot(*(self._heads[row, -1] - self._heads[row, 0])[:2]) < JAM_GAIN)
+    def _adopt(self, rows: np.ndarray, done: np.ndarray) -> None:
+        """Go on in some rows as if what was done had been wanted."""
+        times, passed = self._params, PATIENCE * DECISION
+        size = np.select(
+            [done == REVERSE, done == FORWARD], [times.reverse_time, 0.0], times.turn_time
+        )
+        turned = rows & ((done == TURN_L) | (done == TURN_R))
+        self._turned = self._turned + turned * np.where(done == TURN_R, size, -size)
+        self._right = np.where(turned, done == TURN_R, self._right)
+        self.tries = self.tries + turned
+        self._until = np.where(rows, self._t + size - passed, self._until)
+        self._begun = np.where(rows, self._t + DECISION - passed, self._begun)
+        self.maneuver = np.where(rows, done, self.maneuver)
+        self._astray[rows] = 0
 
 
 class Class:
@@ -131,12 +128,10 @@ class Class:
         words = {"num_envs": ROWS, "interface": INTERFACE, "autoreset_mode": "SAME_STEP"}
         self.envs = gym.make_vec(SCENES[scene], **words)
         self.scene, self.blind = scene, readings == "none"
-        self.teacher = Teacher(self.envs.unwrapped.config, ROWS)
+        self.teacher = Teacher(self.envs.unwrapped.config.control, ROWS)
         self.done = np.zeros(ROWS, np.int64)
         self.taught = np.ones(ROWS, bool)
-        self.observation, infos = self.envs.reset(seed=seed)
-        self.teacher.begin(np.ones(ROWS, bool), infos)
-        self.heads = infos["head"]
+        self.observation, _ = self.envs.reset(seed=seed)
         self.ends: list[tuple[str, float, bool]] = []
         self.alone = np.ones(ROWS, bool)
 
@@ -156,7 +151,8 @@ class Class:
         for i in range(ROUND):
             if i % SEGMENT == 0:
                 self.taught = rng.random(ROWS) < share
-            advice, seen = self.teacher.advise(self.heads, self.done), self.seen()
+            flex = self.observation[:, [0, HISTORY]].astype(float)
+            advice, seen = self.teacher.advise(flex, self.done), self.seen()
             given.append(seen.copy())
             told.append(advice)
             self.done = np.where(self.taught, advice, network.choose(seen))
@@ -168,13 +164,12 @@ class Class:
         """Carry out what was chosen."""
         actions = CHOICES[self.done].astype(np.float32)
         self.observation, _, ended, cut, infos = self.envs.step(actions)
-        self.heads = infos["head"]
         if (over := ended | cut).any():
             final = infos["final_info"]
             for row in np.flatnonzero(over):
                 end = final["outcome"][row], float(final["t"][row]), bool(self.alone[row])
                 self.ends.append(end)
-            self.teacher.begin(over, infos)
+            self.teacher.begin(over)
             self.done[over], self.alone[over] = FORWARD, True
 
 

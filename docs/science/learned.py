@@ -1,7 +1,6 @@
-"""The table of the learned policy in docs/envs.md: `python docs/science/learned.py`.
+"""The table of learned policies in docs/envs.md: `python docs/science/learned.py`.
 
-It is made of docs/science/learned.csv, the trials of the commands that the page names, and of the
-rows of `closed` and `geometric` in docs/science/geometric.csv.
+It is made of docs/science/learned.csv, the trials of `antennate tunnel` that the page names.
 """
 
 from __future__ import annotations
@@ -13,59 +12,41 @@ import numpy as np
 
 from antennate.studies.statistics import holm, mcnemar, signed_rank
 
-HERE = Path(__file__).parent
-FRESH, KNOWN = "20261377", "20261201"
-COMPARED = (
-    ("uturn", FRESH, "timed"),
-    ("uturn", FRESH, "blind"),
-    ("uturn", KNOWN, "closed"),
-    ("uturn", KNOWN, "geometric"),
-    ("room", KNOWN, "blind"),
-    ("room", KNOWN, "closed"),
-    ("room", KNOWN, "geometric"),
-)
-"""Scene, seed and rival of each comparison."""
+ROWS = Path(__file__).with_suffix(".csv")
+RIVAL, POLICIES = "timed", ("taught by closed", "taught by the route")
 RESAMPLES = 4000
-Trials = dict[int, tuple[bool, float]]
-"""Whether each draw was crossed, and its time [s], of a failure the limit."""
 
 
-def read() -> dict[tuple[str, str, str], Trials]:
-    """All trials by scene, seed and controller."""
-    trials: dict[tuple[str, str, str], Trials] = {}
-    for name in ("learned", "geometric"):
-        with (HERE / f"{name}.csv").open(newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                if row.get("frequency_hz", "0.6") == "0.6":
-                    out = row["outcome"] == "success"
-                    key = row["scene"], row["seed"], row["controller"]
-                    time = float(row["time_s"] if out else row["limit_s"])
-                    trials.setdefault(key, {})[int(row["trial"])] = out, time
-    return trials
+def read() -> dict[str, np.ndarray]:
+    """Whether each draw was crossed, and its time [s], of a failure the limit: shape (n, 2)."""
+    with ROWS.open(newline="", encoding="utf-8") as file:
+        rows = sorted(csv.DictReader(file), key=lambda row: int(row["trial"]))
+    trials: dict[str, list[tuple[bool, float]]] = {}
+    for row in rows:
+        out = row["outcome"] == "success"
+        time = float(row["time_s"] if out else row["limit_s"])
+        trials.setdefault(row["controller"], []).append((out, time))
+    return {name: np.array(values) for name, values in trials.items()}
 
 
 def main() -> None:
-    """Print a row for each comparison."""
-    trials, rows = read(), []
-    for scene, seed, rival in COMPARED:
-        own, other = trials[scene, seed, "policy"], trials[scene, seed, rival]
-        draws = sorted(own.keys() & other.keys())
-        (a, s), (b, t) = (np.array([x[i] for i in draws]).T for x in (own, other))
-        change = s - t
+    """Print the rival, and a row for each policy."""
+    trials, cells, p = read(), [], []
+    other = trials[RIVAL]
+    for name in POLICIES:
+        own = trials[name]
+        change = own[:, 1] - other[:, 1]
         sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
         low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
-        p = signed_rank(change), mcnemar(np.stack([a, b], axis=1) > 0.0).mcnemar_p
-        cells = [
-            f"`{scene}`, {seed}",
-            f"`{rival}`" if rival != "blind" else "blind twin",
-            f"{int(a.sum())}, {s.mean():.1f} s",
-            f"{int(b.sum())}, {t.mean():.1f} s",
-            f"{change.mean():+.1f} ({low:+.1f} to {high:+.1f})",
-        ]
-        rows.append((cells, p, len(draws)))
-    corrected = zip(*(holm([p[i] for _, p, _ in rows]) for i in (0, 1)), strict=True)
-    for (cells, _, draws), (times, crossed) in zip(rows, corrected, strict=True):
-        print(f"| {' | '.join(cells)} | {times:.2g} | {crossed:.2g} | {draws} |")
+        crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
+        cells.append(
+            f"| {name} | {int(own[:, 0].sum())} | {own[:, 1].mean():.1f} "
+            f"| {change.mean():+.1f} ({low:+.1f} to {high:+.1f})"
+        )
+        p.append((signed_rank(change), crossed.mcnemar_p))
+    print(f"| `{RIVAL}` | {int(other[:, 0].sum())} | {other[:, 1].mean():.1f} | | | |")
+    for row, times, successes in zip(cells, *map(holm, zip(*p, strict=True)), strict=True):
+        print(f"{row} | {times:.2g} | {successes:.2g} |")
 
 
 if __name__ == "__main__":
