@@ -188,10 +188,10 @@ uv run python docs/science/learned.py  # the table, of the rows in learned.csv
 - **Share of ended episodes misleads**: in training 26 of the first student's last 30 episodes alone
   got out, as those that end late had not ended yet. In the test it was 67 of 100.
 - **On [the twin](twin.md)** the first student, as processes, crossed 9 of 10 tunnels of seed
-  20261377, a scene that it was not taught in. The tenth drive ended with SILENT_SERVO, on two cores that
-  ten programs shared. All ten logs replay bit for bit
-  (`antennate log replay FOLDER/drive.mcap --controller FILE.onnx`). The second one has not been
-  driven there yet.
+  20261377, a scene that it was not taught in. The
+  tenth drive ended with SILENT_SERVO, on two cores that ten programs shared. All ten logs replay
+  bit for bit (`antennate log replay FOLDER/drive.mcap --controller FILE.onnx`). The second one has
+  not been driven there yet.
 
 ## Policy files
 
