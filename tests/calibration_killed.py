@@ -15,6 +15,7 @@ import signal
 import struct
 import sys
 import time
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -116,6 +117,8 @@ def main() -> None:
     old, new = outcome("old"), outcome("new")
     calibrated = {made.calibration.to_json().encode(): made for made in (old, new)}
     names = dict(zip(calibrated, ("old", "new"), strict=True))
+    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        calibrate(folder.with_name("imported"), old)  # all that the others import
     before = folder.with_name("before")  # all files of a run, so that each kill meets the same
     before.mkdir()
     killed(before, old, None, None)

@@ -84,6 +84,12 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
 
 @pytest.fixture(autouse=True)
+def _one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands that are told no number run in this process; starting others takes a second each."""
+    monkeypatch.setattr("antennate.cli.experiment.core_count", lambda: 1)
+
+
+@pytest.fixture(autouse=True)
 def _registries_stay_as_they_are() -> Iterator[None]:
     """What a test adds to a registry is known in its process from then on."""
     before = {group: dict(objects) for group, objects in ADDED.items()}

@@ -26,18 +26,20 @@ from antennate.types import AntennaFrame, Controller
 def recorded(config: Params) -> Iterator[set[str]]:
     """Yield the dotted parameters of this configuration that are read within the block."""
     read: set[str] = set()
-    held: dict[int, tuple[Params, tuple[str, ...]]] = {}
+    held: dict[int, tuple[Params, tuple[str, ...], dict[str, str]]] = {}
     plain, copied = object.__getattribute__, Params.model_copy
 
     def watch(group: Params, path: tuple[str, ...]) -> None:
-        held[id(group)] = group, path
-        for name in type(group).model_fields:
+        fields = type(group).model_fields
+        held[id(group)] = group, path, {name: ".".join((*path, name)) for name in fields}
+        for name in fields:
             if isinstance(inner := plain(group, name), Params):
                 watch(inner, (*path, name))
 
     def get(self: Params, name: str) -> Any:
-        if id(self) in held and name in type(self).model_fields:
-            read.add(".".join((*held[id(self)][1], name)))
+        known = held.get(id(self))
+        if known and name in known[2]:
+            read.add(known[2][name])
         return plain(self, name)
 
     def copy(self: Params, **changes: Any) -> Any:
@@ -96,15 +98,16 @@ def climb_all(control: ControlParams, robot: RobotSpec) -> None:
     controller.reset(np.zeros(1, dtype=np.int64))
     rule: Any = controller.rule
     visits, before = Counter[int](), -1
-    for tick in range(ticks := round(300.0 / control.period)):
+    for tick in range(ticks := round(100.0 / control.period)):
         stage = int(rule.stage[0])
         visits[stage] += stage != before
         before, even = stage, visits[stage] % 2 == 0
         level = tick < 0.5 * ticks  # later it is stopped by what it climbs
         even &= level
+        slipped = visits[stage] == 1 and controller.body.raised[0] > 0.3  # over a low step
         counts = {
             Stage.WALK: straight if even or (level and controller.body.climbs[0]) else bent,
-            Stage.PROBE_UP: straight if visits[stage] == 1 else bent,
+            Stage.PROBE_UP: straight if slipped or visits[stage] == 2 else bent,
             Stage.PROBE_DOWN: straight if even else bent,
             Stage.CHECK: bent if visits[stage] == 2 else floor,
         }.get(Stage(stage), floor)

@@ -45,7 +45,7 @@ def test_it_is_registered_with_all_its_cells():
     table = cells(config)
     climbs = [cell for cell in table.values() if cell.part == "climbing"]
     assert len(climbs) == 6 * 5 * 2
-    assert len([cell for cell in table.values() if cell.part == "ground"]) == 6 * 7 * 2
+    assert len([cell for cell in table.values() if cell.part == "ground"]) == 6 * 6 * 2
     assert len(every(config)) == len(table)
     robots = {cell.condition: config_of(config, cell).robot for cell in climbs}
     assert [n for n, robot in robots.items() if not robot.pitch_count] == ["locked"]

@@ -19,7 +19,7 @@ from antennate.telemetry.reader import LogReader
 from antennate.types import AntennaFrame, Contact, Floats
 
 CONTROL = ControlParams()
-NARROW = ["--seed", "3", "--time-limit", "4"]
+NARROW = ["--seed", "3", "--time-limit", "2"]
 
 
 def changed(name: str, counts: Floats, **more: Any) -> Floats:
@@ -89,7 +89,7 @@ def logged(path: Path) -> Floats:
 def test_yoked_trials_get_the_readings_of_the_next_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of trials that end at different times, on one worker and on two, and replayed."""
+    """On one worker and on two, and replayed."""
     monkeypatch.chdir(tmp_path)
     words = ["tunnel", *NARROW, "--trials", "3", "--controllers", "closed"]
     more = ["--readings", "own", "yoked", "--no-figures"]

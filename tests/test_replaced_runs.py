@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -29,6 +30,12 @@ WALL = [
     "--workers",
     "1",
     "--no-figures",
+    "--wall.start",
+    "0.002",
+    "--wall.travel",
+    "0.03",
+    "--wall.speed",
+    "0.2",
 ]
 SLOW = """
 import os, time
@@ -122,19 +129,30 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
     assert files() == before
 
 
-@pytest.mark.parametrize("name", ["run", "run/", "./run", "sub/../run"])
-def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(name: str, tmp_path: Path) -> None:
-    Path("sub").mkdir()
+SPRINGS = ["antenna", "springs", "--no-figures"]
+
+
+def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(tmp_path: Path) -> None:
     replaced = ["run.old", "run.old2", "run.old3"]
-    for words in (["antenna", "springs", "--no-figures"], ["robot"], WALL):
+    for words in (SPRINGS, ["robot"], WALL):
         before = contents("run")
-        assert main([*words, "--out", name, "--overwrite"]) == 0
+        assert main([*words, "--out", "run", "--overwrite"]) == 0
         assert contents(replaced.pop(0)) == before
         fresh = tmp_path / "fresh" / words[0]
         assert main([*words, "--out", str(fresh)]) == 0
         assert contents("run").keys() == contents(fresh).keys()
-    folders = ["fresh", "run", "run.old", "run.old2", "run.old3", "sub"]
+    folders = ["fresh", "run", "run.old", "run.old2", "run.old3"]
     assert sorted(path.name for path in Path().iterdir()) == folders
+
+
+@pytest.mark.parametrize("name", ["run/", "./run", "sub/../run"])
+def test_the_old_run_lies_beside_the_new_one_however_its_path_is_written(name: str) -> None:
+    Path("sub").mkdir()
+    before = contents("run")
+    assert main([*SPRINGS, "--out", name, "--overwrite"]) == 0
+    assert contents("run.old") == before
+    assert RunDirectory.open("run").result()
+    assert sorted(path.name for path in Path().iterdir()) == ["run", "run.old", "sub"]
 
 
 def test_a_run_without_a_result_takes_the_place_of_none() -> None:
@@ -192,39 +210,54 @@ def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
 
 
 KILLED = """
-import os, signal, sys
+import json, os, shutil, signal, sys
+from pathlib import Path
 from antennate.cli import main
-left = int(sys.argv[1])
-def watch(name, arguments):
-    global left
-    if name == "open" and not arguments[2] & (os.O_WRONLY | os.O_RDWR):
-        return
-    if name in ("os.rename", "os.remove", "os.mkdir", "os.link", "os.rmdir", "open"):
-        path = str(arguments[0])
-        if "run" in path and not path.endswith(".py") and "site-packages" not in path:
-            left -= 1
-            if left == 0:
-                os.kill(os.getpid(), signal.SIGKILL)
-sys.addaudithook(watch)
-sys.exit(main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]))
+WORDS = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
+def killed(left):
+    def watch(name, arguments):
+        nonlocal left
+        if name == "open" and not arguments[2] & (os.O_WRONLY | os.O_RDWR):
+            return
+        if name in ("os.rename", "os.remove", "os.mkdir", "os.link", "os.rmdir", "open"):
+            path = str(arguments[0])
+            if "run" in path and not path.endswith(".py") and "site-packages" not in path:
+                left -= 1
+                if left == 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+    sys.addaudithook(watch)
+    sys.exit(main(WORDS))
+main([*WORDS[:3], "--out", "imported"])  # all that the others import
+codes = []
+while 0 not in codes:  # until one meets its end
+    kill = len(codes) + 1
+    place = Path(str(kill))
+    shutil.copytree("old", place / "run")
+    os.chdir(place)
+    if not (child := os.fork()):
+        killed(kill)
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    os.chdir("..")
+Path("codes.json").write_text(json.dumps(codes))
 """
 
 
-@pytest.mark.parametrize("first", [1, 2, 3])
-def test_killed_at_any_change_of_a_file_the_old_run_is_whole(first: int) -> None:
+def test_killed_at_any_change_of_a_file_the_old_run_is_whole(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Under one of both names; and the same command ends, whatever the killed one left."""
-    shutil.copytree("run", "old")
+    shutil.move("run", "old")
+    done = subprocess.run([sys.executable, "-c", KILLED], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    codes = json.loads(Path("codes.json").read_text())
+    assert codes == [*[-signal.SIGKILL] * (len(codes) - 1), 0]
     before, seen = contents("old"), set[str]()
-    for kill in range(first, 40, 6):
-        for place in Path().glob("run*"):
-            shutil.rmtree(place)
-        shutil.copytree("old", "run")
-        done = subprocess.run([sys.executable, "-c", KILLED, str(kill)], capture_output=True)
-        assert done.returncode in (0, -signal.SIGKILL), done.stderr
+    for kill in range(1, len(codes)):
+        monkeypatch.chdir(tmp_path / str(kill))
         whole = "run.old" if Path("run.old").exists() else "run"
         assert contents(whole) == before
         seen.add(whole)
-        assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+        assert main([*SPRINGS, "--out", "run", "--overwrite"]) == 0
         assert RunDirectory.open("run").result()
         assert not [path for path in Path("run").iterdir() if path.name.startswith(".")]
         assert contents("run.old") == before
@@ -279,7 +312,7 @@ def test_W7_temporary_files_of_a_killed_run_are_swept_and_no_others() -> None:
     listed(Path("run"), "figures/a.svg")
     for name in [*ours, *theirs]:
         Path("run", name).write_text("half of a file")
-    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 0
+    assert main([*SPRINGS, "--out", "run", "--overwrite"]) == 0
     assert [name for name in [*ours, *theirs] if Path("run.old", name).exists()] == theirs
 
 
@@ -359,7 +392,7 @@ def test_what_somebody_laid_into_a_run_goes_along_and_is_never_removed(
         Path("run", name).parent.mkdir(exist_ok=True)
         Path("run", name).write_text("mine")
     before = contents("run")
-    words = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
+    words = [*SPRINGS, "--out", "run", "--overwrite"]
     assert main(words) == 0
     assert contents("run.old") == before
     assert Path("run.old", name).exists()
@@ -377,7 +410,7 @@ def test_a_rename_that_fails_costs_neither_run(monkeypatch: pytest.MonkeyPatch) 
         return rename(path, target)
 
     monkeypatch.setattr(Path, "rename", busy)
-    assert main(["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]) == 2
+    assert main([*SPRINGS, "--out", "run", "--overwrite"]) == 2
     assert files(".") == before
 
 

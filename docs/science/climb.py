@@ -1,7 +1,7 @@
 """Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
 
-They are made of docs/science/climb.csv, climb_fresh.csv, climb_ground.csv and climb_plane.csv, the
-trials.csv of the runs that the page names; with --check the page is only compared.
+They are made of docs/science/climb.csv, climb_ground.csv and climb_plane.csv, the trials.csv of the
+runs that the page names; with --check the page is only compared.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ from antennate.studies.measures import Table
 
 HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
-FRESH, SHOWN = HERE / "climb_fresh.csv", ("Climbed", "Trial by trial")
-"""A run on draws on which nothing was tuned, and the tables of it that the page shows."""
 GROUND = HERE / "climb_ground.csv"
 """A run on other grounds, and on steps that are too high."""
 PLANE = HERE / "climb_plane.csv"
@@ -53,9 +51,6 @@ def main() -> None:
         if "--check" not in sys.argv[1:]:
             grounds = outcome_of(GROUND).result()["grounds"]
             FIGURE.write_bytes(render(success(result["climbing"], grounds))["png"])
-        fresh = outcome_of(FRESH).result()
-        text += f"\n### On fresh draws\n\n{sentence(fresh)}\n\n"
-        text += "\n".join(markdown(t) for t in tables(fresh) if t.title.startswith(SHOWN))
         ground = outcome_of(GROUND).result()
         text += "\n### On other grounds\n\n"
         text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
@@ -68,8 +63,10 @@ def main() -> None:
 
 
 def first_of(result: Mapping[str, Any]) -> list[Table]:
-    """Tables of success over the height of steps, one each divisor."""
-    return [table for table in step_tables(result) if table.title.startswith(SHOWN[0])]
+    """Tables of success over the height of steps, one each divisor that has trials."""
+    shown = [entry for entry in result["climbing"] if entry["conditions"]["climb"]["trials"]]
+    found = step_tables({**result, "climbing": shown})
+    return [table for table in found if table.title.startswith("Climbed")]
 
 
 def plane() -> Table:
@@ -99,7 +96,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
         )
         for row in from_csv(path.read_text())
     ]
-    climbs = [row for row in rows if row.part == "climbing"]
+    climbs = [row for row in rows if row.part != "sensing"]
     felt = [row for row in rows if row.part == "sensing"]
     config = ClimbConfig(
         trials=max(row.trial for row in climbs) + 1,

@@ -46,6 +46,14 @@ class FeelParams(Params):
     """Elevation at which a probe upwards ends."""
     lowest: float = number(math.radians(-75.0), "rad", "assumed: nearly down", ge=-1.57, le=0)
     """Elevation at which a probe downwards ends."""
+    creep_time: float = number(
+        0.4,
+        "s",
+        "fitted: trials of seed 0; a head before the edge cannot bow, at 0.55 s robots tip over",
+        ge=0,
+        le=2,
+    )
+    """How long it walks on before a probe downwards."""
     bow: float = number(
         -0.5, "rad", "assumed: one link down; it reaches 14 cm below the ground", ge=-1, le=0
     )
@@ -107,7 +115,19 @@ class ClimbParams(Params):
         gt=0,
         le=0.3,
     )
-    """Step for which it is raised, whatever the height."""
+    """Step for which it is raised where the probe does not say that it is a low one."""
+    low: float = number(
+        0.065,
+        "m",
+        "fitted: probes of seeds 5, 6; 14 of 128 steps of 12 and 15 cm read less",
+        ge=0,
+        le=0.5,
+    )
+    """Height by the probe under which a step is a low one."""
+    spare: float = number(
+        0.06, "m", "assumed: twice what a probe is wrong by, and the body sags", ge=0, le=0.3
+    )
+    """How much higher than a low step it is raised."""
     ramp: float = number(0.24, "m", "fitted: trials of seed 0, true position", gt=0.05, le=1)
     """Length over which the line rises."""
     before: float = number(0.03, "m", "fitted: trials of seed 0, true position", ge=0, le=0.3)

@@ -132,12 +132,15 @@ class Body:
         self.rise[rows], self.measured[rows] = self._params.rise, np.nan
         self.elevation[rows] = self.sweep[rows] = 0.0
 
-    def begin(self, rows: Bools) -> None:
-        """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one."""
+    def begin(self, rows: Bools, rise: float | None = None) -> None:
+        """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one.
+
+        It is raised for a rise [m], that of the parameters if None.
+        """
         for row in np.flatnonzero(rows & np.isnan(self.progress).any(axis=1)):
             free = int(np.flatnonzero(np.isnan(self.progress[row]))[0])
             self.progress[row, free] = -self._params.ahead
-            self.rise[row, free] = self._params.rise
+            self.rise[row, free] = self._params.rise if rise is None else rise
 
     def advance(self, rows: Bools) -> None:
         """Let the plans of some rows, shape (B,), go on; those that the tail has passed end."""

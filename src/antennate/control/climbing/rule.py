@@ -184,9 +184,11 @@ class ClimbRule:
         return axle + self._robot.antenna.length * math.sin(angle)
 
     def _raise(self, row: int) -> None:
-        """Begin a climb."""
+        """Begin a climb, by the height of the probe if it is low and nothing speaks against it."""
+        low = self.height[row] < self._p.low and not (self._climbs[row] or self._close[row])
+        rise = self.height[row] + self._p.spare if low else self._p.rise
         self._climbs[row] += not self._body.climbs[row]
-        self._body.begin(self._one(row))
+        self._body.begin(self._one(row), rise)
         self._to(row, Stage.LIFT)
 
     def _lift(self, row: int, flex: Floats, steering: int) -> int:
@@ -215,8 +217,12 @@ class ClimbRule:
         self._to(row, Stage.STEER)
 
     def _probe_down(self, row: int, flex: Floats, steering: int) -> int:
-        """Stand, and lower head and antennae until they find ground."""
-        angle = self._feel.elevation - self._feel.sweep_rate * self._since[row]
+        """Creep until the head is past the edge, and lower it with the antennae to find ground."""
+        since = self._since[row] - self._feel.creep_time
+        if since < 0.0:
+            self._pose(row, self._feel.elevation)
+            return Maneuver.FORWARD
+        angle = self._feel.elevation - self._feel.sweep_rate * since
         self._pose(row, angle, self._feel.inwards, self._feel.bow)
         if (flex > self._feel.clear)[self._missing[row]].all():
             self.height[row] = self._tip(self._body.raised[row])
@@ -235,9 +241,9 @@ class ClimbRule:
         return Maneuver.REVERSE
 
     def _back(self, row: int, flex: Floats, steering: int) -> int:
-        """Back off from a drop."""
+        """Back off from a drop, and before that over the way that it crept."""
         self._pose(row, self._feel.elevation)
-        if self._since[row] > self._p.back_time:
+        if self._since[row] > self._p.back_time + self._feel.creep_time:
             self._to(row, Stage.TURN)
         return Maneuver.REVERSE
 

@@ -129,7 +129,7 @@ class ClimbConfig(Params):
     grounds: tuple[str, ...] = number(
         USUAL,
         "1",
-        "assumed: one of each kind, and a gap that is too wide",
+        "assumed: one of each kind but the tunnel, and a gap that is too wide",
         max_length=50,
     )
     """Other grounds: flat, gap:WIDTH, step_down:HEIGHT, stairs:HEIGHT or step_tunnel:HEIGHT [m], or

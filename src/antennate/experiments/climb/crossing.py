@@ -119,10 +119,11 @@ def ground_tables(result: Mapping[str, Any]) -> list[Table]:
 
 
 def _by_ground(entry: Mapping[str, Any], cell: Any) -> list[tuple[str, list[str]]]:
-    """A line for each ground, a cell for each condition."""
+    """A line for each ground that has trials, a cell for each condition."""
     return [
         (Terrain.of(some[0]["ground"]).label, [cell(row) for row in some])
         for some in zip(*entry["grounds"].values(), strict=True)
+        if any(row["trials"] for row in some)
     ]
 
 

@@ -41,8 +41,8 @@ KINDS: Mapping[str, Kind] = {
     "step_tunnel": Kind("height", "tunnel with a step of {} cm", patience=2.0),
 }
 """Kinds of ground by name, but for the flat floor, which has no size."""
-USUAL = (FLAT, "gap:0.1", "gap:0.3", "step_down:0.1", "stairs:0.08", "ramp:20", "step_tunnel:0.08")
-"""One of each kind, and a gap that is too wide."""
+USUAL = (FLAT, "gap:0.1", "gap:0.3", "step_down:0.1", "stairs:0.08", "ramp:20")
+"""One of each kind but the tunnel, which takes longest, and a gap that is too wide."""
 
 
 @dataclass(frozen=True, slots=True)
