@@ -13,11 +13,14 @@ import pytest
 from lockstep import BoardPort, LockstepClock
 from pages import blocks
 from policy_files import FORWARD, constant, contract, counting, drawn
+from recorded import recorded
 
 from antennate.cli import main
 from antennate.control.policy.contract import Contract, contract_of, require_match
 from antennate.control.policy.controller import Policy
-from antennate.control.policy.interface import PolicyInterface, actions, observations
+from antennate.control.policy.interface import PolicyInterface, Quantity, actions, observations
+from antennate.control.policy.writer import write_policy
+from antennate.control.readers import UNREAD_BY_POLICIES
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.batch import run_trials
@@ -43,6 +46,10 @@ def trials_of(path: Path, batch: int = 3, **config: Any) -> list[TrialResult]:
     made = TunnelConfig.model_validate({"controllers": [str(path)], **values})
     run_trials(made, str(path), range(3), lambda result: rows.append(result[0]), batch)
     return sorted(rows, key=lambda row: row.trial)
+
+
+def actions_of(mode: str) -> tuple[Quantity, ...]:
+    return actions(PolicyInterface.model_validate({"action": mode}), RobotSpec())
 
 
 def frame(t: float, counts: float, batch: int = 1) -> AntennaFrame:
@@ -84,6 +91,19 @@ def test_names_are_different_and_have_units(mode: str) -> None:
 
 
 # control
+
+
+def test_a_policy_that_chooses_gives_the_answer_with_the_largest_score(tmp_path: Path) -> None:
+    rng, made = np.random.default_rng(4), contract(action="gait")
+    size, table = len(made.observations), np.arange(20.0).reshape(5, 4)
+    layers = [(rng.normal(size=(5, size)), np.zeros(5))]
+    parts = {"mean": np.zeros(size), "scale": np.ones(size), "clip": 10.0, "choices": table}
+    policy = Policy(write_policy(tmp_path / "p.onnx", made, layers, **parts))
+    x = rng.normal(size=(20, size)).astype(np.float32)
+    answers = np.concatenate([policy.answer(row[None], {})[0] for row in x])
+    best = np.argmax(x @ layers[0][0].T, axis=1)
+    assert len(set(best.tolist())) > 2
+    assert (answers == table[best]).all()
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -199,6 +219,30 @@ def test_what_it_was_not_made_for_is_refused_before_the_first_trial(
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert all(word in line for word in words), line
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_policy_reads_none_of_what_it_is_said_not_to_read(tmp_path: Path, mode: str) -> None:
+    path = constant(tmp_path / "p.onnx", (0.5,) * len(actions_of(mode)), contract(action=mode))
+    control = ControlParams()
+    with recorded(control) as read:
+        controller = make_controller(str(path), control)
+        for tick in range(30):
+            controller.step(frame(0.01 * tick, 2000.0))
+    assert "rule.threshold" in read
+    assert not read & set(UNREAD_BY_POLICIES)
+
+
+@pytest.mark.parametrize("name", ["search.patience", "rule.strong", "timed.walk_time"])
+def test_a_parameter_that_no_policy_reads_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    flag = f"--control.{name.replace('_', '-')}"
+    assert main(["tunnel", "--controllers", str(path), flag, "0.9"]) == 2
+    said = capsys.readouterr().err
+    assert f"{flag}: expected a parameter that is read" in said
+    assert f"but {path} does not read it" in said
 
 
 def test_other_ids_and_directions_are_no_other_robot(tmp_path: Path) -> None:

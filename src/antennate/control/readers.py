@@ -178,6 +178,9 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
+_POLICY = ("rate", "gait.", "conditioning", "rule.threshold", "rule.hysteresis")
+UNREAD_BY_POLICIES = tuple(p for p in paths_of(ControlParams) if not p.startswith(_POLICY))
+"""The same of a policy file. Another rate or gait than that of its contract is refused with it."""
 
 
 def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[str]:
@@ -191,7 +194,8 @@ def unread(name: str, control: ControlParams, knows: Sequence[str] = ()) -> set[
         knows: What a simulation tells it; a robot tells nothing.
     """
     by_contact = name == "closed-1" and control.escape.trigger == "contact"
-    paths = set(UNREAD.get(BY_CONTACT if by_contact else name, ()))
+    own = UNREAD_BY_POLICIES if name.endswith(".onnx") else ()
+    paths = set(UNREAD.get(BY_CONTACT if by_contact else name, own))
     if name == "closed-1" and "jam" in knows:
         paths |= {"escape.trigger", *_REPEATED, *_BLOCKED}
     if name in ("closed", "geometric") and "jam" in knows:

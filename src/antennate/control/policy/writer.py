@@ -25,6 +25,7 @@ def write_policy(
     mean: Weights,
     scale: Weights,
     clip: float,
+    choices: Weights | None = None,
 ) -> Path:
     """Write a network of dense layers with tanh between them, its normaliser in the graph.
 
@@ -35,6 +36,8 @@ def write_policy(
         mean: Subtracted from an observation, shape (n,).
         scale: What it is divided by then, shape (n,).
         clip: Largest normalised number either way.
+        choices: Answers to choose from, shape (outputs, k): the one with the largest score is
+            given, the first of equal ones. Without them the scores are the answer.
 
     Returns:
         The path.
@@ -53,11 +56,19 @@ def write_policy(
     for i, (weight, bias) in enumerate(layers):
         constants |= {f"w{i}": weight, f"b{i}": bias}
         last = i == len(layers) - 1
-        out = ACTION if last else f"y{i}"
+        out = f"y{i}" if not last else ACTION if choices is None else "scores"
         nodes.append(helper.make_node("Gemm", [f"x{i}", f"w{i}", f"b{i}"], [out], transB=1))
         if not last:
             nodes.append(helper.make_node("Tanh", [out], [f"x{i + 1}"]))
-    shapes = (OBSERVATION, len(mean)), (ACTION, len(layers[-1][1]))
+    answers = len(layers[-1][1])
+    if choices is not None:
+        constants["choices"] = choices
+        nodes += [
+            helper.make_node("ArgMax", ["scores"], ["best"], axis=1, keepdims=0),
+            helper.make_node("Gather", ["choices", "best"], [ACTION], axis=0),
+        ]
+        answers = choices.shape[1]
+    shapes = (OBSERVATION, len(mean)), (ACTION, answers)
     given, answer = (helper.make_tensor_value_info(n, kind, [1, size]) for n, size in shapes)
     tensors = [
         numpy_helper.from_array(np.asarray(value, np.float32), name)

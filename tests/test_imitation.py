@@ -1,0 +1,147 @@
+"""The example of imitation: what its teacher says, and what its student is given."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from antennate.control.policy.controller import Policy
+from antennate.control.policy.interface import PolicyInterface
+from antennate.control.policy.observer import Observer
+from antennate.control.registry import make_controller
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.testing import check_controller
+from antennate.types import AntennaFrame
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+@pytest.fixture
+def imitate(monkeypatch: pytest.MonkeyPatch) -> Any:
+    pytest.importorskip("torch")
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return importlib.import_module("imitate")
+
+
+def advice(teacher: Any, flex: tuple[float, float], done: int) -> int:
+    return int(teacher.advise(np.array([flex]), np.array([done]))[0])
+
+
+@pytest.mark.parametrize(("bent", "side"), [((0.6, 0.1), "TURN_R"), ((0.1, 0.6), "TURN_L")])
+def test_readings_that_repeat_are_told_to_back_off_and_to_turn_from_what_stays_bent(
+    imitate: Any, bent: tuple[float, float], side: str
+) -> None:
+    """Patience 3 s and 2.2 s of backing off at 0.6 Hz, so 0.6 of it at 1 Hz."""
+    teacher, told = imitate.Teacher(ControlParams(), 1), [imitate.FORWARD]
+    while len(told) < 100 and not {imitate.TURN_L, imitate.TURN_R} & set(told):
+        told.append(advice(teacher, bent, told[-1]))  # it does as it is told
+    assert told[-1] == getattr(imitate, side)
+    walked, backed = (told.count(maneuver) for maneuver in (imitate.FORWARD, imitate.REVERSE))
+    assert abs(walked * imitate.DECISION - 0.6 * 3.0) < 0.5
+    assert abs(backed * imitate.DECISION - 0.6 * 2.2) < 0.25
+
+
+def test_a_robot_that_feels_nothing_is_told_to_walk(imitate: Any) -> None:
+    teacher = imitate.Teacher(ControlParams(), 1)
+    for _ in range(100):
+        assert advice(teacher, (0.0, 0.0), imitate.FORWARD) == imitate.FORWARD
+
+
+def test_another_will_than_that_of_the_teacher_is_gone_on_with_after_a_while(imitate: Any) -> None:
+    teacher = imitate.Teacher(ControlParams(), 1)
+    told = [advice(teacher, (0.0, 0.0), imitate.TURN_L) for _ in range(20)]
+    assert told[: imitate.PATIENCE - 1] == [imitate.FORWARD] * (imitate.PATIENCE - 1)
+    assert told[imitate.PATIENCE] == imitate.TURN_L
+    over = told.index(imitate.FORWARD, imitate.PATIENCE)  # the turn has had its time
+    assert abs((over + 1) * imitate.DECISION - 0.6 * 2.6) < 0.25
+
+
+class Gait:
+    """A gait state of one robot."""
+
+    def __init__(self, phase: float, offset: float) -> None:
+        self.phase, self.offset = np.array([phase]), np.array([offset])
+        self.pace, self.amplitude = np.ones(1), np.full(1, 0.4)
+
+    def goals(self) -> None:
+        return None
+
+
+def test_a_mirrored_observation_is_that_of_the_mirrored_robot(imitate: Any) -> None:
+    """Antennae exchanged, offset negated, and the gait half a turn later."""
+    interface = PolicyInterface.model_validate(imitate.INTERFACE)
+    observers = [Observer(interface, ControlParams(), RobotSpec(), 1) for _ in range(2)]
+    rng = np.random.default_rng(2)
+    for i in range(40):
+        counts, phase, offset = rng.uniform(1500.0, 2500.0, (1, 2)), 0.3 * i, rng.uniform(-0.5, 0.5)
+        t = np.array([0.2 * i])
+        observers[0].feel(AntennaFrame(t, counts))
+        observers[1].feel(AntennaFrame(t, counts[:, ::-1].copy()))
+        own = observers[0].look(Gait(phase, offset))
+        other = observers[1].look(Gait(phase + np.pi, -offset))
+    seen, told = imitate.mirrored(own, np.array([imitate.TURN_L]))
+    assert np.abs(seen - other).max() < 1e-6
+    assert np.abs(seen - own).max() > 0.1
+    assert told.tolist() == [imitate.TURN_R]
+
+
+def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) -> None:
+    """The same walk: but for what is felt, the observations are the same, bit for bit."""
+    seen = {}
+    for readings in ("own", "none"):
+        env = gym.make("antennate/Tunnel-v1", interface=imitate.INTERFACE, readings=readings)
+        seen[readings], _ = env.reset(seed=5)
+        for _ in range(8):
+            seen[readings], *_ = env.step(imitate.CHOICES[0].astype(np.float32))
+    own, none = (seen[name][None] for name in ("own", "none"))
+    assert (own != none).any()
+    assert (imitate.untouched(own) == none).all()
+    network = imitate.Network(own.shape[1])
+    imitate.blindfold(network)
+    scores = [network(imitate.torch.from_numpy(x)).detach().numpy() for x in (own, none)]
+    assert (scores[0] == scores[1]).all()
+
+
+@pytest.mark.slow
+def test_the_example_teaches_and_its_policy_walks(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    pytest.importorskip("onnxruntime")
+    script = str(EXAMPLES / "imitate.py")
+    words = [sys.executable, script, "--scene", "uturn", "--decisions", "600", "--out", "p"]
+    subprocess.run(words, cwd=tmp_path, check=True)
+    path, rows = tmp_path / "p/policy.onnx", list[TrialResult]()
+    config = TunnelConfig(time_limit=3.0, scene="uturn", controllers=(str(path),))
+    run_trials(config, str(path), [0], lambda r: rows.append(r[0]))
+    assert rows[0].outcome != "invalid"
+
+
+ENTRY = Path(__file__).parents[1] / "entries/apprentice"
+
+
+def test_the_entry_keeps_the_protocol_of_controllers() -> None:
+    pytest.importorskip("onnxruntime")
+    path = str(ENTRY / "policy.onnx")
+    check_controller(lambda c, r, b: make_controller(path, c, r, b))
+
+
+def test_the_entry_answers_by_what_it_feels() -> None:
+    pytest.importorskip("onnxruntime")
+    policy, rng = Policy(ENTRY / "policy.onnx"), np.random.default_rng(8)
+    names = [quantity.name for quantity in policy.contract.observations]
+    felt = [i for i, name in enumerate(names) if name.startswith("flex")]
+    own = np.zeros((50, len(names)), np.float32)
+    other = own.copy()
+    other[:, felt] = rng.uniform(0.0, 1.0, (50, len(felt)))
+    free, touched = ([policy.answer(x[None], {})[0] for x in seen] for seen in (own, other))
+    assert len(np.unique(free, axis=0)) == 1
+    assert len(np.unique(touched, axis=0)) > 1
