@@ -139,9 +139,8 @@ def test_the_entry_answers_by_what_it_feels() -> None:
     policy, rng = Policy(ENTRY / "policy.onnx"), np.random.default_rng(8)
     names = [quantity.name for quantity in policy.contract.observations]
     felt = [i for i, name in enumerate(names) if name.startswith("flex")]
-    own = np.zeros((50, len(names)), np.float32)
+    own = rng.normal(0.0, 1.0, (200, len(names))).astype(np.float32)
     other = own.copy()
-    other[:, felt] = rng.uniform(0.0, 1.0, (50, len(felt)))
-    free, touched = ([policy.answer(x[None], {})[0] for x in seen] for seen in (own, other))
-    assert len(np.unique(free, axis=0)) == 1
-    assert len(np.unique(touched, axis=0)) > 1
+    other[:, felt] = rng.normal(0.5, 1.0, (200, len(felt)))
+    before, after = ([policy.answer(x[None], {})[0] for x in seen] for seen in (own, other))
+    assert (np.array(before) != np.array(after)).any()
