@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -29,6 +28,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 @pytest.fixture
 def imitate(monkeypatch: pytest.MonkeyPatch) -> Any:
     pytest.importorskip("torch")
+    pytest.importorskip("gymnasium")
     monkeypatch.syspath_prepend(str(EXAMPLES))
     return importlib.import_module("imitate")
 
@@ -99,7 +99,9 @@ def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) 
     """The same walk: but for what is felt, the observations are the same, bit for bit."""
     seen = {}
     for readings in ("own", "none"):
-        env = gym.make("antennate/Tunnel-v1", interface=imitate.INTERFACE, readings=readings)
+        env = imitate.gym.make(
+            "antennate/Tunnel-v1", interface=imitate.INTERFACE, readings=readings
+        )
         seen[readings], _ = env.reset(seed=5)
         for _ in range(8):
             seen[readings], *_ = env.step(imitate.CHOICES[0].astype(np.float32))

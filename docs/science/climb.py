@@ -46,7 +46,8 @@ def main() -> None:
     if ROWS.exists():
         outcome = outcome_of(ROWS)
         result = outcome.result()
-        text = f"{sentence(result)}\n\n![Success over the height of the step](climb.png)\n\n"
+        text = f"{sentence(result)}\n\n"
+        text += "![Success over heights of steps and widths of gaps](climb.png)\n\n"
         text += "\n".join(map(markdown, tables(result)))
         if "--check" not in sys.argv[1:]:
             grounds = outcome_of(GROUND).result()["grounds"]

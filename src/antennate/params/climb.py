@@ -31,11 +31,19 @@ class FeelParams(Params):
     )
     """How long something is to be felt."""
     missing_time: float = number(
-        0.15, "s", "fitted: trials of seed 0; the bases are past the edge then, to probe it", ge=0
+        0.15,
+        "s",
+        "fitted: trials of seed 0; the bases are past the edge then, to probe it",
+        ge=0,
+        le=5,
     )
     """How long both antennae are to miss the ground."""
     aslant_time: float = number(
-        0.35, "s", "fitted: trials of seed 0; the base is past an edge that is met aslant", ge=0
+        0.35,
+        "s",
+        "fitted: trials of seed 0; the base is past an edge that is met aslant",
+        ge=0,
+        le=5,
     )
     """How long one antenna is to miss it."""
     settle_time: float = number(0.5, "s", "assumed: the antennae come down in it", ge=0, le=5)
@@ -59,7 +67,11 @@ class FeelParams(Params):
     )
     """Pitch of the head in a probe downwards."""
     clear: float = number(
-        0.3, "1", "fitted: trials of seed 0; an antenna that slips over an edge falls below", ge=0
+        0.3,
+        "1",
+        "fitted: trials of seed 0; an antenna that slips over an edge falls below",
+        ge=0,
+        le=2,
     )
     """Flex under which a probe upwards has passed the edge."""
     level_height: float = number(
@@ -79,11 +91,19 @@ class FeelParams(Params):
     )
     """How much higher an edge is for each radian that it is raised further."""
     inwards: float = number(
-        math.radians(-30.0), "rad", "assumed: straight ahead, where it reaches highest", ge=-0.8
+        math.radians(-30.0),
+        "rad",
+        "assumed: straight ahead, where it reaches highest",
+        ge=-0.8,
+        le=0.8,
     )
     """Sweep of the bases in a probe."""
     check: float = number(
-        0.1, "rad", "fitted: trials of seed 0; above a step of 15 cm, below walls of 20 cm", ge=-1
+        0.1,
+        "rad",
+        "fitted: trials of seed 0; above a step of 15 cm, below walls of 20 cm",
+        ge=-1,
+        le=1.57,
     )
     """Elevation of the antennae before a raised head, from the plane of the tail."""
     tread: float = number(
@@ -91,7 +111,11 @@ class FeelParams(Params):
     )
     """Elevation of the antennae behind an edge, which feel for the tread while the head is up."""
     plane_sweep: float = number(
-        math.radians(17.0), "rad", "assumed: 47 deg, as antennae that stay in the plane", ge=-0.8
+        math.radians(17.0),
+        "rad",
+        "assumed: 47 deg, as antennae that stay in the plane",
+        ge=-0.8,
+        le=0.8,
     )
     """Sweep of the bases while it steers by level antennae."""
     plane_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=60)
@@ -137,10 +161,16 @@ class ClimbParams(Params):
     settle: float = number(0.15, "m", "assumed: over a link", gt=0, le=1)
     """Length over which it comes down to the step."""
     amplitude: float = number(
-        math.radians(15.0), "rad", "fitted: trials of seed 3; bent less, it turns less aside", ge=0
+        math.radians(15.0),
+        "rad",
+        "fitted: trials of seed 3; bent less, it turns less aside",
+        ge=0,
+        le=1,
     )
     """Amplitude of the yaw joints while it climbs, at most that of the gait."""
-    amplitude_rate: float = number(0.2, "rad/s", "assumed: half a second for the change", gt=0)
+    amplitude_rate: float = number(
+        0.2, "rad/s", "assumed: half a second for the change", gt=0, le=10
+    )
     """Largest change of that amplitude."""
     frequency: float = number(
         0.3,

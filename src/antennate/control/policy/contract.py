@@ -123,7 +123,7 @@ def read_contract(text: str, where: str) -> Contract:
     """
     try:
         version = json.loads(text).get("version")
-    except (ValueError, AttributeError):
+    except (ValueError, AttributeError, RecursionError):
         raise ConfigError(f"{where}: expected a contract in JSON, found {shown(text)}") from None
     if version != VERSION:
         raise ConfigError(f"{where}: expected a contract of version {VERSION}, found {version!r}")
@@ -147,10 +147,11 @@ def require_match(contract: Contract, control: ControlParams, robot: RobotSpec, 
         )
     for name in ("rate", "averaging_time", "gait", "joints", "robot", "observations", "actions"):
         theirs, ours = (_plain(getattr(side, name)) for side in (contract, own))
+        what = "robot" if name in ("joints", "robot") else "setting"
         for path, expected, found in _differences(theirs, ours, name):
             raise ConfigError(
-                f"{where}: made for another {'robot' if name == 'robot' else 'setting'}: "
-                f"expected {path} {shown(expected)}, found {shown(found)}"
+                f"{where}: made for another {what}: expected {path} {shown(expected)}, "
+                f"found {shown(found)}"
             )
 
 
@@ -190,7 +191,9 @@ def _differences(old: Any, new: Any, path: str) -> Iterator[tuple[str, Any, Any]
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys([*old, *new]):
             yield from _differences(old.get(key), new.get(key), f"{path}.{key}")
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+    elif isinstance(old, list) and isinstance(new, list) and len(old) != len(new):
+        yield f"number of {path}", len(old), len(new)
+    elif isinstance(old, list) and isinstance(new, list):
         for i, pair in enumerate(zip(old, new, strict=True)):
             yield from _differences(*pair, f"{path}[{i}]")
     elif old != new:

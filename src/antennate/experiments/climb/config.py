@@ -132,8 +132,8 @@ class ClimbConfig(Params):
         "assumed: one of each kind but the tunnel, and a gap that is too wide",
         max_length=50,
     )
-    """Other grounds: flat, gap:WIDTH, step_down:HEIGHT, stairs:HEIGHT or step_tunnel:HEIGHT [m], or
-    ramp:SLOPE [deg]."""
+    """Other grounds: flat, gap:WIDTH, step_down:HEIGHT, stairs:HEIGHT or step_tunnel:HEIGHT, to 0.5
+    m, or ramp:SLOPE, to 45 deg."""
     conditions: tuple[Condition, ...] = number(
         ("locked", "level", "lifted", "rhythm", "climb", "edges"),
         "1",
@@ -198,6 +198,8 @@ class ClimbConfig(Params):
     def _agree(self) -> ClimbConfig:
         for name in ("heights", "grounds", "conditions", "divisors"):
             require_different(name, getattr(self, name))
+        require_different("heights", [f"{100 * height:g} cm" for height in self.heights])
+        require_different("divisors", [f"{divisor:g}" for divisor in self.divisors])
         require_whole_steps("control.rate", self.control.rate, self.physics.timestep)
         try:
             require_pitch(self.robot)

@@ -97,11 +97,11 @@ def _draw_success(
 ) -> None:
     for i, (name, rows) in enumerate(by_name.items()):
         colour, marker = _LOOKS[name]
-        known = [row for row in rows if row["wilson95"] is not None]
         shift = _APART * (i - (len(by_name) - 1) / 2) / 3
-        x = [100 * (row[size] + shift) for row in known]
-        y = np.array([100 * row["success_share"] for row in known])
-        ends = 100 * np.array([row["wilson95"] for row in known]).reshape(-1, 2).T
+        x = [100 * (row[size] + shift) for row in rows]
+        y = np.array([100 * row["success_share"] if row["wilson95"] else np.nan for row in rows])
+        known = [row["wilson95"] or (np.nan, np.nan) for row in rows]
+        ends = 100 * np.array(known).reshape(-1, 2).T
         panel.errorbar(
             x,
             y,
@@ -116,6 +116,7 @@ def _draw_success(
     marks = sorted({100 * row[size] for rows in by_name.values() for row in rows})
     if marks:
         panel.set_xticks(marks, [f"{mark:g}" for mark in marks])
+        panel.set_xlim(marks[0] - 1.5, marks[-1] + 1.5)
 
 
 @style.styled

@@ -15,9 +15,9 @@ from antennate.studies.measures import Table, shown
 
 Result = Mapping[str, Any]
 _NOTE = (
-    "A failure counts as its time limit, and so does INVALID: an answer that is not finite, an "
-    "exception,\na decision that took too long. {given}Ranks: of those that live on their readings "
-    "alone."
+    "A failure counts as its time limit, and so does INVALID: an angle that is not finite, an "
+    "exception,\na decision that took too long. (A learned policy's answer that is not finite is "
+    "HOLD.) {given}Ranks:\nof those that live on their readings alone."
 )
 
 
