@@ -13,7 +13,7 @@ import numpy as np
 from antennate.studies.statistics import holm, mcnemar, signed_rank
 
 ROWS = Path(__file__).with_suffix(".csv")
-RIVAL, POLICIES = "timed", ("taught by closed", "taught by the route")
+RIVALS, POLICIES = ("timed", "timed at 1 Hz"), ("taught by closed", "taught by the route")
 RESAMPLES = 4000
 
 
@@ -30,11 +30,16 @@ def read() -> dict[str, np.ndarray]:
 
 
 def main() -> None:
-    """Print the rival, and a row for each policy."""
-    trials, cells, p = read(), [], []
-    other = trials[RIVAL]
-    for name in POLICIES:
-        own = trials[name]
+    """Print, for each rival, its row and a row for each policy."""
+    trials = read()
+    for rival in RIVALS:
+        compare(rival, trials[rival], {name: trials[name] for name in POLICIES})
+
+
+def compare(rival: str, other: np.ndarray, policies: dict[str, np.ndarray]) -> None:
+    """Print the rows of a rival and of policies, on the same draws, with Holm's correction."""
+    cells, p = [], []
+    for name, own in policies.items():
         change = own[:, 1] - other[:, 1]
         sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
         low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
@@ -44,7 +49,7 @@ def main() -> None:
             f"| {change.mean():+.1f} ({low:+.1f} to {high:+.1f})"
         )
         p.append((signed_rank(change), crossed.mcnemar_p))
-    print(f"| `{RIVAL}` | {int(other[:, 0].sum())} | {other[:, 1].mean():.1f} | | | |")
+    print(f"| {rival} | {int(other[:, 0].sum())} | {other[:, 1].mean():.1f} | | | |")
     for row, times, successes in zip(cells, *map(holm, zip(*p, strict=True)), strict=True):
         print(f"{row} | {times:.2g} | {successes:.2g} |")
 
