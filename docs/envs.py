@@ -150,7 +150,7 @@ set](science/corridors.md#the-hard-set)).
 last 12 s, and learns on its own episodes (DAgger; [Ross, Gordon and Bagnell
 2011](https://arxiv.org/abs/1011.0686)). Five times a second it chooses forward, left, right or
 backwards, at 1 Hz. **In the U-turn the second of two policies beats `timed`, which walks at 0.6 Hz,
-but not `timed` at 1 Hz: what it gains is haste.**
+but not `timed` at 1 Hz. More than haste is not shown.**
 
 The criterion stood before the first network was tried: `uturn`, 100 draws of seed 20261377, which
 was drawn by chance and used for nothing before. A failure counts as the limit of 100 s. A policy

@@ -1,6 +1,6 @@
 """Teach a network to escape by touch, by imitation of `closed`; write it as ONNX.
 
-    python examples/imitate.py --out my_policy                   # 20 minutes on one core
+    python examples/imitate.py --out my_policy                   # some 10 minutes on one core
     antennate tunnel --scene uturn --controllers timed closed my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.

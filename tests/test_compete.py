@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate.cli import main
+from antennate.cli import BAD_INPUT, main
 from antennate.errors import ConfigError
 from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
@@ -171,7 +171,19 @@ def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     readme = (tmp_path / "run" / "README.md").read_text()
     assert "| `map` | not ranked |" in readme
     assert "expected finite angles in yaw" in readme
-    assert capsys.readouterr().out.splitlines()[-1].startswith("Ranks in 1 scene")
+    told = capsys.readouterr().out.splitlines()[-1]
+    assert told.startswith("Ranks in 1 scene")
+    assert " No episode of NotFinite is valid: " in told
+    assert "expected finite angles in yaw" in told
+
+
+def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(
+    entries: Callable[[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compete", "--trials", "1", "--scenes", SHORT, "--no-figures", "--out", "run"]
+    assert main([*words, "--controllers", entries("Raises")]) == BAD_INPUT
+    out = capsys.readouterr().out
+    assert "No episode of Raises is valid: controller: step raised ZeroDivisionError: no" in out
 
 
 def test_rows_are_the_same_for_any_number_of_workers() -> None:

@@ -229,7 +229,7 @@ def killed(left):
     sys.exit(main(WORDS))
 main([*WORDS[:3], "--out", "imported"])  # all that the others import
 codes = []
-while 0 not in codes:  # until one meets its end
+while not codes or codes[-1] == -signal.SIGKILL:  # until one meets its end
     kill = len(codes) + 1
     place = Path(str(kill))
     shutil.copytree("old", place / "run")

@@ -110,7 +110,7 @@ class Gait:
         offset: Yaw offset [rad], shape (B,).
         sweep: Phase of the antenna bases [rad], shape (B,).
         amplitude: Amplitude of the yaw joints [rad], shape (B,); that of the gait if None.
-        frequency: Frequency [Hz], shape (B,); that of the gait if None.
+        frequency: Frequency [Hz], of all rows or shape (B,).
     """
 
     def __init__(
@@ -122,9 +122,8 @@ class Gait:
         self.offset: Floats = np.zeros(batch)
         self.sweep: Floats = np.zeros(batch)
         self.amplitude: Floats | None = None
-        self.frequency: Floats | None = None
+        self.frequency: Floats | float = params.frequency
         self._period = period
-        self._advance = 2.0 * math.pi * params.frequency * period
         self._slew = params.offset_rate * period
         self._swing = 2.0 * math.pi * params.antenna_frequency * period
 
@@ -155,10 +154,7 @@ class Gait:
         change = goal - self.offset
         change = np.minimum(np.maximum(change, -self._slew), self._slew)
         self.offset += change * moves
-        advance: Floats | float = self._advance
-        if self.frequency is not None:
-            advance = 2.0 * math.pi * self.frequency * self._period
-        self.phase += DIRECTION[maneuver] * advance
+        self.phase += DIRECTION[maneuver] * (2.0 * math.pi * self.frequency * self._period)
         self.sweep += moves * self._swing
         command = targets(
             self.params,

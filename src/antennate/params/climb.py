@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from pydantic import model_validator
+
 from antennate.params.base import Params, number
 
 
@@ -121,6 +123,14 @@ class FeelParams(Params):
     plane_time: float = number(4.0, "s", "assumed: over two gait cycles", gt=0, le=60)
     """Nothing felt for so long while it steers, and it feels for the ground again."""
 
+    @model_validator(mode="after")
+    def _apart(self) -> FeelParams:
+        if self.missing >= self.touch:
+            raise ValueError(
+                f"missing: expected less than touch, {self.touch:g}, found {self.missing:g}"
+            )
+        return self
+
 
 class ClimbParams(Params):
     """How the body is raised over an edge.
@@ -236,3 +246,9 @@ class ClimbParams(Params):
         5.0, "s", "fitted: best of 3, 5 and 8 s at 10 cm (docs/science/climb.md)", ge=0, le=60
     )
     """Time that `rhythm` walks between two climbs."""
+
+    @model_validator(mode="after")
+    def _low_is_low(self) -> ClimbParams:
+        if self.low > self.rise:
+            raise ValueError(f"low: expected at most rise, {self.rise:g} m, found {self.low:g}")
+        return self

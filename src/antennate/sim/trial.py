@@ -42,7 +42,7 @@ MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
 FALL = 0.175
 """How far a link has fallen that is lower than the ground at the start [m] (assumed: half the depth
-of a gap; robots walk down steps of 16 cm, docs/science/climb.md)."""
+of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
 MEMBERS = ("start", "length", "exit", "build", "progress", "left")
 """What a SceneInstance has."""
 

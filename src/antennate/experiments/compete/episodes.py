@@ -47,7 +47,7 @@ class Episode:
         scene: The scene, with its other parameters if it has some.
         seed: Seed of the run; with `trial` and `scene` it decides all chance.
         trial: Number of the draw.
-        outcome: success, timeout, left, or invalid, which counts as a failure.
+        outcome: success, timeout, left, overturned, fell, or invalid, which counts as a failure.
         time_s: Time to the exit [s]; the limit for every failure.
         limit_s: Time limit [s].
         progress_m: How far the head came [m].

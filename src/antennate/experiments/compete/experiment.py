@@ -25,7 +25,7 @@ from antennate.experiments.compete.episodes import (
 )
 from antennate.experiments.compete.page import readme, sentence, tables
 from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
-from antennate.experiments.compete.standings import CONTROLLER, standings
+from antennate.experiments.compete.standings import CONTROLLER, none_valid, standings
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.knowledge import require_route
@@ -170,9 +170,10 @@ def run(
 
 
 def failed(result: Mapping[str, Any]) -> bool:
-    """Whether a table that was checked does not repeat."""
-    check = result["check"]
-    return check is not None and refused(check, result["tie"])
+    """Whether a table that was checked does not repeat, or there is no valid episode at all."""
+    if (check := result["check"]) is not None:
+        return refused(check, result["tie"])
+    return len(none_valid(result)) == len(result["controllers"])
 
 
 EXPERIMENT = Experiment.of_folder(

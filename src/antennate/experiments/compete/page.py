@@ -10,7 +10,7 @@ from antennate.control.registry import about
 from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
-from antennate.experiments.compete.standings import CONTROLLER, PAIR
+from antennate.experiments.compete.standings import CONTROLLER, PAIR, none_valid
 from antennate.studies.measures import Table, shown
 
 Result = Mapping[str, Any]
@@ -128,9 +128,10 @@ def sentence(result: Result) -> str:
     known = "public" if set(seeds) <= set(DEVELOPMENT) else "chosen"
     kind = f"{'hidden' if result['hidden'] else known} seed{'s' * (len(seeds) > 1)}"
     ranks = ", ".join(entries) or "none, as none lives on its readings"
+    lost = (f" No episode of {short[n]} is valid: {why}." for n, why in none_valid(result).items())
     return (
         f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
-        f"{', '.join(map(str, seeds))}: {ranks}."
+        f"{', '.join(map(str, seeds))}: {ranks}.{''.join(lost)}"
     )
 
 

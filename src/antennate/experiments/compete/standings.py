@@ -88,6 +88,15 @@ def standings(rows: Rows, tie: float) -> dict[str, Any]:
     }
 
 
+def none_valid(result: Mapping[str, Any]) -> dict[str, str]:
+    """Controllers of which every episode is INVALID, and why the first one is."""
+    return {
+        name: row["first_reason"]
+        for name, row in result["controllers"].items()
+        if row["episodes"] and row["invalid"] == row["episodes"]
+    }
+
+
 def names_of(rows: Rows) -> list[str]:
     """The controllers of these rows, in their order."""
     return list(dict.fromkeys(row.controller for row in rows))
