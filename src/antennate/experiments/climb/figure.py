@@ -142,7 +142,7 @@ def side(path: ClimbPath) -> Figure:
         panel.set(xlim=(left, right), ylim=(-0.03, path.height + 0.22))
         panel.set_aspect("equal", adjustable="box")
         panel.grid(visible=False)
-    panels[-1].set_xlabel("along the way, from the edge [m]; dashed: the head by the plan")
+    panels[-1].set_xlabel("from the edge [m]; dashed: the head by the plan")
     panels[_MOMENTS // 2].set_ylabel("height [m]")
     return figure
 
@@ -153,7 +153,7 @@ def plan(entries: Sequence[Mapping[str, Any]]) -> Figure:
     figure = style.canvas(style.WIDTH, 3.4)
     panel = figure.subplots()
     low, high = (100 * end for end in PLAN_BAND)
-    panel.axhspan(low, high, color=style.FAINT, alpha=0.6, zorder=0, label="aim for 90 %")
+    panel.axhspan(low, high, color=style.FAINT, alpha=0.6, zorder=0, label="aim: 90 % in here")
     for i, entry in enumerate(entries):
         rows = [row for row in entry["plan"] if row["crossings"]]
         places = np.arange(len(rows)) + 0.16 * (i - (len(entries) - 1) / 2)
