@@ -202,6 +202,17 @@ def on_its_back(world: World, share: float = 1.0) -> Any:
     return world
 
 
+def watched(name: str) -> tuple[World, TrialMonitor]:
+    """A robot at the start of a scene, and who says how its trial ends: not yet."""
+    scene = make_scene(name).draw(ROBOT, np.random.default_rng(0))
+    world = make_world(PhysicsParams(), ROBOT, scene)
+    place_at_start(world, scene, GaitParams())
+    mujoco.mj_kinematics(world.model, world.data)
+    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
+    assert monitor.look(world, 0.1, 0) is None
+    return world, monitor
+
+
 @pytest.mark.parametrize(
     ("name", "share", "outcome"),
     [
@@ -215,12 +226,7 @@ def on_its_back(world: World, share: float = 1.0) -> Any:
 def test_robots_on_their_backs_have_overturned_where_the_ground_is_not_flat(
     name: str, share: float, outcome: str | None
 ) -> None:
-    scene = make_scene(name).draw(ROBOT, np.random.default_rng(0))
-    world = make_world(PhysicsParams(), ROBOT, scene)
-    place_at_start(world, scene, GaitParams())
-    mujoco.mj_kinematics(world.model, world.data)
-    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
-    assert monitor.look(world, 0.1, 0) is None
+    world, monitor = watched(name)
     assert monitor.look(on_its_back(world, share), 0.2, 0) == outcome
 
 
@@ -238,12 +244,7 @@ def test_a_robot_with_one_link_far_below_the_ground_where_it_began_has_fallen(
     name: str, lower: float, outcome: str | None
 ) -> None:
     """The criterion, on its tail that is lowered by hand; flat floors have nothing below them."""
-    scene = make_scene(name).draw(ROBOT, np.random.default_rng(0))
-    world = make_world(PhysicsParams(), ROBOT, scene)
-    place_at_start(world, scene, GaitParams())
-    mujoco.mj_kinematics(world.model, world.data)
-    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
-    assert monitor.look(world, 0.1, 0) is None
+    world, monitor = watched(name)
     world.data.xpos[world.places.links[-1], 2] -= lower
     assert monitor.look(world, 0.2, 0) == outcome
 
