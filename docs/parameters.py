@@ -20,7 +20,7 @@ Every physical number: its default with its unit, what it means and where it com
 begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the paper
 does not say).
 """
-ROBOTS = ("spec", "joints", "servos", "antenna")
+ROBOTS = ("spec", "joints", "servos", "antenna", "imu")
 """Modules of `antennate.robots` that describe robots."""
 HARDWARE = (
     robot_file.RobotFile,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import AntennateError, raised
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.gaits import GaitParams
-from antennate.params.scene import PhysicsParams
+from antennate.params.scene import GRAVITY, PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.scenes.scene import Scene, SceneInstance
@@ -130,7 +130,8 @@ class _Runs:
                 if tick == _RESET_AT and reset is not None:
                     checked.reset(np.array([reset]), offsets[[reset]])
                 t = offsets + period * tick
-                commands.append(_step(checked, AntennaFrame(t, reading, self._positions(t))))
+                frame = AntennaFrame(t, reading, self._positions(t), *self._motion(t))
+                commands.append(_step(checked, frame))
                 copies_of.append([getattr(commands[-1], part).copy() for part in self._parts])
                 for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
@@ -157,13 +158,22 @@ class _Runs:
         lags = np.arange(len(self._robot.joint_names))
         return 0.3 * np.sin(2.0 * math.pi * self._control.gait.frequency * t[:, None] - lags)
 
+    def _motion(self, t: Floats) -> tuple[Floats, Floats]:
+        """What an inertial sensor feels at the time of each row, shapes (rows, 3) or (rows, 0).
+
+        A head that turns to and fro and stays level.
+        """
+        if not self._robot.has_imu:
+            return np.zeros((len(t), 0)), np.zeros((len(t), 0))
+        turning = np.sin(2.0 * math.pi * self._control.gait.frequency * t[:, None])
+        return turning * [0.0, 0.0, 1.0], np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
+
 
 def _step(checked: CheckedController, given: AntennaFrame) -> JointCommand:
-    parts = (given.t, given.counts, given.positions)
-    frame = AntennaFrame(*(part.copy() for part in parts))
+    frame = given.copy()
     command = checked.step(frame)
-    after = (frame.t, frame.counts, frame.positions)
-    same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(parts, after, strict=True))
+    pairs = [(getattr(given, part.name), getattr(frame, part.name)) for part in fields(given)]
+    same = all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
     _expect(same, "a frame that is left as it is", "other values in it after a step")
     for row, fault in checked.faults.items():
         raise AssertionError(f"{fault} in row {row}")

@@ -6,7 +6,7 @@ Arrays carry a leading batch axis of B robots; B is 1 for a single one.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Protocol
 
@@ -50,7 +50,7 @@ class Maneuver(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class AntennaFrame:
-    """What a robot feels: one reading of both antennae, and where its joints are.
+    """What a robot feels: one reading of both antennae, its joints, and how its head moves.
 
     Attributes:
         t: Time at which the sensors were sampled [s], shape (B,).
@@ -59,11 +59,22 @@ class AntennaFrame:
             robot's joints, legs unwrapped; NaN where one did not answer. Shape (B, 0) or (0, 0)
             where a robot cannot tell any. A bus tells them after its goals: they are those of the
             tick before.
+        angular_velocity: Of the head [rad/s], shape (B, 3), about its axes: x forward, y to the
+            left, z up (REP 103). NaN where a sample is missing. Shape (B, 0) or (0, 0) where a
+            robot has no inertial sensor.
+        linear_acceleration: Specific force on the head [m/s²] along the same axes, with the same
+            shapes: at rest the acceleration of gravity upwards, as in ROS' sensor_msgs/Imu.
     """
 
     t: Floats
     counts: Floats
     positions: Floats = field(default_factory=lambda: _EMPTY)
+    angular_velocity: Floats = field(default_factory=lambda: _EMPTY)
+    linear_acceleration: Floats = field(default_factory=lambda: _EMPTY)
+
+    def copy(self) -> AntennaFrame:
+        """The same in arrays of its own."""
+        return AntennaFrame(*(getattr(self, part.name).copy() for part in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from antennate.params.control import (
 )
 from antennate.params.gaits import LiftParams
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.imu import ImuParams
 from antennate.robots.joints import BaseParams, ElevationParams
 from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
@@ -52,6 +53,10 @@ SIMULATION_ALONE = (
             "pitch.stiffness",
             "elevation.mass",
             "legs.reach",
+            "imu.gyro_noise",
+            "imu.gyro_bias",
+            "imu.accel_noise",
+            "imu.accel_bias",
         )
     ),
     *paths_of(ServosParams, "robot.servos"),
@@ -82,6 +87,9 @@ def unused(robot: RobotSpec) -> dict[str, str]:
         names = (name for name in ElevationParams.model_fields if name != "kind")
         paths = (f"robot.elevation.{name}" for name in names)
         reasons |= dict.fromkeys(paths, "the antennae of the robot have no vertical joints")
+    if not robot.has_imu:
+        paths = (f"robot.imu.{name}" for name in ImuParams.model_fields if name != "kind")
+        reasons |= dict.fromkeys(paths, "the robot has no inertial sensor")
     if not robot.antenna_count:
         bases = (f"robot.antennae.{name}" for name in BaseParams.model_fields if name != "kind")
         paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))

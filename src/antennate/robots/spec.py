@@ -20,6 +20,7 @@ from antennate.messages import nearest, shown
 from antennate.params.base import Params, number, read_file
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
+from antennate.robots.imu import ImuParams
 from antennate.robots.joints import (
     STRAIGHT,
     BaseParams,
@@ -93,6 +94,7 @@ class RobotSpec(Params):
     elevation: ElevationParams = ElevationParams()
     servos: ServosParams = ServosParams()
     antenna: AntennaSpec = AntennaSpec()
+    imu: ImuParams = ImuParams()
 
     @classmethod
     def named(cls, text: str | Path, folder: Path = Path()) -> Self:
@@ -144,6 +146,11 @@ class RobotSpec(Params):
     def elevation_count(self) -> int:
         """Number of joints that raise and lower the antennae, 0 or 2."""
         return self.antenna_count if self.elevation.kind == "pair" else 0
+
+    @property
+    def has_imu(self) -> bool:
+        """Whether the antenna board carries an inertial sensor."""
+        return self.imu.kind == "head"
 
     @property
     def hip(self) -> float:
@@ -336,6 +343,11 @@ class RobotSpec(Params):
         if doubled := sorted({i for i in ids if ids.count(i) > 1}):
             raise ValueError(
                 f"ids: expected each once, found {', '.join(map(str, doubled))} more than once"
+            )
+        if self.has_imu and not self.antenna_count:
+            raise ValueError(
+                "imu.kind: expected none for a robot without antennae, on whose board it is, "
+                f"found {self.imu.kind}"
             )
         _check_mass(self)
         if self.legs.reach is not None and self.hip < 0:

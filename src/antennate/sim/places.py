@@ -27,6 +27,7 @@ class Places:
 
     Attributes:
         root: First coordinate of the head's free joint.
+        root_speed: First degree of freedom of it.
         yaw, legs: Coordinates of these joints, shape (Y,) and (2 L,).
         hinges: Coordinates of the hinges under the flex sensors, shape (2, n).
         bent: Coordinates of all hinges of the antennae, one antenna after the other, shape (n,).
@@ -49,6 +50,7 @@ class Places:
         bent = coordinates([p + h for p in prefixes for h in robot.antenna.hinge_names])
         names = list(robot.joint_names)
         self.root: int = model.joint(prefix + "root").qposadr[0]
+        self.root_speed: int = model.joint(prefix + "root").dofadr[0]
         self.yaw: Ints = coordinates(list(robot.yaw_names))
         self.legs: Ints = coordinates(list(robot.leg_names))
         sensed = robot.antenna.sensed_hinges

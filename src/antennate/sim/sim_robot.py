@@ -7,121 +7,18 @@ antennae read NaN, which the controller takes for UNKNOWN. Rows never influence 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
 from antennate.params.scene import VariationParams
+from antennate.robots.imu import AXES, measured
 from antennate.robots.spec import RobotSpec
-from antennate.sim.engine import mujoco
-from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, SPEED_LIMIT
+from antennate.sim.imu import Imu, bias_of, noise_of
+from antennate.sim.states import States
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, joint_angles
-
-_STATE = int(
-    mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
-)
-"""What is copied of each world: its time, its coordinates, its speeds, in this order."""
-
-
-class _State(NamedTuple):
-    """A world, where its state is copied, and how often its engine has warned."""
-
-    world: World
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    copy: Floats
-    warnings: Ints
-    no_warning: bytes
-
-
-class States:
-    """Time, coordinates and speeds of worlds in rows, as they were when one looked last.
-
-    The last column is 0, for what an empty row does not have.
-
-    Args:
-        batch: Number of rows B.
-        hinges: Number n of hinges under each flex sensor.
-        joints: Number of driven joints.
-    """
-
-    def __init__(self, batch: int, hinges: int, joints: int) -> None:
-        self._rows: dict[int, _State] = {}
-        self._all: Floats = np.zeros((batch, 1))
-        self._scale: Floats = np.zeros((batch, 1))
-        self._heights: Ints = np.zeros(batch, np.int64)
-        self._hinges: Ints = np.zeros((batch, 2, hinges), np.int64)
-        self._joints: Ints = np.zeros((batch, joints), np.int64)
-
-    def put(self, row: int, world: World) -> None:
-        """Put a world into a row."""
-        size = mujoco.mj_stateSize(world.model, _STATE)
-        if size < self._all.shape[1]:
-            self._place(row, world, size)
-            return
-        worlds = {each: held.world for each, held in self._rows.items()} | {row: world}
-        self._all = np.zeros((len(self._all), size + 1))
-        self._scale = np.zeros_like(self._all)
-        for each in range(len(self._all)):
-            self.remove(each)
-        for each, other in worlds.items():
-            self._place(each, other, mujoco.mj_stateSize(other.model, _STATE))
-
-    def _place(self, row: int, world: World, size: int) -> None:
-        """Put a world whose state has this size into a row; there is room for it."""
-        model, places = world.model, world.places
-        self.remove(row)
-        self._scale[row, 1 + model.nq : size] = 1.0 / SPEED_LIMIT
-        coordinates = self._scale[row, 1 : 1 + model.nq]
-        coordinates[places.root : places.root + 2] = 1.0 / DISTANCE_LIMIT
-        coordinates[places.root + 2] = 1.0 / world.height_limit
-        coordinates[places.bounded] = 1.0 / ANGLE_LIMIT
-        first = row * self._all.shape[1] + 1
-        self._heights[row] = first + places.root + 2
-        self._hinges[row] = first + places.hinges
-        self._joints[row] = first + places.driven
-        warnings, copy = world.data.warning.number, self._all[row, :size]
-        self._rows[row] = _State(world, model, world.data, copy, warnings, bytes(warnings.nbytes))
-
-    def remove(self, row: int) -> None:
-        """Empty a row."""
-        self._rows.pop(row, None)
-        self._all[row] = self._scale[row] = 0.0
-        last = (row + 1) * self._all.shape[1] - 1
-        self._heights[row] = self._hinges[row] = self._joints[row] = last
-
-    def look(self) -> list[int]:
-        """Copy all states; rows that may be unsound, or whose time has not gone on since."""
-        before, suspects = self._all[:, 0].copy(), list[int]()
-        for row, (_, model, data, copy, warnings, no_warning) in self._rows.items():
-            mujoco.mj_getState(model, data, copy, _STATE)
-            if warnings.tobytes() != no_warning:
-                suspects.append(row)
-        with np.errstate(invalid="ignore", over="ignore"):
-            shares = self._all * self._scale
-            sound = np.einsum("ij,ij->i", shares, shares) < 1.0  # none is beyond their norm
-        sound &= self._all.take(self._heights) > 0.0
-        sound &= self._all[:, 0] > before
-        return suspects if sound.all() else [*suspects, *np.flatnonzero(~sound).tolist()]
-
-    @property
-    def times(self) -> Floats:
-        """Time of each world, 0 in an empty row [s], shape (B,)."""
-        return self._all[:, 0]
-
-    @property
-    def hinges(self) -> Floats:
-        """Angles of the hinges under the flex sensors [rad], shape (B, 2, n)."""
-        return self._all.take(self._hinges)
-
-    @property
-    def joints(self) -> Floats:
-        """Angles of all driven joints, 0 in an empty row [rad], shape (B, joints)."""
-        return self._all.take(self._joints)
-
 
 NOISE_BLOCK = 1024
 """Ticks whose noise is drawn at once."""
@@ -137,6 +34,7 @@ class Disturbance:
         slip_ticks: Ticks from one friction of the legs to the next.
         bends: 1 for each flex sensor that bends with its antenna, 0 for one that stays straight,
             shape (2,).
+        imu_bias: Zeros of the inertial sensor [rad/s], then [m/s²], shape (6,); empty without one.
     """
 
     def __init__(
@@ -156,6 +54,12 @@ class Disturbance:
             random = variation.broken == "random"
             side = int(rng.integers(2)) if random else ("left", "right").index(variation.broken)
             self.bends[side] = 0.0
+        self._period = period
+        self._imu_rng = rng.spawn(1)[0] if robot.has_imu else None  # draws nothing from `rng`
+        self._imu_noise = np.zeros((0, 2 * AXES))
+        self.imu_bias: Floats = np.zeros(0)
+        if self._imu_rng is not None:
+            self.imu_bias = bias_of(robot.imu, self._imu_rng)
 
     def noise(self, tick: int) -> Floats:
         """Reading noise of one tick [counts], shape (2,)."""
@@ -168,6 +72,20 @@ class Disturbance:
         """Reading noise of the next NOISE_BLOCK ticks [counts], shape (NOISE_BLOCK, 2)."""
         noise = reading_noise(self._robot.antenna.sensor, self._rng, (NOISE_BLOCK, 2))
         return self._variation.reading_noise * noise
+
+    def imu_error(self, tick: int) -> Floats:
+        """Bias and noise of the inertial sensor in one tick [rad/s], then [m/s²], shape (6,)."""
+        at = tick % NOISE_BLOCK
+        if at == 0 or not len(self._imu_noise):
+            self._imu_noise = self.imu_error_block()
+        return self._imu_noise[at]
+
+    def imu_error_block(self) -> Floats:
+        """The same of the next NOISE_BLOCK ticks, shape (NOISE_BLOCK, 6)."""
+        if self._imu_rng is None:
+            return np.zeros((NOISE_BLOCK, 2 * AXES))
+        noise = noise_of(self._robot.imu, self._imu_rng, NOISE_BLOCK, self._period)
+        return self.imu_bias + noise
 
     def leg_friction(self, tick: int) -> Floats | None:
         """New friction of all legs where this tick draws one, else None."""
@@ -222,6 +140,10 @@ class SimRobot:
         self._bias: Floats = np.zeros((batch, robot.yaw_count))
         self._bends: Floats = np.ones((batch, 2))
         self._noise: Floats = np.zeros((batch, NOISE_BLOCK, 2))
+        self._imu_params = robot.imu
+        self._imu = Imu(robot.imu, batch) if robot.has_imu else None
+        blocks = NOISE_BLOCK if robot.has_imu else 0
+        self._imu_error: Floats = np.zeros((batch, blocks, 2 * AXES))
         self._every: Ints = np.arange(batch)
         self._empty, self._missing = np.ones((2, batch), dtype=bool)
         self._moved: set[int] = set()
@@ -237,15 +159,20 @@ class SimRobot:
         self._rows[row] = _Row(world, chance)
         self._states.put(row, world)
         self._bias[row], self._bends[row] = chance.joint_bias, chance.bends
-        self._sensors.reset(row)
+        self._reset_sensors(row)
         self._empty[row], self._missing[row] = False, not world.robot.antenna_count
 
     def put_back(self, row: int, state: Floats) -> None:
-        """Let the world of a row go on from a state of its own; its flex sensors forget."""
+        """Let the world of a row go on from a state of its own; its sensors forget."""
         if self._moved:
             self._look()
         self._rows[row].world.restore(state)
+        self._reset_sensors(row)
+
+    def _reset_sensors(self, row: int) -> None:
         self._sensors.reset(row)
+        if self._imu is not None:
+            self._imu.reset(row)
 
     def unload(self, row: int) -> None:
         """Empty a row."""
@@ -277,7 +204,7 @@ class SimRobot:
         return self._ticks * self._period
 
     def read(self, rows: Bools | None = None) -> AntennaFrame:
-        """Sample both sensors of every row, or of these alone, shape (B,).
+        """Sample the sensors of every row, or of these alone, shape (B,).
 
         The sensors of other rows do not remember it; the frame holds no reading of them.
         """
@@ -287,6 +214,8 @@ class SimRobot:
             at[i] = row.tick % NOISE_BLOCK
             if not at[i] and (rows is None or rows[i]):
                 self._noise[i] = row.chance.noise_block()
+                if self._imu is not None:
+                    self._imu_error[i] = row.chance.imu_error_block()
         noise = self._noise[self._every, at]
         flex = self._states.hinges.sum(axis=2) * self._bends
         counts = self._sensors.step(flex, noise, rows)
@@ -294,7 +223,13 @@ class SimRobot:
         joints = self._states.joints
         joints[:, : self._yaws] -= self._bias  # a servo reports angles about its own zero
         joints[self._empty] = np.nan
-        return AntennaFrame(np.where(self._empty, np.nan, self._states.times), counts, joints)
+        t = np.where(self._empty, np.nan, self._states.times)
+        if self._imu is None:
+            return AntennaFrame(t, counts, joints)
+        error = self._imu_error[self._every, at]
+        felt = self._imu.step(self._states.times, self._states.heads, error, rows)
+        felt[self._missing] = np.nan
+        return AntennaFrame(t, counts, joints, *measured(self._imu_params, felt))
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""

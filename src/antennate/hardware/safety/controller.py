@@ -179,8 +179,7 @@ class SupervisedController:
             return self._sound_command
         self.sound = False
         try:
-            own = AntennaFrame(frame.t.copy(), frame.counts.copy(), frame.positions.copy())
-            command = self.controller.step(own)  # which it may change
+            command = self.controller.step(frame.copy())  # which it may change
             self.decision = decision_of(self.controller)
         except KeyboardInterrupt:
             raise

@@ -13,9 +13,11 @@ import numpy as np
 
 from antennate.antenna.sensor import SensorChain
 from antennate.errors import SceneError, SimulationError
+from antennate.robots.imu import AXES, measured
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
-from antennate.sim.places import broken, sound
+from antennate.sim.imu import STATE, Imu
+from antennate.sim.places import Places, broken, sound
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot
@@ -183,6 +185,13 @@ class WarpRow:
         mujoco.mj_kinematics(self.world.model, data)
 
 
+def _head(positions: Floats, speeds: Floats, places: Places) -> Floats:
+    """Attitude and velocity of heads as `imu.STATE` says, shape (..., 10)."""
+    attitude = positions[..., places.root + 3 : places.root + 7]
+    velocity = speeds[..., places.root_speed : places.root_speed + 6]
+    return np.concatenate([attitude, velocity], axis=-1)
+
+
 def _standing(polygons: list[Floats]) -> list[Floats]:
     return [polygon for polygon in polygons if not is_parked(polygon)]
 
@@ -222,6 +231,9 @@ class WarpRobot:
         self._rows = dict[int, WarpRow]()
         self._failures = dict[int, SimulationError]()
         self._new, self._ended = set[int](), set[int]()
+        self._imu_params = robot.imu
+        self._imu = Imu(robot.imu, batch) if robot.has_imu else None
+        self._heads: Floats = np.zeros((batch, STATE))
         self._missing = np.ones(batch, dtype=bool)
         self._noise: Floats = np.zeros((batch, 2))
         self._ticks = 0
@@ -253,8 +265,11 @@ class WarpRobot:
         self._failures.pop(row, None)
         self._new.add(row)
         self._sensors.reset(row)
+        if self._imu is not None:
+            self._imu.reset(row)
         self._missing[row] = not world.robot.antenna_count
         self.positions[row] = world.data.qpos
+        self._heads[row] = _head(world.data.qpos, world.data.qvel, world.places)
 
     def unload(self, row: int) -> None:
         """Empty a row."""
@@ -306,7 +321,14 @@ class WarpRobot:
                 joints[i, : self._yaws] -= held.chance.joint_bias
         counts = self._sensors.step(flex, self._noise)
         counts[self._missing] = np.nan
-        return AntennaFrame(t, counts, joints)
+        if self._imu is None:
+            return AntennaFrame(t, counts, joints)
+        errors = np.zeros((self._batch, 2 * AXES))
+        for i, row in self._rows.items():
+            errors[i] = row.chance.imu_error(row.ticks)
+        felt = self._imu.step(np.nan_to_num(t), self._heads, errors)
+        felt[self._missing] = np.nan
+        return AntennaFrame(t, counts, joints, *measured(self._imu_params, felt))
 
     def write(self, command: JointCommand) -> None:
         """Command every row's joints."""
@@ -365,6 +387,7 @@ class WarpRobot:
         positions, speeds = self.worlds.state()
         rows = list(moving)
         self.positions[rows] = positions[rows]
+        self._heads[rows] = _head(positions[rows], speeds[rows], moving[rows[0]].world.places)
         dropped = self.worlds.overflows()
         places = moving[rows[0]].world.places
         bounded = positions[:, places.bounded]
