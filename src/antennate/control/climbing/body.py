@@ -11,18 +11,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from antennate.control.gait import Gait
+from antennate.control.climbing.heading import Heading, direction, steer
+from antennate.control.gait import STEER, Gait
 from antennate.control.knowledge import EDGES
 from antennate.errors import ConfigError
 from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
 
 _STEEPEST = 0.8
 """Sine of the steepest slope of a link: 53 degrees (ramps over 50 fail)."""
 _MOST_SAG = 0.4
 """Most that a target is changed against its load [rad]."""
+_REST = 1e-9
+"""Change of a target in a tick under which a joint is told to stand [rad]."""
 
 
 def line(params: ClimbParams, robot: RobotSpec, u: Floats, rise: Floats | float) -> Floats:
@@ -78,6 +81,7 @@ class Body:
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
         self._params, self._robot, self._period = control.climb, robot, control.period
         self._level = _level(robot)
+        self._yaws, self._pitches = robot.places("yaw"), robot.places("pitch")
         self._gait = Gait(control.gait, robot, batch, control.period)
         self.phase: Floats = self._gait.phase
         self._gait.amplitude = np.full(batch, control.gait.amplitude)
@@ -93,6 +97,10 @@ class Body:
         self.held: Bools = np.zeros(batch, dtype=bool)
         self.still: Bools = np.zeros(batch, dtype=bool)
         self.measured: Floats = np.full((batch, robot.pitch_count), np.nan)
+        self._yaw: Floats = np.full((batch, robot.yaw_count), np.nan)
+        self.heading = Heading(control.climb.heading, batch, control.period)
+        self._usual_turn = control.gait.turn_offset
+        self._stands: Bools = np.zeros(batch, dtype=bool)
         self._sag: Floats = np.zeros((batch, robot.pitch_count))
         self._now: Floats = np.zeros((batch, robot.pitch_count + 2))
 
@@ -131,6 +139,8 @@ class Body:
         self._sag[rows], self.held[rows], self.still[rows] = 0.0, False, False
         self.rise[rows], self.measured[rows] = self._params.rise, np.nan
         self.elevation[rows] = self.sweep[rows] = 0.0
+        self._stands[rows], self._yaw[rows] = False, np.nan
+        self.heading.reset(rows)
 
     def begin(self, rows: Bools, rise: float | None = None) -> None:
         """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one.
@@ -165,13 +175,17 @@ class Body:
         self._amplitude += np.clip(wave - self._amplitude, -change, change)
         slow = np.logical_or.reduce(self.progress > -self._params.ahead, axis=1)
         self._gait.frequency = np.where(slow, self._slow, self._fast)
-        command = self._gait.step(maneuver, turn_offset)
+        size = self._usual_turn if turn_offset is None else turn_offset
+        command = self._gait.steer(maneuver, STEER[maneuver] * size + self._back(maneuver))
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod
         goals = np.column_stack([pitch, self.elevation, self.sweep])
         most = np.full(goals.shape[1], self._params.rate * self._period)
         moves = ~self.still[:, None]
-        self._now += np.clip(goals - self._now, -most, most) * moves
+        change = np.clip(goals - self._now, -most, most) * moves
+        self._now += change
+        rests = ~np.logical_or.reduce(abs(change[:, :-2]) > _REST, axis=1)
+        self._stands = rests & (maneuver == int(Maneuver.HOLD))
         self._carry(goals[:, :-2], moves)
         limit, most = self._robot.pitch.largest, self._robot.elevation.largest
         joints = np.clip(self._now[:, :-2] + self._sag, -limit, limit)
@@ -182,6 +196,26 @@ class Body:
             pitch=joints,
             elevation=np.repeat(lowered[:, None], 2, axis=1),
         )
+
+    def feel(self, frame: AntennaFrame) -> None:
+        """Take where the joints are and how the head turns, where the robot can tell."""
+        if frame.positions.size:
+            self._yaw = frame.positions[:, self._yaws]
+            self.measured = frame.positions[:, self._pitches]
+        along = direction(np.nan_to_num(self._yaw), np.nan_to_num(self.measured))
+        self.heading.step(frame, along, self._stands)
+
+    def _back(self, maneuver: Ints) -> Floats:
+        """Yaw offset that keeps the heading of rows that climb forward [rad], shape (B,).
+
+        It is the heading that they had when they last steered, or when the plan began.
+        """
+        forward = maneuver == int(Maneuver.FORWARD)
+        keep = self.climbs & (forward | (maneuver == int(Maneuver.HOLD)))
+        self.heading.mark(keep)
+        self.heading.forget(~keep)
+        turned = np.where(forward, self.heading.turned, 0.0)
+        return steer(self._params.heading, turned)
 
     def _carry(self, goals: Floats, moves: Bools) -> None:
         """Integrate what the load takes off the pitch joints of held rows; let go of the others."""

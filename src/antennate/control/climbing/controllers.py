@@ -59,12 +59,10 @@ class ClimbingController(RuleController):
         self.body = Body(control, robot, batch)
         rule = make(control, robot, batch, self.body)
         super().__init__(rule, control, robot, batch, self.body)
-        self._pitch = robot.places("pitch")
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """As of a `Controller`."""
-        if frame.positions.size:
-            self.body.measured = frame.positions[:, self._pitch]
+        self.body.feel(frame)
         return super().step(frame)
 
 

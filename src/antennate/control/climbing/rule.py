@@ -192,9 +192,12 @@ class ClimbRule:
         self._to(row, Stage.LIFT)
 
     def _lift(self, row: int, flex: Floats, steering: int) -> int:
-        """Stand until the head is raised, then the antennae level before it."""
+        """Stand until the head is raised, then the antennae level before it.
+
+        They are spread: one that is pushed along its axis bends the other way, which is no touch.
+        """
         late = self._since[row] > 0.5 * self._p.lift_time
-        self._pose(row, self._feel.check if late else self._feel.highest, self._feel.inwards)
+        self._pose(row, self._feel.check if late else self._feel.highest)
         if self._since[row] > self._p.lift_time:
             self._to(row, Stage.CHECK)
         return Maneuver.HOLD
