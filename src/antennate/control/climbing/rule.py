@@ -197,7 +197,7 @@ class ClimbRule:
         They are spread: one that is pushed along its axis bends the other way, which is no touch.
         """
         late = self._since[row] > 0.5 * self._p.lift_time
-        self._pose(row, self._feel.check if late else self._feel.highest)
+        self._pose(row, self._feel.check if late else self._feel.highest, self._feel.check_sweep)
         if self._since[row] > self._p.lift_time:
             self._to(row, Stage.CHECK)
         return Maneuver.HOLD
@@ -206,7 +206,7 @@ class ClimbRule:
         """Walk on with the head raised: what its level antennae touch is higher than any step."""
         if self._since[row] > self._p.approach_time:
             self._body.advance(self._one(row))
-        if self._felt[row] > self._feel.touch_time:
+        if self._felt[row] > self._feel.check_time:
             self._wall(row)
         elif not (self._body.progress[row] < -self._p.before).any():
             self._to(row, Stage.WALK)
