@@ -11,9 +11,9 @@ PIN_RIGHT = 35
 PIN_BUTTON = 0
 """GPIO of the button that stops the program (BOOT on most boards)."""
 
-PIN_SDA = None
+PIN_SDA: int | None = None
 """GPIO of the data line of an inertial sensor, LSM6DSOX; None: there is none."""
-PIN_SCL = None
+PIN_SCL: int | None = None
 """GPIO of its clock line."""
 IMU_ADDRESS = 0x6A
 """Its address on I2C; 0x6B if its pin SA0 is high."""

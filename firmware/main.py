@@ -97,13 +97,17 @@ class Sampler:
                 self._counts[2 * slot + 1],
                 self._flags[slot],
                 self.drops,
-                tuple(self._motion[6 * slot : 6 * slot + 6]),
+                self._felt(slot),
                 self._misses[slot],
             )
             if self.head - seq <= SLOTS:  # else the callback has overwritten the slot meanwhile
                 self.tail = seq + 1
                 return True
         return False
+
+    def _felt(self, slot):
+        """Readings of the inertial sensor in a slot."""
+        return tuple(self._motion[6 * slot : 6 * slot + 6]) if self._motion else ()
 
     def put_back(self):
         """The sample encoded last could not be sent: it waits again."""
@@ -168,21 +172,31 @@ def channel(pin):
     return machine.ADC(machine.Pin(pin), atten=machine.ADC.ATTN_11DB)
 
 
+def imu_settings():
+    """Pins, address and axes of the inertial sensor; nothing if the settings name none."""
+    sda, scl = config.PIN_SDA, config.PIN_SCL
+    if sda is None and scl is None:
+        return ()
+    if sda is None or scl is None:
+        raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, or neither, found one")
+    return (sda, scl, config.IMU_ADDRESS) + config.IMU_AXES  # noqa: RUF005  (MicroPython)
+
+
 def inertial():
     """The inertial sensor that the settings name, None for none."""
-    if config.PIN_SDA is None or config.PIN_SCL is None:
+    settings = imu_settings()
+    if not settings:
         return None
     import imu  # a board without one needs no copy of it
 
-    return imu.Imu(config.PIN_SDA, config.PIN_SCL, config.IMU_ADDRESS, config.IMU_AXES, config.RATE)
+    return imu.Imu(*settings[:3], settings[3:], config.RATE)
 
 
 def greeting(boot_id):
     """Frame that says who speaks, since when and with which settings."""
-    imu = ()
-    if config.PIN_SDA is not None and config.PIN_SCL is not None:
-        imu = (config.PIN_SDA, config.PIN_SCL, config.IMU_ADDRESS) + tuple(config.IMU_AXES)
-    settings = frame.config_hash(config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT, imu)
+    settings = frame.config_hash(
+        config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT, imu_settings()
+    )
     return frame.encode_hello(boot_id, reset_reason(), settings, machine.unique_id(), config.RATE)
 
 
