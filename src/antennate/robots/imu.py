@@ -96,6 +96,12 @@ class ImuParams(Params):
         return np.repeat([self.gyro_bias, self.accel_bias], AXES)
 
 
+def in_counts(params: ImuParams, angular_velocity: Floats, linear_acceleration: Floats) -> Floats:
+    """Readings of these measurements: what `measured` takes [counts], NaN for NaN, shape (B, 6)."""
+    values = np.concatenate([angular_velocity, linear_acceleration], axis=1)
+    return np.rint(values / params.steps)
+
+
 def measured(params: ImuParams, counts: Floats) -> tuple[Floats, Floats]:
     """What readings mean.
 

@@ -166,13 +166,13 @@ class BoardReader:
         used: Usable samples that the last reading found.
         refused: Samples it found that may not be used.
         imu: Readings of the inertial sensor [counts] in the same sample, gyroscopes first,
-            shape (6,); NaN where there is none, or where the sample is missing or too old.
+            shape (6,), NaN where it did not answer; None where the sample is missing or too old.
     """
 
     def __init__(self, board: Board, clock: Clock) -> None:
         self._board, self._clock = board, clock
         self.used = self.refused = 0
-        self.imu: Floats = np.full(6, math.nan)
+        self.imu: Floats | None = None
         self._stamp: Timed | None = None
         self._stamp_now: float | None = None
         self._stamp_t = self._t = 0.0
@@ -188,7 +188,7 @@ class BoardReader:
         self.refused = sum(states.values()) - before - self.used
         timed = self._board.newest(now)
         self._t = max(self._t, self._time(timed, now))
-        self.imu = imu_counts(() if timed is None else timed.sample.imu)
+        self.imu = None if timed is None else imu_counts(timed.sample.imu)
         if timed is None:
             return self._t, np.full((1, 2), math.nan)
         return self._t, np.array([[timed.sample.left, timed.sample.right]], float)
