@@ -85,10 +85,10 @@ class ImuDiagnosis:
         self.finding = (
             ImuFinding.MISSING
             if missing
-            else ImuFinding.STUCK
-            if self._equal >= STUCK
             else ImuFinding.RAILED
             if self._at_end.max() >= RAILED
+            else ImuFinding.STUCK
+            if self._equal >= STUCK
             else ImuFinding.OK
         )
 
