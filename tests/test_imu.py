@@ -7,9 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from antennate.control.policy.contract import contract_of, require_match
+from antennate.control.policy.interface import PolicyInterface
 from antennate.errors import ConfigError
+from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.imu import ImuParams, measured
+from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.imu import Imu, bias_of, noise_of
@@ -218,3 +222,24 @@ def test_what_16_bits_cannot_hold_is_refused(changes: dict[str, float], words: s
 def test_a_robot_without_antennae_has_no_board_for_it() -> None:
     with pytest.raises(ConfigError, match=r"imu\.kind: expected none for a robot without antennae"):
         RobotSpec(antennae={"kind": "none"}, imu={"kind": "head"})  # pyright: ignore[reportArgumentType]
+
+
+def test_the_parts_of_a_robot_with_one_have_it() -> None:
+    parts = {part.item for part in bill(ROBOT)} - {part.item for part in bill(PLAIN)}
+    assert parts == {"breakout of an LSM6DSOX"}
+
+
+def test_a_robot_without_one_is_written_as_before_there_were_any() -> None:
+    assert "imu" not in RobotSpec().model_dump(mode="json")
+    assert "imu" not in RobotSpec().model_dump_json()
+    assert RobotSpec.model_validate(ROBOT.model_dump()) == ROBOT
+    changed = RobotSpec(imu={"gyro_range": 5.0})  # pyright: ignore[reportArgumentType]
+    assert RobotSpec.model_validate_json(changed.model_dump_json()) == changed
+
+
+def test_policies_do_not_depend_on_a_sensor_that_they_do_not_observe() -> None:
+    interface, control = PolicyInterface(), ControlParams()
+    made, other = (contract_of(interface, control, robot) for robot in (PLAIN, ROBOT))
+    assert made.robot_hash == other.robot_hash
+    assert "imu" not in made.robot
+    require_match(made, control, ROBOT, "a file")
