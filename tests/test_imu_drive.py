@@ -198,37 +198,6 @@ def test_a_board_without_one_is_named() -> None:
     assert report.worst == State.DEGRADED
 
 
-def test_readings_of_a_silent_board_are_its_own_fault_alone() -> None:
-    sensor = ImuDiagnosis(ROBOT.imu)
-    sensor.step(0.0, np.zeros(6))
-    for tick in range(1, 50):
-        sensor.step(0.01 * tick, None)
-    assert np.isnan(sensor.angular_velocity).all()
-    assert sensor.fault == ""
-    assert sensor.counted[ImuFinding.MISSING] == 0
-
-
-def test_a_knock_beyond_the_range_is_no_fault_and_single_misses_are_not_named() -> None:
-    sensor, rng = ImuDiagnosis(ROBOT.imu), np.random.default_rng(5)
-    for tick in range(60):
-        counts = rng.integers(-50, 50, 6).astype(float)
-        if tick % 20 < 9:
-            counts[3] = ROBOT.imu.most[3]
-        if tick % 20 == 15:
-            counts[:] = np.nan
-        sensor.step(0.01 * tick, counts)
-        assert np.isnan(sensor.angular_velocity).all() == (tick % 20 == 15)
-        assert sensor.fault == ""
-    assert sensor.counted == {
-        ImuFinding.OK: 57,
-        ImuFinding.MISSING: 3,
-        ImuFinding.STUCK: 0,
-        ImuFinding.RAILED: 0,
-    }
-    sensor.step(0.59, np.zeros(6))  # a sample that was there before
-    assert sum(sensor.counted.values()) == 60
-
-
 def replayed(log: Path) -> Any:
     """A log decided upon anew by the same controller."""
     with LogReader(log) as reader:
