@@ -10,6 +10,7 @@ import pytest
 from antennate.control.policy.contract import contract_of, require_match
 from antennate.control.policy.interface import PolicyInterface
 from antennate.errors import ConfigError
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.imu import ImuParams, measured
@@ -18,6 +19,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.imu import Imu, bias_of, noise_of
 from antennate.sim.sim_robot import Disturbance, SimRobot
+from antennate.sim.trial import draw_trial, scene_of
 from antennate.sim.world import PREFIX, World, compile_world, world_spec
 from antennate.types import Floats, JointCommand
 
@@ -94,6 +96,14 @@ def test_a_head_on_a_circle_feels_the_centripetal_acceleration() -> None:
         rate, force = felt(sensor, PERIOD * tick, states(turned((0, 0, 1), angle), velocity))
     np.testing.assert_allclose(rate, [0.0, 0.0, v / r], atol=SENSOR.gyro_step)
     np.testing.assert_allclose(force, [0.0, v * v / r, G], atol=2 * SENSOR.accel_step)
+
+
+def test_gravity_is_felt_in_the_mean_attitude_of_a_sample() -> None:
+    """A head that pitches through the level: forward and back cancel out."""
+    sensor = Imu(SENSOR, 1)
+    felt(sensor, 0.0, states(turned((0, 1, 0), -0.05)))
+    _, force = felt(sensor, PERIOD, states(turned((0, 1, 0), 0.05)))
+    np.testing.assert_allclose(force, [0.0, 0.0, G], atol=SENSOR.accel_step)
 
 
 def test_readings_end_at_the_range() -> None:
@@ -185,6 +195,32 @@ def test_a_standing_robot_feels_gravity() -> None:
     frames = walk(robot_with(ROBOT, 2), ROBOT, 1)
     np.testing.assert_allclose(frames[0][:, -6:-3], 0.0, atol=SENSOR.gyro_step)
     np.testing.assert_allclose(frames[0][:, -3:], [[0.0, 0.0, G]] * 2, atol=SENSOR.accel_step)
+
+
+def test_a_robot_among_things_that_move_feels_its_own_head() -> None:
+    """The sensor of a batch, fed by the engine's state of the joint that is named so."""
+    config = TunnelConfig(robot=ROBOT)
+    start = draw_trial(config, scene_of(config), 0, config.control.gait, PERIOD)
+    model, data = start.world.model, start.world.data
+    root = model.joint(PREFIX + "root")
+    assert root.dofadr[0] > 0  # cylinders come before the robot
+    robot, sensor = SimRobot(1, ROBOT, PERIOD, config.physics.timestep), Imu(SENSOR, 1)
+    robot.load(0, start.world, start.chance)
+    turns = list[Floats]()
+    for tick in range(30):
+        frame = robot.read()
+        attitude = data.qpos[root.qposadr[0] + 3 :][:4]
+        state = np.concatenate([attitude, data.qvel[root.dofadr[0] :][:6]])[None]
+        rate, force = felt(sensor, data.time, state)
+        np.testing.assert_array_equal(frame.angular_velocity[0], rate)
+        np.testing.assert_array_equal(frame.linear_acceleration[0], force)
+        turns.append(rate)
+        shapes = ROBOT.command_shapes().items()
+        command = {name: np.zeros(shape) for name, shape in shapes}
+        command["yaw"][:] = 0.3 * math.sin(4.0 * PERIOD * tick)
+        robot.write(JointCommand(**command))
+        robot.sleep_until(PERIOD * (tick + 1))
+    assert np.array(turns)[:, 2].std() > 0.02
 
 
 def test_the_sensor_changes_nothing_else() -> None:
