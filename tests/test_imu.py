@@ -114,8 +114,8 @@ def test_readings_end_at_the_range() -> None:
     assert force[0] == pytest.approx(7.995 * G, abs=SENSOR.accel_step)
 
 
-def test_noise_has_the_datasheets_density() -> None:
-    """LSM6DSOX at 100 Hz: 3.8 mdeg/s/√Hz and 80 µg/√Hz over 50 Hz."""
+def test_noise_has_the_density_that_is_given() -> None:
+    """At 100 Hz: 3.8 mdeg/s/√Hz and 80 µg/√Hz over 50 Hz."""
     noise = noise_of(ImuParams(), np.random.default_rng(1), 40_000, 0.01).std(axis=0)
     expected = [math.radians(3.8e-3) * math.sqrt(50.0)] * 3 + [80e-6 * G * math.sqrt(50.0)] * 3
     np.testing.assert_allclose(noise, expected, rtol=0.02)

@@ -51,7 +51,7 @@ def test_its_readings_come_along_the_axes_of_the_head(inertial: Any) -> None:
     assert [found.seq for found in samples] == list(range(len(samples)))
     settings = struct.pack("<HHBBBBBbbb", 100, 15, 34, 35, 21, 22, 0x6A, *AXES)
     assert greetings[0].config_hash == zlib.crc32(settings)
-    # DS12814: BDU and IF_INC; 104 Hz and 8 g; 104 Hz and 1000 deg/s
+    # lsm6dsox_reg.h: BDU and IF_INC; 104 Hz and 8 g; 104 Hz and 1000 deg/s
     assert bus.registers == {0x12: 0x44, 0x10: 0x4C, 0x11: 0x48}
 
 
