@@ -1,7 +1,7 @@
 """Reads ST's LSM6DSOX, three gyroscopes and three accelerometers, over I2C.
 
-Registers and their bits are those of ST's own driver, lsm6dsox_reg.h. It measures up to 1000 deg/s and 8 g, as
-the host's `robot.imu` says by default. A board without one needs no copy of this file.
+Registers and their bits are those of ST's own driver, lsm6dsox_reg.h. It measures up to 1000 deg/s
+and 8 g, as the host's `robot.imu` says by default. A board without one needs no copy of this file.
 """
 
 import struct
