@@ -11,6 +11,15 @@ PIN_RIGHT = 35
 PIN_BUTTON = 0
 """GPIO of the button that stops the program (BOOT on most boards)."""
 
+PIN_SDA: int | None = None
+"""GPIO of the data line of an inertial sensor, LSM6DSOX; None: there is none."""
+PIN_SCL: int | None = None
+"""GPIO of its clock line."""
+IMU_ADDRESS = 0x6A
+"""Its address on I2C; 0x6B if its pin SA0 is high."""
+IMU_AXES = (1, 2, 3)
+"""Which of its axes (1 is x) point forward, to the left and up; negative: the other way."""
+
 WIFI = ""
 """Name of the network to join; empty: frames go over USB, and no radio is switched on."""
 PASSWORD = ""

@@ -29,9 +29,10 @@ class Sampler:
     The callback writes only `head` and slots, the loop only `tail` and `drops`, so neither waits.
     """
 
-    def __init__(self, left, right):
+    def __init__(self, left, right, imu=None):
         self._left = left
         self._right = right
+        self._imu = imu
         self._bursts = (
             array.array("H", [0] * config.BURST),
             array.array("H", [0] * config.BURST),
@@ -39,11 +40,18 @@ class Sampler:
         self._ticks = array.array("I", [0] * SLOTS)
         self._counts = array.array("H", [0] * (2 * SLOTS))
         self._flags = bytearray(SLOTS)
+        self._motion = array.array("h", [0] * (6 * SLOTS if imu else 0))
+        self._misses = array.array("I", [0] * SLOTS)
         self._longest = 1500000 // config.RATE
         self._last = None
         self.head = 0
         self.tail = 0
         self.drops = 0
+
+    @property
+    def moves(self):
+        """Whether samples hold readings of an inertial sensor."""
+        return self._imu is not None
 
     def sample(self, _timer):
         """Read both antennae in turn; the time is that of the first reading."""
@@ -55,6 +63,9 @@ class Sampler:
         left = lefts[config.BURST // 2]
         right = rights[config.BURST // 2]
         slot = self.head % SLOTS
+        if self._imu is not None:
+            self._imu.read_into(self._motion, 6 * slot)
+            self._misses[slot] = self._imu.misses
         self._ticks[slot] = ticks
         self._counts[2 * slot] = left
         self._counts[2 * slot + 1] = right
@@ -86,11 +97,17 @@ class Sampler:
                 self._counts[2 * slot + 1],
                 self._flags[slot],
                 self.drops,
+                self._felt(slot),
+                self._misses[slot],
             )
             if self.head - seq <= SLOTS:  # else the callback has overwritten the slot meanwhile
                 self.tail = seq + 1
                 return True
         return False
+
+    def _felt(self, slot):
+        """Readings of the inertial sensor in a slot."""
+        return tuple(self._motion[6 * slot : 6 * slot + 6]) if self._motion else ()
 
     def put_back(self):
         """The sample encoded last could not be sent: it waits again."""
@@ -155,9 +172,31 @@ def channel(pin):
     return machine.ADC(machine.Pin(pin), atten=machine.ADC.ATTN_11DB)
 
 
+def imu_settings():
+    """Pins, address and axes of the inertial sensor; nothing if the settings name none."""
+    sda, scl = config.PIN_SDA, config.PIN_SCL
+    if sda is None and scl is None:
+        return ()
+    if sda is None or scl is None:
+        raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, or neither, found one")
+    return (sda, scl, config.IMU_ADDRESS) + config.IMU_AXES  # noqa: RUF005  (MicroPython)
+
+
+def inertial():
+    """The inertial sensor that the settings name, None for none."""
+    settings = imu_settings()
+    if not settings:
+        return None
+    import imu  # a board without one needs no copy of it
+
+    return imu.Imu(*settings[:3], settings[3:], config.RATE)
+
+
 def greeting(boot_id):
     """Frame that says who speaks, since when and with which settings."""
-    settings = frame.config_hash(config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT)
+    settings = frame.config_hash(
+        config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT, imu_settings()
+    )
     return frame.encode_hello(boot_id, reset_reason(), settings, machine.unique_id(), config.RATE)
 
 
@@ -204,23 +243,24 @@ def joined():
     return wifi.Station(config.WIFI, config.PASSWORD)
 
 
-def outlet(station, boot_id):
-    """The way out of the frames."""
+def outlet(station, boot_id, size):
+    """The way out of frames of this size."""
     hello = greeting(boot_id)
     if station is None:
         return Usb(hello)
     import wifi
 
-    return wifi.Outlet(station, config.UDP_PORT, binascii.unhexlify(config.KEY), boot_id, hello)
+    key = binascii.unhexlify(config.KEY)
+    return wifi.Outlet(station, config.UDP_PORT, key, boot_id, hello, size)
 
 
 def stream(sampler, button):
     """Send until the button is held."""
     station = joined()  # before numbers are drawn: its noise makes them random
     boot_id = random_id()
-    way = outlet(station, boot_id)
-    encoder = frame.SampleEncoder(boot_id)
-    buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
+    encoder = frame.SampleEncoder(boot_id, sampler.moves)
+    way = outlet(station, boot_id, encoder.size)
+    buffer = bytearray(encoder.size)
     while button.value():
         if not sampler.encode_next_into(encoder, buffer):
             time.sleep_ms(1)
@@ -232,7 +272,7 @@ def stream(sampler, button):
 
 def main():
     """Set up the board and stream; the serial port is a prompt again afterwards."""
-    sampler = Sampler(channel(config.PIN_LEFT), channel(config.PIN_RIGHT))
+    sampler = Sampler(channel(config.PIN_LEFT), channel(config.PIN_RIGHT), inertial())
     button = machine.Pin(config.PIN_BUTTON, machine.Pin.IN, machine.Pin.PULL_UP)
     timer = machine.Timer(0)
     micropython.kbd_intr(-1)  # a byte 3 from the host is no keyboard interrupt

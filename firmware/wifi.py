@@ -7,7 +7,6 @@ import socket
 import time
 
 import antenna_datagram as datagram
-import antenna_frame as frame
 import network
 
 LOOK_MS = 250
@@ -61,11 +60,9 @@ def now_ms() -> int:
 class Outlet:
     """Where frames go: to the host that last proved to have the key and to hear this board."""
 
-    def __init__(self, station, port, key, boot_id, hello):
+    def __init__(self, station, port, key, boot_id, hello, size):
         self._station = station
-        self._speaker = datagram.Speaker(
-            datagram.Signer(key), boot_id, hello, frame.SAMPLE_FRAME_SIZE
-        )
+        self._speaker = datagram.Speaker(datagram.Signer(key), boot_id, hello, size)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(socket.getaddrinfo("0.0.0.0", port)[0][-1])  # noqa: S104  (its one address)
         self._socket.setblocking(False)

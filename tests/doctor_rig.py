@@ -12,6 +12,7 @@ from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import apply, plan
 from antennate.port import Port
+from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
@@ -22,11 +23,13 @@ ROBOT = DoctorConfig()
 class Patient:
     """A robot with faults, and what opens its two ports."""
 
-    def __init__(self, *faults: str) -> None:
-        self.robot: TwinRobot = watched(TwinConfig())[0]
+    def __init__(self, *faults: str, robot: RobotSpec | None = None) -> None:
+        self.spec = robot or ROBOT.robot
+        self.robot: TwinRobot = watched(TwinConfig(robot=self.spec))[0]
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
-        Faults([read(text) for text in faults], ROBOT.robot.ids).apply(self.robot, 0.0)
+        demands = [read(text) for text in faults]
+        Faults(demands, self.spec.ids, has_imu=self.spec.has_imu).apply(self.robot, 0.0)
         self.clock.latency = self.robot.bus.latency
         self.robot.bus.latency = 0.0
 
@@ -42,7 +45,7 @@ class Patient:
     def examine(self, bus: bool = True, esp32: bool = True, swapped: bool = False) -> Checkup:
         openers = (self.esp32, self.bus) if swapped else (self.bus, self.esp32)
         return examine(
-            ROBOT,
+            ROBOT.model_copy(update={"robot": self.spec}),
             ("/dev/bus", openers[0]) if bus else None,
             ("/dev/esp32", openers[1]) if esp32 else None,
             self.clock.now,
@@ -51,7 +54,7 @@ class Patient:
     def fix(self) -> list[str]:
         """Changes made until nothing is left to change."""
         made: list[str] = []
-        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, ROBOT.robot)):
+        while (survey := self.examine(esp32=False).bus) and (changes := plan(survey, self.spec)):
             for change in changes:
                 apply(self.bus, change, self.clock.now)
                 made.append(str(change))

@@ -264,7 +264,12 @@ class _Begun:
 
     def _stamped(self, frame: AntennaFrame) -> AntennaFrame:
         """Stamped in whole microseconds as by the board."""
-        return AntennaFrame(t=1e-6 * np.rint(1e6 * (frame.t + self._ahead)), counts=frame.counts)
+        return AntennaFrame(
+            t=1e-6 * np.rint(1e6 * (frame.t + self._ahead)),
+            counts=frame.counts,
+            angular_velocity=frame.angular_velocity,
+            linear_acceleration=frame.linear_acceleration,
+        )
 
     def write(self, command: JointCommand) -> None:
         """Round, then command."""

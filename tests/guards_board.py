@@ -17,6 +17,7 @@ import test_diagnosis
 import test_esp32_clock as test_clock
 import test_esp32_decoder as test_decoder
 import test_esp32_frame as test_frame
+import test_imu_diagnosis as test_imu
 import test_maneuver
 import test_noise
 import test_touch_check
@@ -28,7 +29,7 @@ from antennate.hardware.esp32 import board, clock, frame
 from antennate.hardware.esp32 import wire as decoder
 from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Reset
-from antennate.hardware.safety import channel
+from antennate.hardware.safety import channel, imu
 from antennate.hardware.safety import signal_quality as touch_check
 from antennate.types import Maneuver
 
@@ -108,6 +109,21 @@ STREAM = [
             b"\x01\x02" + bytes(12) + b"\x00\x10\x03" + bytes(4),
             "at most 4095",
         ),
+    ),
+    Guard(
+        "repeated readings of an inertial sensor",
+        put(imu, "STUCK", 1 << 30),
+        test_imu.test_one_that_repeats_itself_is_withheld_after_100_ms,
+    ),
+    Guard(
+        "end of the range of an inertial sensor",
+        put(imu, "RAILED", 1 << 30),
+        test_imu.test_an_axis_at_its_end_is_withheld_after_100_ms,
+    ),
+    Guard(
+        "answer of an inertial sensor",
+        put(imu, "SILENT", 1 << 30),
+        test_imu.test_what_is_missing_is_withheld_at_once_and_named_after_100_ms,
     ),
     Guard("firmware", put(board, "objections", constant(())), OLD_FIRMWARE),
     Guard(

@@ -50,6 +50,7 @@ def healthy(now: float, **changes: Any) -> Inputs:
         "leaps": {},
         "modes": {},
         "drift": "",
+        "imu": "",
         "objections": (),
         "unrecorded": False,
         "stop": False,

@@ -114,7 +114,7 @@ def test_E8_another_protocol_version_is_refused_and_both_are_named() -> None:
     ("body", "says"),
     [
         (b"\x01\x01", "has 25 bytes, found 2"),
-        (b"\x01\x63", "kind 99 is unknown, valid are 1 and 2"),
+        (b"\x01\x63", "kind 99 is unknown, valid are 1, 2 and 5"),
         (b"\x01\x02" + bytes(18), "has 21 bytes, found 20"),
         (struct.pack("<BBIIIHHBH", 1, 2, 0, 0, 0, 4096, 3, 0, 0), "at most 4095, found 4096 and 3"),
         (struct.pack("<BBI4BI8sBH", 1, 1, 0, 0, 1, 0, 1, 0, b"", 30, 0), "at least 1 Hz, found 0"),

@@ -7,13 +7,19 @@ import math
 import numpy as np
 import pytest
 
+from antennate.control.policy.contract import contract_of, require_match
+from antennate.control.policy.interface import PolicyInterface
 from antennate.errors import ConfigError
+from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, VariationParams
 from antennate.robots.imu import ImuParams, measured
+from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.imu import Imu, bias_of, noise_of
 from antennate.sim.sim_robot import Disturbance, SimRobot
+from antennate.sim.trial import draw_trial, scene_of
 from antennate.sim.world import PREFIX, World, compile_world, world_spec
 from antennate.types import Floats, JointCommand
 
@@ -92,6 +98,14 @@ def test_a_head_on_a_circle_feels_the_centripetal_acceleration() -> None:
     np.testing.assert_allclose(force, [0.0, v * v / r, G], atol=2 * SENSOR.accel_step)
 
 
+def test_gravity_is_felt_in_the_mean_attitude_of_a_sample() -> None:
+    """A head that pitches through the level: forward and back cancel out."""
+    sensor = Imu(SENSOR, 1)
+    felt(sensor, 0.0, states(turned((0, 1, 0), -0.05)))
+    _, force = felt(sensor, PERIOD, states(turned((0, 1, 0), 0.05)))
+    np.testing.assert_allclose(force, [0.0, 0.0, G], atol=SENSOR.accel_step)
+
+
 def test_readings_end_at_the_range() -> None:
     sensor = Imu(SENSOR, 1)
     felt(sensor, 0.0, states(turned((0, 0, 1), 0.0)))
@@ -100,8 +114,8 @@ def test_readings_end_at_the_range() -> None:
     assert force[0] == pytest.approx(7.995 * G, abs=SENSOR.accel_step)
 
 
-def test_noise_has_the_datasheets_density() -> None:
-    """LSM6DSOX at 100 Hz: 3.8 mdeg/s/√Hz and 80 µg/√Hz over 50 Hz."""
+def test_noise_has_the_density_that_is_given() -> None:
+    """At 100 Hz: 3.8 mdeg/s/√Hz and 80 µg/√Hz over 50 Hz."""
     noise = noise_of(ImuParams(), np.random.default_rng(1), 40_000, 0.01).std(axis=0)
     expected = [math.radians(3.8e-3) * math.sqrt(50.0)] * 3 + [80e-6 * G * math.sqrt(50.0)] * 3
     np.testing.assert_allclose(noise, expected, rtol=0.02)
@@ -183,6 +197,32 @@ def test_a_standing_robot_feels_gravity() -> None:
     np.testing.assert_allclose(frames[0][:, -3:], [[0.0, 0.0, G]] * 2, atol=SENSOR.accel_step)
 
 
+def test_a_robot_among_things_that_move_feels_its_own_head() -> None:
+    """The sensor of a batch, fed by the engine's state of the joint that is named so."""
+    config = TunnelConfig(robot=ROBOT)
+    start = draw_trial(config, scene_of(config), 0, config.control.gait, PERIOD)
+    model, data = start.world.model, start.world.data
+    root = model.joint(PREFIX + "root")
+    assert root.dofadr[0] > 0  # cylinders come before the robot
+    robot, sensor = SimRobot(1, ROBOT, PERIOD, config.physics.timestep), Imu(SENSOR, 1)
+    robot.load(0, start.world, start.chance)
+    turns = list[Floats]()
+    for tick in range(30):
+        frame = robot.read()
+        attitude = data.qpos[root.qposadr[0] + 3 :][:4]
+        state = np.concatenate([attitude, data.qvel[root.dofadr[0] :][:6]])[None]
+        rate, force = felt(sensor, data.time, state)
+        np.testing.assert_array_equal(frame.angular_velocity[0], rate)
+        np.testing.assert_array_equal(frame.linear_acceleration[0], force)
+        turns.append(rate)
+        shapes = ROBOT.command_shapes().items()
+        command = {name: np.zeros(shape) for name, shape in shapes}
+        command["yaw"][:] = 0.3 * math.sin(4.0 * PERIOD * tick)
+        robot.write(JointCommand(**command))
+        robot.sleep_until(PERIOD * (tick + 1))
+    assert np.array(turns)[:, 2].std() > 0.02
+
+
 def test_the_sensor_changes_nothing_else() -> None:
     noisy = ROBOT.model_copy(update={"imu": ImuParams(kind="head")})
     with_imu = np.array(walk(robot_with(noisy, 2), noisy, 120))
@@ -218,3 +258,24 @@ def test_what_16_bits_cannot_hold_is_refused(changes: dict[str, float], words: s
 def test_a_robot_without_antennae_has_no_board_for_it() -> None:
     with pytest.raises(ConfigError, match=r"imu\.kind: expected none for a robot without antennae"):
         RobotSpec(antennae={"kind": "none"}, imu={"kind": "head"})  # pyright: ignore[reportArgumentType]
+
+
+def test_the_parts_of_a_robot_with_one_have_it() -> None:
+    parts = {part.item for part in bill(ROBOT)} - {part.item for part in bill(PLAIN)}
+    assert parts == {"breakout of an LSM6DSOX"}
+
+
+def test_a_robot_without_one_is_written_as_before_there_were_any() -> None:
+    assert "imu" not in RobotSpec().model_dump(mode="json")
+    assert "imu" not in RobotSpec().model_dump_json()
+    assert RobotSpec.model_validate(ROBOT.model_dump()) == ROBOT
+    changed = RobotSpec(imu={"gyro_range": 5.0})  # pyright: ignore[reportArgumentType]
+    assert RobotSpec.model_validate_json(changed.model_dump_json()) == changed
+
+
+def test_policies_do_not_depend_on_a_sensor_that_they_do_not_observe() -> None:
+    interface, control = PolicyInterface(), ControlParams()
+    made, other = (contract_of(interface, control, robot) for robot in (PLAIN, ROBOT))
+    assert made.robot_hash == other.robot_hash
+    assert "imu" not in made.robot
+    require_match(made, control, ROBOT, "a file")

@@ -279,6 +279,12 @@ twin --tcp=0.0.0.0 :: expected [HOST:]PORT
 twin --tcp=127.0.0.1:70000 :: expected [HOST:]PORT
 twin --tcp=-1 :: expected [HOST:]PORT
 twin --tcp=a:b :: expected [HOST:]PORT
+twin --fault imu=silent --duration 0.01 :: --fault: expected a robot with an inertial sensor (robot.imu.kind), found one without for imu=silent
+twin --fault imu=hum --robot scuttle3d --duration 0.01 :: --fault: expected one of silent, stuck, railed, none for imu, found hum
+tunnel --robot.imu.gyro-range 5 :: --robot.imu.gyro-range :: the robot has no inertial sensor
+gait --robot hexapod --robot.imu.kind head :: imu.kind: expected none for a robot without antennae, on whose board it is, found head
+tunnel --robot scuttle3d --robot.imu.gyro-step 1e-5 :: gyro_range: expected 1 to 32768 times gyro_step
+drive --robot scuttle3d --robot.imu.gyro-noise 0.1 :: --robot.imu.gyro-noise
 twin --fault esp32=plateau:-5 :: --fault: expected a code of 0 to 4095, as plateau:SIZE
 twin --fault esp32=plateau:4096 :: --fault: expected a code of 0 to 4095 :: found 'esp32=plateau:4096'
 twin --fault esp32=plateau :: --fault: expected a code of 0 to 4095 :: found 'esp32=plateau'

@@ -61,7 +61,13 @@ SHORT = {"dry_run": 0.1, "duration": 0.5, "stand": 0.1}
 BRIEF = {"patience": 1.0}
 """Torque is refused before a silent bus; it is asked for so long."""
 PITCH = {"kind": "actuated", "servo": "xl430_w250"}
-LIFTING = {"legs": {"kind": "lifting"}, "pitch": PITCH, "elevation": {"kind": "pair"}}
+INERTIAL = {"imu": {"kind": "head"}}
+LIFTING = {
+    "legs": {"kind": "lifting"},
+    "pitch": PITCH,
+    "elevation": {"kind": "pair"},
+    **INERTIAL,
+}
 GROUND = ("stairs", "gap", "ramp", "rubble")
 """Scenes that read all sizes of ground between them."""
 PLANAR = {name: group for name, group in LIFTING.items() if name != "elevation"}
@@ -149,7 +155,8 @@ def run_teleop(patch: Patch, config: TeleopConfig, tmp_path: Path) -> None:
 
 
 def run_doctor(patch: Patch, config: DoctorConfig, tmp_path: Path) -> None:
-    patient = Patient(*FAULTS[config.doctor.reads])
+    robot = fresh(config.robot) if config.robot.has_imu and not config.robot.pitch_count else None
+    patient = Patient(*FAULTS[config.doctor.reads], robot=robot)
 
     def opener(address: str, flag: str, key: object = None, network: Any = None) -> Any:
         if network is not None:
@@ -295,7 +302,10 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
     "doctor": (
         DoctorConfig,
         run_doctor,
-        [{"doctor": {"reads": n}, "robot": LIFTING if n == 4 else {}} for n in FAULTS],
+        [
+            {"doctor": {"reads": n}, "robot": LIFTING if n == 4 else INERTIAL if n == 3 else {}}
+            for n in FAULTS
+        ],
     ),
     "record": (
         RecordConfig,

@@ -151,6 +151,34 @@ def test_a_robot_walks_the_path_of_the_cpu_engine(warp: Any, gear: dict[str, flo
 
 
 @pytest.mark.slow
+def test_an_inertial_sensor_feels_what_it_feels_on_the_cpu_engine(warp: Any) -> None:
+    """Its chance is the same; single precision alone tells the worlds apart."""
+    config, felt = flat(imu={"kind": "head"}), list[Floats]()
+    for body in (
+        SimRobot(2, config.robot, CONTROL.period, PHYSICS.timestep),
+        WarpRobot(2, config.robot, CONTROL.period, PHYSICS.timestep, ROOM, "cpu"),
+    ):
+        for row in range(2):
+            start = draw_trial(config, make_scene("flat"), row, CONTROL.gait, CONTROL.period)
+            body.load(row, start.world, start.chance)
+        control = make_controller("open", CONTROL, config.robot, 2)
+        control.reset(np.arange(2), np.zeros(2))
+        frames: list[Floats] = []
+
+        def go_on(frame: AntennaFrame, command: JointCommand, frames: Any = frames) -> bool:
+            frames.append(np.hstack([frame.angular_velocity, frame.linear_acceleration]))
+            return len(frames) < 40
+
+        run_loop(body, control, CONTROL.period, go_on)
+        felt.append(np.array(frames))
+    cpu, gpu = felt
+    assert cpu.shape == (40, 2, 6)
+    assert cpu[:, :, 2].std() > 0.05, "it turns"
+    np.testing.assert_allclose(gpu[:, :, :3], cpu[:, :, :3], atol=0.01)
+    np.testing.assert_allclose(gpu[:, :, 3:], cpu[:, :, 3:], atol=0.3)
+
+
+@pytest.mark.slow
 def test_each_world_has_parameters_of_its_own(warp: Any) -> None:
     soft = {"active_coils": (9.0,) * 6, "link_mass": 0.0012}
     cpu, gpu = on_both([flat(), flat(mass=3.0, leg_friction=0.3, antenna=soft)], 0.6)

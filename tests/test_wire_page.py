@@ -14,7 +14,7 @@ from antennate.hardware.esp32 import datagram, frame
 
 PAGE = (Path(__file__).parents[1] / "docs" / "wire.md").read_text()
 BOOT = 0x5EED0001
-TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
+TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i16": "h"}
 
 
 def fields_of(title: str) -> dict[str, str]:
@@ -63,10 +63,30 @@ def sample() -> bytes:
     return bytes(buffer)
 
 
+FELT = (0, -2, 29, 120, 0, 4098)
+
+
+def motion() -> bytes:
+    encoder = frame.SampleEncoder(BOOT, motion=True)
+    buffer = bytearray(encoder.size)
+    encoder.encode_sample_into(buffer, 7, 1_070_312, 1650, 4095, 2, 0, FELT, 3)
+    return bytes(buffer)
+
+
 def test_the_examples_are_what_the_board_sends() -> None:
     assert example("hello") == hello()
     assert example("sample") == sample()
     assert example("request") == frame.encode_request()
+    assert example("motion") == motion()
+
+
+def test_a_reader_made_from_the_tables_reads_an_inertial_sensor() -> None:
+    reading = read("MOTION", *bodies(motion()))
+    names = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+    assert tuple(reading[name] for name in names) == FELT
+    assert reading["misses"] == 3
+    plain = read("SAMPLE", *bodies(sample()))
+    assert all(reading[name] == plain[name] for name in plain if name != "kind")
 
 
 def test_a_reader_made_from_the_tables_reads_a_stream_with_boot_text_and_damage() -> None:

@@ -36,7 +36,7 @@ from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, part
 from antennate.telemetry.reader import LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
-from antennate.telemetry.topics import EVENTS
+from antennate.telemetry.topics import EVENTS, MOTION
 from antennate.telemetry.view import PAGE_PORT
 
 if TYPE_CHECKING:  # these import much, for a page and for films
@@ -160,7 +160,8 @@ def _recover(path: Path, target: Path) -> LogReader:
 
 def _export(path: Path, target: Path) -> LogReader:
     with LogReader(path) as log:
-        measured = {name for tick in log for name in JOINTS[1:] if getattr(tick, name)}
+        kinds = (*JOINTS[1:], *MOTION)
+        measured = {name for tick in log for name in kinds if getattr(tick, name)}
         log.require_ticks()
     with LogReader(path) as log:
         rows = (tick.row(log.header.robot, measured) for tick in log)

@@ -151,7 +151,8 @@ def command(argv: Sequence[str]) -> int:
 
 
 def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> int:
-    faults = Faults([read(text) for text in config.fault], config.robot.ids)
+    demands = [read(text) for text in config.fault]
+    faults = Faults(demands, config.robot.ids, has_imu=config.robot.has_imu)
     real = places.pace == "real"
     robot, passage = watched(config, boot_id=secrets.randbits(32) if real else None)
     with (
@@ -281,7 +282,9 @@ def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpo
     kind, host, port = _tcp(places)
     board: Endpoint | None = None
     if places.udp is not None:
-        board = UdpEndpoint(*_place("--udp", places.udp), read_key(places.key))
+        board = UdpEndpoint(
+            *_place("--udp", places.udp), read_key(places.key), size=robot.sample_size
+        )
     elif kind is Rfc2217Endpoint:
         board = Rfc2217Endpoint(host, port, robot.set_lines)
     elif kind is not None:

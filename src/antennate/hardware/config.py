@@ -35,6 +35,7 @@ from antennate.params.hardware import (
     TeleopParams,
 )
 from antennate.params.safety import DriftParams, SupervisorParams, TouchCheckParams
+from antennate.robots.imu import ImuParams
 from antennate.robots.spec import RobotSpec
 
 
@@ -159,6 +160,13 @@ class DoctorConfig(RobotConfig):
     )
     doctor: DoctorParams = DoctorParams()
 
+    def unread_here(self) -> Mapping[str, str]:
+        """What is looked at of an inertial sensor, where there is none."""
+        if self.robot.has_imu:
+            return {}
+        why = "the robot has no inertial sensor"
+        return dict.fromkeys(("doctor.gravity_error", "doctor.turning"), why)
+
     def calibrated(self) -> Self:
         """The same with curve, flex sensor and noise of the calibration file, as of a robot."""
         names = {"calibrated_noise": self.calibration}
@@ -233,7 +241,9 @@ class DriveConfig(RobotConfig):
         return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot)
 
 
-_UNREAD = (*SIMULATION_ALONE, "robot.release")
+_UNREAD = tuple(
+    dict.fromkeys((*SIMULATION_ALONE, "robot.release", *paths_of(ImuParams, "robot.imu")))
+)
 
 
 class SetupConfig(Params):

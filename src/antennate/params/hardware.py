@@ -121,6 +121,14 @@ class DoctorParams(Params):
         None, "counts", "assumed: that of its calibration file", ge=0, le=4095
     )
     """The same of the right antenna."""
+    gravity_error: float = number(
+        0.1, "1", "assumed: five times a zero-g level of 20 mg, or a slope of 6 deg", gt=0, le=1
+    )
+    """Largest part of gravity by which the inertial sensor at rest is off."""
+    turning: float = number(
+        0.1, "rad/s", "assumed: nearly six times a zero-rate level of 1 deg/s", gt=0, le=10
+    )
+    """Highest mean angular velocity that it shows at rest."""
 
 
 class DeadManParams(Params):

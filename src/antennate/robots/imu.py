@@ -2,7 +2,8 @@
 
 Its axes are those of the head: x forward, y to the left, z up (REP 103). An accelerometer measures
 specific force: at rest it shows the acceleration of gravity upwards. Defaults are those of ST's
-LSM6DSOX (datasheet DS12814, table 2) at 1000 deg/s and 8 g, in its high-performance mode.
+LSM6DSOX at 1000 deg/s and 8 g: typical values of its datasheet DS12814, and what a count is by ST's
+own driver, lsm6dsox_reg.c.
 """
 
 from __future__ import annotations
@@ -35,7 +36,11 @@ class ImuParams(Params):
     )
     """Largest angular velocity about an axis that it measures."""
     gyro_step: float = number(
-        0.035 * _DEGREE, "rad/s", "datasheet: LSM6DSOX, 35 mdeg/s at 1000 deg/s", gt=0, le=0.1
+        0.035 * _DEGREE,
+        "rad/s",
+        "datasheet: LSM6DSOX, 35 mdeg/s at 1000 deg/s, as in ST's driver",
+        gt=0,
+        le=0.1,
     )
     """Angular velocity of one count."""
     gyro_noise: float = number(
@@ -51,11 +56,19 @@ class ImuParams(Params):
     )
     """Largest specific force along an axis that it measures."""
     accel_step: float = number(
-        0.244e-3 * GRAVITY, "m/s²", "datasheet: LSM6DSOX, 0.244 mg at 8 g", gt=0, le=1
+        0.244e-3 * GRAVITY,
+        "m/s²",
+        "datasheet: LSM6DSOX, 0.244 mg at 8 g, as in ST's driver",
+        gt=0,
+        le=1,
     )
     """Specific force of one count."""
     accel_noise: float = number(
-        80e-6 * GRAVITY, "m/s²/√Hz", "datasheet: LSM6DSOX, 80 µg/√Hz at 8 g", ge=0, le=1
+        80e-6 * GRAVITY,
+        "m/s²/√Hz",
+        "assumed: 75 µg/√Hz at 4 g (datasheet LSM6DSOX), more at 8 g",
+        ge=0,
+        le=1,
     )
     """Density of the noise of the specific force."""
     accel_bias: float = number(
@@ -94,6 +107,12 @@ class ImuParams(Params):
     def biases(self) -> Floats:
         """Standard deviations of the zeros of the axes [rad/s], then [m/s²], shape (6,)."""
         return np.repeat([self.gyro_bias, self.accel_bias], AXES)
+
+
+def in_counts(params: ImuParams, angular_velocity: Floats, linear_acceleration: Floats) -> Floats:
+    """Readings of these measurements: what `measured` takes [counts], NaN for NaN, shape (B, 6)."""
+    values = np.concatenate([angular_velocity, linear_acceleration], axis=1)
+    return np.rint(values / params.steps)
 
 
 def measured(params: ImuParams, counts: Floats) -> tuple[Floats, Floats]:

@@ -129,6 +129,9 @@ DIVIDER_CAPACITOR = "100 nF"
 """Beside each divider's lower resistor: keeps the converter's own noise small (ESP-IDF)."""
 
 
+INERTIAL = ("breakout of an LSM6DSOX", "inertial sensor of the ESP32 board", "3.3 V, I2C")
+
+
 @dataclass(frozen=True)
 class Part:
     """One row.
@@ -192,6 +195,7 @@ def _electronics(robot: RobotSpec) -> list[Part]:
         ),
         Part(2, "resistor", "divider of each antenna", ohms),
         Part(2, "capacitor", "across that resistor", DIVIDER_CAPACITOR),
+        *([Part(1, *INERTIAL)] if robot.has_imu else []),
     ]
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
-from pydantic import model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from antennate import checks
 from antennate.dxl.model import EXTENDED_MODE, POSITION_MODE
@@ -146,6 +146,14 @@ class RobotSpec(Params):
     def elevation_count(self) -> int:
         """Number of joints that raise and lower the antennae, 0 or 2."""
         return self.antenna_count if self.elevation.kind == "pair" else 0
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A robot without an inertial sensor is written as before there were any."""
+        table = handler(self)
+        if self.imu == ImuParams():
+            table.pop("imu", None)
+        return table
 
     @property
     def has_imu(self) -> bool:

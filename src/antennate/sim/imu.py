@@ -9,11 +9,13 @@ white noise whose density is N has the standard deviation N / sqrt(2 T).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from antennate.params.scene import GRAVITY
 from antennate.robots.imu import AXES, ImuParams
-from antennate.types import Bools, Floats, Ints
+from antennate.types import Bools, Floats
 
 STATE = 10
 """Numbers that a sample is made of: quaternion, real part first, velocity in the axes of the world
@@ -23,6 +25,8 @@ STATE = 10
 class Imu:
     """Inertial sensors of B heads, each in the middle of its head.
 
+    Rows are worked out one by one: for few of them that is ten times faster than by arrays.
+
     Args:
         params: The sensor.
         batch: Number of rows B.
@@ -30,13 +34,12 @@ class Imu:
 
     def __init__(self, params: ImuParams, batch: int) -> None:
         self._steps, self._most = params.steps, params.most
-        self._t: Floats = np.full(batch, np.nan)
-        self._state: Floats = np.zeros((batch, STATE))
-        self._mean: Floats = np.zeros((batch, 2 * AXES))
+        self._last: list[tuple[float, list[float]] | None] = [None] * batch
+        self._mean = [(0.0,) * 2 * AXES] * batch
 
-    def reset(self, rows: int | Ints | Bools) -> None:
-        """Let some rows begin anew: their next sample is of that moment, as if at rest before."""
-        self._t[rows] = np.nan
+    def reset(self, row: int) -> None:
+        """Let a row begin anew: its next sample is of that moment, as if unaccelerated before."""
+        self._last[row] = None
 
     def step(self, t: Floats, state: Floats, error: Floats, rows: Bools | None = None) -> Floats:
         """Sample all sensors.
@@ -50,13 +53,14 @@ class Imu:
         Returns:
             Readings [counts], gyroscopes first, then accelerometers, shape (B, 6).
         """
-        first = np.isnan(self._t)
-        dt = np.where(first, 0.0, t - self._t)
-        new = first | (dt > 0.0)
-        mean = np.where(new[:, None], _mean(self._state, state, dt), self._mean)
-        kept = new if rows is None else new & rows
-        self._mean[kept], self._state[kept], self._t[kept] = mean[kept], state[kept], t[kept]
-        return np.clip(np.rint((mean + error) / self._steps), -self._most, self._most)
+        means = self._mean if rows is None else self._mean.copy()
+        for i, now in enumerate(zip(t.tolist(), state.tolist(), strict=True)):
+            before = self._last[i]
+            if before is None or now[0] > before[0]:
+                means[i] = _mean(before or now, now)
+                if rows is None or rows[i]:
+                    self._mean[i], self._last[i] = means[i], now
+        return np.clip(np.rint((means + error) / self._steps), -self._most, self._most)
 
 
 def noise_of(params: ImuParams, rng: np.random.Generator, count: int, period: float) -> Floats:
@@ -69,35 +73,35 @@ def bias_of(params: ImuParams, rng: np.random.Generator) -> Floats:
     return params.biases * rng.standard_normal(2 * AXES)
 
 
-def _mean(before: Floats, now: Floats, dt: Floats) -> Floats:
-    """Mean angular velocity and specific force between two states, shape (B, 6).
+def _mean(before: tuple[float, list[float]], now: tuple[float, list[float]]) -> tuple[float, ...]:
+    """Mean angular velocity and specific force between two times and states.
 
     Without time between them, those of the later one, unaccelerated.
     """
-    still = dt <= 0.0
-    before = np.where(still[:, None], now, before)
-    dt = np.where(still, 1.0, dt)[:, None]
-    p, q = before[:, :4], now[:, :4]
-    turn = _product(p * [1.0, -1.0, -1.0, -1.0], q)
-    sign = np.where(turn[:, :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, abs(turn[:, :1]))
-    share = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
-    rate = np.where(still[:, None], now[:, 7:], sign * share * turn[:, 1:] / dt)
-    force = (now[:, 4:7] - before[:, 4:7]) / dt + [0.0, 0.0, GRAVITY]
-    return np.concatenate([rate, _turned_back(p + sign * q, force)], axis=1)
-
-
-def _product(p: Floats, q: Floats) -> Floats:
-    """Quaternions p q, shape (B, 4)."""
-    a, u, b, v = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
-    real = a * b - (u * v).sum(axis=1, keepdims=True)
-    return np.concatenate([real, a * v + b * u + np.cross(u, v)], axis=1)
-
-
-def _turned_back(q: Floats, vector: Floats) -> Floats:
-    """Vectors of the world in the axes of bodies with attitudes q, of any length, shape (B, 3)."""
-    length = np.maximum(np.linalg.norm(q, axis=1, keepdims=True), 1e-12)
-    w, u = q[:, :1] / length, -q[:, 1:] / length
-    across = 2.0 * np.cross(u, vector)
-    return vector + w * across + np.cross(u, across)
+    w0, x0, y0, z0, vx0, vy0, vz0, *_ = before[1]
+    w, x, y, z, vx, vy, vz, *rate = now[1]
+    dt = now[0] - before[0]
+    if dt > 0.0:  # the turn from one attitude to the other, as its axis times its angle
+        real = w0 * w + x0 * x + y0 * y + z0 * z
+        turn = (
+            w0 * x - w * x0 - y0 * z + z0 * y,
+            w0 * y - w * y0 - z0 * x + x0 * z,
+            w0 * z - w * z0 - x0 * y + y0 * x,
+        )
+        sine = math.hypot(*turn)
+        share = 2.0 * math.atan2(sine, abs(real)) / sine if sine > 1e-12 else 2.0
+        share = math.copysign(share, real) / dt
+        rate = [share * part for part in turn]
+        if real < 0.0:  # the same attitude, on the same side
+            w0, x0, y0, z0 = -w0, -x0, -y0, -z0
+        fx, fy, fz = (vx - vx0) / dt, (vy - vy0) / dt, (vz - vz0) / dt + GRAVITY
+    else:
+        fx, fy, fz = 0.0, 0.0, GRAVITY
+    w, x, y, z = w + w0, x + x0, y + y0, z + z0
+    two = 2.0 / ((w * w + x * x + y * y + z * z) or 1.0)
+    return (
+        *rate,
+        fx - two * ((y * y + z * z) * fx - (x * y + w * z) * fy - (x * z - w * y) * fz),
+        fy - two * ((x * x + z * z) * fy - (x * y - w * z) * fx - (y * z + w * x) * fz),
+        fz - two * ((x * x + y * y) * fz - (x * z + w * y) * fx - (y * z - w * x) * fy),
+    )

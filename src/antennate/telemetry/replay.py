@@ -27,6 +27,7 @@ from antennate.errors import LogError, raised
 from antennate.hardware.safety.controller import Decision, decision_of, no_command
 from antennate.messages import shortened
 from antennate.params.base import Params, number
+from antennate.robots.imu import AXES
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import TWIN, Header
 from antennate.telemetry.ticks import Tick, angles_of
@@ -75,6 +76,7 @@ class ReplayRobot:
         self._ticks = iter(ticks)
         self._now = 0.0
         joints = len(header.robot.joint_names)
+        self._has_imu = header.robot.has_imu
         self._unknown: Floats = np.full(joints, math.nan)
         self._bias = np.array([*header.joint_bias, *[0.0] * joints])[:joints]
         self._simulated, self._before = header.seed is not None, self._unknown
@@ -115,7 +117,11 @@ class ReplayRobot:
         if self.tick is None:
             raise LogError("expected a tick to replay, found the end of the log")
         positions = self._measured(self.tick) - self._bias if self._simulated else self._before
-        return replace(self.tick.frame(), positions=positions[None].copy())
+        frame = replace(self.tick.frame(), positions=positions[None].copy())
+        if not self._has_imu or frame.angular_velocity.size:
+            return frame
+        unknown = np.full((1, AXES), math.nan)
+        return replace(frame, angular_velocity=unknown, linear_acceleration=unknown.copy())
 
     def _measured(self, tick: Tick) -> Floats:
         """Joint angles of a tick [rad], NaN where they are not known, shape (n,)."""

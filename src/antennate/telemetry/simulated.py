@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from antennate.robots.imu import AXES
 from antennate.robots.spec import RobotSpec
 from antennate.sim.places import Contacts
 from antennate.sim.trial import LOOK_EVERY
@@ -28,10 +29,13 @@ from antennate.telemetry.topics import (
     ANTENNA,
     CONTACT_FORCES,
     COORDINATES,
+    IMU,
     JOINT_COMMANDS,
     JOINT_STATES,
     MANEUVER,
+    MOTION,
     Topic,
+    imu_values,
 )
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Floats, JointCommand
@@ -40,8 +44,9 @@ HEAD = 9
 """Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
 Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
 """Numbers of some ticks, shape (n, HEAD + 4 joints): what `HEAD` says, then the angles commanded
-[rad], and angles [rad], speeds [rad/s] and torques [N·m] measured. Beside them, by tick, messages
-of `CONTACT_FORCES` and `COORDINATES`."""
+[rad], and angles [rad], speeds [rad/s] and torques [N·m] measured. With an inertial sensor, behind
+the commanded angles: angular velocity [rad/s] and specific force [m/s²], six more. Beside them, by
+tick, messages of `CONTACT_FORCES` and `COORDINATES`."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
@@ -72,6 +77,7 @@ class RowLog:
         self.path, self._rows = path, rows
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._angles = len(header.robot.joint_names)
+        self._felt = 2 * AXES if header.robot.has_imu else 0
         self._forms = _forms(header.robot.joint_names)
         self._held: list[Any] = []
         self._since = math.inf
@@ -175,7 +181,10 @@ class RowLog:
             self._write(ticks[count // 2 :])
             return
         t, angles = rows[:, 0], self._angles
-        joints = [rows[:, at : at + angles] for at in range(HEAD, rows.shape[1], angles)]
+        decided, felt, measured = np.split(
+            rows, [HEAD + angles, HEAD + angles + self._felt], axis=1
+        )
+        joints = [decided[:, HEAD:], *np.split(measured, 3, axis=1)]
         stamps = self._out.stamps(t)
         time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
         columns: dict[Topic, dict[str, Any]] = {
@@ -196,6 +205,9 @@ class RowLog:
             JOINT_STATES: time
             | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
         }
+        if self._felt:
+            motion = dict(zip(MOTION, np.split(felt, 2, axis=1), strict=True))
+            columns[IMU] = time | motion
         self._out.write_many(
             stamps,
             {topic: (self._forms[topic], numbers) for topic, numbers in columns.items()},
@@ -228,6 +240,7 @@ def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
             (*joints, angles, angles, angles),
             (*time, "position", "velocity", "effort"),
         ),
+        IMU: Form(IMU.type, imu_values(0, (0.0,) * AXES, (0.0,) * AXES), (*time, *MOTION)),
     }
 
 
@@ -245,12 +258,15 @@ class Decisions:
         self._controller = controller
         self._unknown = np.full(batch, math.nan)
         self._parts = robot.command_shapes(batch)
-        pair = (batch, 2)
+        self._felt = MOTION if robot.has_imu else ()
+        pair, axes = (batch, 2), (batch, AXES)
+        self._unfelt = np.full(axes, math.nan)
         self._layout = np.dtype(
             [
                 *(("t", float, batch), ("maneuver", np.int64, batch), ("phase", float, batch)),
                 *(("counts", float, pair), ("level", float, pair), ("contact", np.int64, pair)),
                 *((name, float, shape) for name, shape in self._parts.items()),
+                *((name, float, axes) for name in self._felt),
             ]
         )
         self._kinds = [self._layout[name].base for name in self._layout.names or ()]
@@ -277,6 +293,9 @@ class Decisions:
             controller.contact,
         ]
         parts += [getattr(command, name) for name in self._parts]
+        for name in self._felt:
+            felt = getattr(frame, name)
+            parts.append(felt if felt.shape == self._unfelt.shape else self._unfelt)
         if [part.dtype for part in parts] != self._kinds:
             parts = [part.astype(kind) for part, kind in zip(parts, self._kinds, strict=True)]
         try:
@@ -285,7 +304,13 @@ class Decisions:
             return b"".join([part.tobytes() for part in parts])
 
     def rows(self, ticks: Sequence[bytes], row: int, into: Floats) -> None:
-        """Write how one row of the batch begins in some ticks, shape (n, HEAD + joints)."""
+        """Write how one row of the batch begins in some ticks.
+
+        Args:
+            ticks: Of `take`.
+            row: The row of the batch.
+            into: Where to, shape (n, HEAD + joints), with six more of an inertial sensor.
+        """
         block, at = np.frombuffer(b"".join(ticks), self._layout), 0
         for name in self._layout.names or ():
             part = block[name][:, row].reshape(len(ticks), -1)
@@ -341,8 +366,8 @@ class SimulatedLog(RowLog):
 
     def _rows_of(self, ticks: Sequence[TakenTick]) -> Rows:
         """What is written of some ticks; many at once take hardly longer than one."""
-        rows = np.empty((len(ticks), HEAD + 4 * self._angles))
-        end = HEAD + self._angles
+        end = HEAD + self._angles + self._felt
+        rows = np.empty((len(ticks), end + 3 * self._angles))
         self._decisions.rows([tick.decided for tick in ticks], self._row, rows[:, :end])
         measured, places = self._world.measured([tick.measured for tick in ticks])
         rows[:, end:] = measured.reshape(len(ticks), -1)

@@ -21,14 +21,17 @@ from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.topics import (
     ANTENNA,
     COUNTERS,
+    IMU,
     JOINT_COMMANDS,
     JOINT_STATES,
     JOINTS,
     MANEUVER,
+    MOTION,
     SUPERVISOR,
     TICK,
     TICK_TOPICS,
     Topic,
+    imu_values,
 )
 from antennate.types import AntennaFrame, Controller, JointCommand
 
@@ -70,6 +73,8 @@ class Tick:
         positions: Measured joint angles [rad], NaN for one that has not answered; empty if unknown.
         velocities: Measured joint speeds [rad/s], empty if unknown.
         efforts: Measured joint torques [N·m], empty if unknown.
+        angular_velocity: Of the head, as the controller got it [rad/s]; empty without a sensor.
+        linear_acceleration: Specific force on it, likewise [m/s²].
     """
 
     number: int
@@ -98,6 +103,8 @@ class Tick:
     positions: tuple[float, ...] = ()
     velocities: tuple[float, ...] = ()
     efforts: tuple[float, ...] = ()
+    angular_velocity: tuple[float, ...] = ()
+    linear_acceleration: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
@@ -129,7 +136,7 @@ class Tick:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All numbers but the measured ones of the joints, in the order of `fields`."""
+        """All numbers but the measured ones of joints and head, in the order of `fields`."""
         values = (getattr(self, name) for name in _NUMBERS)
         return tuple(n for each in values for n in (each if isinstance(each, tuple) else (each,)))
 
@@ -138,19 +145,23 @@ class Tick:
 
         Args:
             robot: Gives the names of the joints.
-            measured: Which of positions, velocities and efforts have columns.
+            measured: Which of positions, velocities, efforts and of `MOTION` have columns.
         """
         table = _named(fields(robot), self.values)
         for kind in JOINTS[1:]:
             if kind in measured:
                 columns = [f"{name}_{_ONE[kind]}" for name in robot.joint_names]
                 table |= _named(columns, getattr(self, kind))
+        for kind in MOTION:
+            if kind in measured:
+                table |= _named([f"{kind}_{axis}" for axis in "xyz"], getattr(self, kind))
         texts = {"state": self.state, "note": self.note, "causes": "; ".join(self.causes)}
         return table | texts
 
     def frame(self) -> AntennaFrame:
         """What the controller got."""
-        return AntennaFrame(t=np.array([self.t]), counts=np.array([self.counts]))
+        parts = np.array([self.t]), np.array([self.counts]), np.zeros((0, 0))
+        return AntennaFrame(*parts, *(np.array([getattr(self, name)]) for name in MOTION))
 
     def pack(self) -> bytes:
         """All of it as bytes, for another process.
@@ -188,6 +199,9 @@ class Tick:
         if self.positions:
             measured = (self.positions, self.velocities, self.efforts)
             yield JOINT_STATES, JOINT_STATES.type.encode(*time, *measured)
+        if self.angular_velocity:
+            motion = self.angular_velocity, self.linear_acceleration
+            yield IMU, IMU.type.encode(*imu_values(stamp, *motion))
 
     @classmethod
     def of_messages(cls, messages: Mapping[Topic, bytes]) -> Tick:
@@ -204,6 +218,9 @@ class Tick:
         if JOINT_STATES in messages:
             state = JOINT_STATES.decode(messages[JOINT_STATES])
             values |= {kind: state[name] for kind, name in _ONE.items()}
+        if IMU in messages:
+            felt = IMU.decode(messages[IMU])
+            values |= {kind: felt[kind] for kind in MOTION}
         return cls(**values)
 
 
@@ -219,7 +236,7 @@ def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:
 _ALL = _getter(TICK)
 _OWN = tuple((topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR))
 """Topics whose messages are fields of a tick."""
-_NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in JOINTS[1:])
+_NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in (*JOINTS[1:], *MOTION))
 
 
 def fields(robot: RobotSpec) -> tuple[str, ...]:
@@ -252,7 +269,13 @@ def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> 
         "contact": decision.contact,
         "maneuver": decision.maneuver,
         "phase": phase[0] if len(phase) == 1 else math.nan,
+        **{name: tuple(getattr(frame, name)[0].tolist()) for name in _felt(frame)},
     }
+
+
+def _felt(frame: AntennaFrame) -> tuple[str, ...]:
+    """What an inertial sensor gives, if the frame of one robot holds any."""
+    return MOTION if frame.angular_velocity.size else ()
 
 
 def numbers_of(owner: Any, name: str) -> tuple[float, ...]:

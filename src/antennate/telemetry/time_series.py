@@ -14,6 +14,7 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.messages import shortened
 from antennate.notebook import from_columns, html
+from antennate.telemetry.topics import MOTION
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
 _ENDS: dict[str, tuple[str, ...]] = {
@@ -21,6 +22,7 @@ _ENDS: dict[str, tuple[str, ...]] = {
         ("counts", "level", "contact", "leg", "antenna", "elevation"), ("left", "right")
     ),
     "head": ("x", "y"),
+    **dict.fromkeys(MOTION, ("x", "y", "z")),
 }
 """What the columns of the last axis are called; those of others are numbered, head first."""
 _SHOWN_COLUMNS = (
@@ -44,6 +46,9 @@ class TimeSeries:
         pitch: Commanded pitch angles [rad], shape (n, P); P is 0 unless pitch is actuated.
         elevation: Commanded elevations of the antennae [rad], shape (n, 2), (n, 0) without them.
         head: Position of the head in the world [m], shape (n, 2).
+        angular_velocity: Of the head, by its inertial sensor, along x forward, y left, z up
+            [rad/s], shape (n, 3), or (n, 0) without one.
+        linear_acceleration: Specific force, likewise [m/s²].
         meta: What the series is of, such as controller, robot and seed.
     """
 
@@ -58,6 +63,8 @@ class TimeSeries:
     pitch: Floats
     elevation: Floats
     head: Floats
+    angular_velocity: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    linear_acceleration: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     meta: Mapping[str, str | int | float | None] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -145,13 +152,13 @@ class TimeSeriesRecorder:
     def take(self, frame: AntennaFrame, command: JointCommand) -> None:
         """Keep one tick."""
         for source, names in (
-            (frame, ("t", "counts")),
+            (frame, ("t", "counts", *MOTION)),
             (self._controller, ("level", "contact", "maneuver")),
             (command, ("yaw", "leg", "antenna", "pitch", "elevation")),
         ):
             for name in names:
                 batch = getattr(source, name)
-                values = batch[0] if batch.size else ()  # pitch may have no joints
+                values = batch[0] if batch.size else ()  # there may be no pitch joints, no sensor
                 self._ticks[name].append(np.array(values))
         self._ticks["head"].append(np.array(self._head()))
 

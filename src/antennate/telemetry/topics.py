@@ -7,7 +7,7 @@ written from here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from antennate.errors import LogError
@@ -87,6 +87,17 @@ float64[] position
 float64[] velocity
 float64[] effort
 """
+_IMU = """\
+int32 sec
+uint32 nanosec
+string frame_id
+float64[4] orientation
+float64[9] orientation_covariance
+float64[3] angular_velocity
+float64[9] angular_velocity_covariance
+float64[3] linear_acceleration
+float64[9] linear_acceleration_covariance
+"""
 _LOG = """\
 int32 sec
 uint32 nanosec
@@ -115,6 +126,30 @@ MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
 {_TIME}"""
+_IMU_SCHEMA = f"""\
+std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance  # the first is -1: no orientation is measured
+geometry_msgs/Vector3 angular_velocity  # as the controller got it [rad/s]; NaN is unknown
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration  # specific force, likewise [m/s^2]
+float64[9] linear_acceleration_covariance
+{_RULE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{_TIME}{_RULE}
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+{_RULE}
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
 _LOG_SCHEMA = f"""\
 builtin_interfaces/Time stamp
 uint8 level
@@ -131,6 +166,7 @@ def _own(name: str, fields: str) -> MessageType:
 
 
 _STATE = MessageType("sensor_msgs/msg/JointState", _JOINT_STATE, _STATE_SCHEMA)
+_INERTIAL = MessageType("sensor_msgs/msg/Imu", _IMU, _IMU_SCHEMA)
 _STRING = MessageType("std_msgs/msg/String", "string data\n")
 
 ANTENNA = Topic("/antenna", _own("Antenna", _ANTENNA), "readings, and what was made of them")
@@ -155,6 +191,11 @@ COORDINATES = Topic(
     _own("Coordinates", _COORDINATES),
     "state of the engine, ten times a second, in simulation, so that the log can be watched",
 )
+IMU = Topic(
+    "/imu",
+    _INERTIAL,
+    "what the inertial sensor felt, along the axes of the head: x forward, y left, z up",
+)
 EVENTS = Topic(
     "/events",
     MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA),
@@ -177,17 +218,38 @@ TOPICS = (
     CONTACT_FORCES,
     EVENTS,
     COORDINATES,
+    IMU,
 )
 """All, in the order of their channels: the first has id 1. A new one comes last."""
 
 JOINTS = ("angles", "positions", "velocities", "efforts")
 """Numbers of a tick for each joint: the commanded, then the measured ones, empty if unknown."""
+MOTION = ("angular_velocity", "linear_acceleration")
+"""Numbers of a tick along the three axes of the head, empty without an inertial sensor."""
+
+
+def topics_of(has_imu: bool) -> tuple[Topic, ...]:
+    """The topics of the log of a robot with an inertial sensor, or of one without."""
+    return TOPICS if has_imu else tuple(topic for topic in TOPICS if topic is not IMU)
+
+
+def imu_values(
+    stamp: int, angular_velocity: Sequence[float], linear_acceleration: Sequence[float]
+) -> tuple[Any, ...]:
+    """The values of a message of `IMU` at a time [ns]; no covariance is known."""
+    unknown = (0.0,) * 9
+    none = (-1.0, *unknown[1:])
+    seconds = divmod(stamp, 10**9)
+    measured = (angular_velocity, unknown, linear_acceleration, unknown)
+    return (*seconds, "link0", (0.0, 0.0, 0.0, 1.0), none, *measured)
+
+
 TICK = _own(
     "Tick",
     _ANTENNA
     + _MANEUVER
     + _COUNTERS
-    + "".join(f"float64[] {name}\n" for name in JOINTS)
+    + "".join(f"float64[] {name}\n" for name in (*JOINTS, *MOTION))
     + _SUPERVISOR,
 )
 """A whole tick, on its way from the loop to the process that writes the log."""

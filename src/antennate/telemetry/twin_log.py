@@ -31,7 +31,7 @@ from antennate.telemetry.header import TWIN, Header
 from antennate.telemetry.simulated import Decisions, RowLog, SimulatedLog
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
-from antennate.types import AntennaFrame, Contact
+from antennate.types import Contact
 
 _MOST = 3000
 """Most ticks and events in the queue: 30 s at 100 Hz, 3 s at 1000 Hz."""
@@ -166,8 +166,7 @@ class TwinLog(LogQueue):
     def take(self, world: World) -> None:
         """Keep a tick, its time that of the twin."""
         robot = self._robot
-        frame = AntennaFrame(t=np.array([robot.t]), counts=robot.counts[None])
-        self.add(self._ticks.tick(self._decisions.take(frame, robot.command)))
+        self.add(self._ticks.tick(self._decisions.take(robot.frame, robot.command)))
 
 
 def _header(config: TwinConfig, start: int) -> Header:

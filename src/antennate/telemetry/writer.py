@@ -26,7 +26,7 @@ from antennate.files import require_room
 from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import LIBRARY, Header
 from antennate.telemetry.ticks import Tick
-from antennate.telemetry.topics import EVENTS, TOPICS, Topic
+from antennate.telemetry.topics import EVENTS, Topic, topics_of
 from antennate.types import Floats, Ints
 
 LEAST_FREE = 1e9
@@ -99,11 +99,12 @@ class LogWriter:
 
     def _register(self) -> dict[Topic, int]:
         schemas: dict[str, int] = {}
-        for kind in {topic.type.name: topic.type for topic in TOPICS}.values():
+        topics = topics_of(self._header.robot.has_imu)
+        for kind in {topic.type.name: topic.type for topic in topics}.values():
             schemas[kind.name] = self._container.add_schema(kind.name, kind.schema)
         return {
             topic: self._container.add_channel(topic.name, schemas[topic.type.name])
-            for topic in TOPICS
+            for topic in topics
         }
 
     def write(self, tick: Tick) -> None:
@@ -172,9 +173,9 @@ class LogWriter:
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
         """Add a message as it is, of a tick and a time [ns], not before the last one's.
 
-        It is not counted as a tick.
+        It is not counted as a tick. One of a topic that its robot has not is left out.
         """
-        if self.failure:
+        if self.failure or topic not in self._channels:
             return
         self._since = min(self._since, time.monotonic())
         self._size += len(data)

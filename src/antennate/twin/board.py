@@ -28,6 +28,8 @@ from antennate.errors import BadInputError
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.frame import FULL_SCALE
 from antennate.robots.antenna import AntennaSpec
+from antennate.robots.imu import AXES, ImuParams
+from antennate.sim.imu import noise_of
 from antennate.types import Floats
 
 SIDES = ("left", "right")
@@ -111,6 +113,41 @@ class Converter:
         if self._chance.random() >= _STICKY_SHARE:
             return counts
         return 4 * round((counts - _STICKY_CODE) / 4) + _STICKY_CODE
+
+
+class ImuReadings:
+    """The readings of the inertial sensor as the board sends them.
+
+    Args:
+        params: The sensor.
+        period: Time between samples [s].
+        seed: Of the noise of a sensor that is not moved, None for none.
+
+    Attributes:
+        trouble: What is wrong with it: "silent", "stuck", "railed", or nothing.
+        misses: Readings that it has not given.
+    """
+
+    def __init__(self, params: ImuParams, period: float, seed: int | None) -> None:
+        self.trouble, self.misses = "", 0
+        self._params, self._period = params, period
+        self._chance = None if seed is None else np.random.default_rng(seed)
+        self._last = (0,) * (2 * AXES)
+
+    def sample(self, counts: Floats, standing: bool) -> tuple[int, ...]:
+        """What is sent of readings [counts], shape (6,)."""
+        if self.trouble == "silent" or np.isnan(counts).any():
+            self.misses += 1
+            return (frame.IMU_NONE,) * (2 * AXES)
+        if standing and self._chance is not None:  # the physics has not begun, and makes none
+            noise = noise_of(self._params, self._chance, 1, self._period)[0]
+            counts = np.rint(counts + noise / self._params.steps)
+        counts = np.clip(counts, -self._params.most, self._params.most)
+        if self.trouble == "railed":
+            counts = self._params.most
+        if self.trouble != "stuck":
+            self._last = tuple(map(int, counts.tolist()))
+        return self._last
 
 
 TOUCH_FLEX = 1.0
@@ -218,15 +255,21 @@ class UdpEndpoint:
         port: UDP port, 0 for any that is free.
         key: The board's.
         now: Monotonic time [s].
+        size: Of the frames of its samples [byte].
 
     Raises:
         BadInputError: The port cannot be had.
     """
 
     def __init__(
-        self, host: str, port: int, key: bytes, now: Callable[[], float] = time.monotonic
+        self,
+        host: str,
+        port: int,
+        key: bytes,
+        now: Callable[[], float] = time.monotonic,
+        size: int = frame.SAMPLE_FRAME_SIZE,
     ) -> None:
-        self._now = now
+        self._now, self._size = now, size
         self._signer = datagram.Signer(key)
         self._speaker: datagram.Speaker | None = None
         self._boot = -1
@@ -285,8 +328,7 @@ class UdpEndpoint:
 
     def _begin(self, hello: bytes, boot: int) -> None:
         if boot != self._boot:
-            size = frame.SAMPLE_FRAME_SIZE
-            self._speaker = datagram.Speaker(self._signer, boot, hello, size)
+            self._speaker = datagram.Speaker(self._signer, boot, hello, self._size)
             self._boot = boot
 
     def _send(self, data: bytes | bytearray, receiver: Any) -> None:

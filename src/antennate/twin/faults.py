@@ -22,7 +22,7 @@ from antennate.twin.robot import TwinRobot
 from antennate.twin.servos import ServoBox
 
 _FORM = re.compile(
-    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|bus|wire)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
+    r"(?P<target>servo:(?P<id>\d{1,3})|esp32|imu|bus|wire)=(?P<what>[a-z_]+)(:(?P<size>[0-9.e-]+))?"
     r"(@(?P<t>[0-9.]+)s)?"
 )
 _SERVO = {fault.name.lower(): fault for fault in Fault}
@@ -35,6 +35,8 @@ _FROZEN, _JUMP = "frozen", "jump"
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
 _BOARD = ("silent", "reset")
+_IMU = ("silent", "stuck", "railed", NONE)
+"""What can be wrong with the inertial sensor of the board."""
 _READINGS = (
     *(f"{kind}_{side}" for kind in ("open", "short", "stuck") for side in SIDES),
     *SIDES,
@@ -47,6 +49,7 @@ _READINGS = (
 _KNOWN = {
     "servo": (*_SERVO, *_HARDWARE, "reboot", _FROZEN, _JUMP, NONE),
     "esp32": (*_BOARD, *_READINGS, "ber"),
+    "imu": _IMU,
     "bus": ("loss", "silent", "latency", "discharge", "ber", "echo"),
     "wire": ("loss", "ber"),
 }
@@ -68,7 +71,8 @@ class Demand:
     """One fault, and when.
 
     Attributes:
-        target: "servo", "esp32", "bus", or "wire" for the wires of both.
+        target: "servo", "esp32", "imu" for the inertial sensor on that board, "bus", or "wire" for
+            the wires of both.
         servo: Id, for a servo.
         what: Its name.
         size: Delay of a late answer or of all [s], share of answers or bytes lost or of bits
@@ -143,6 +147,7 @@ class Faults:
         demands: The faults.
         ids: Ids of the servos, in their order.
         alone: There are servos and their bus, but no robot.
+        has_imu: The board has an inertial sensor.
 
     Attributes:
         on_begin: Told each of them as it happens, and the time [s].
@@ -151,11 +156,17 @@ class Faults:
         BadInputError: One is for something that is not there.
     """
 
-    def __init__(self, demands: Sequence[Demand], ids: Sequence[int], alone: bool = False) -> None:
+    def __init__(
+        self,
+        demands: Sequence[Demand],
+        ids: Sequence[int],
+        alone: bool = False,
+        has_imu: bool = False,
+    ) -> None:
         self._waiting = sorted(demands, key=lambda demand: demand.t)
         self._ids = tuple(ids)
         self.on_begin: Callable[[Demand, float], None] = lambda demand, t: None
-        self._alone = alone
+        self._alone, self._has_imu = alone, has_imu
         for demand in demands:
             self._require(demand)
 
@@ -173,10 +184,17 @@ class Faults:
         if demand.target == "servo" and demand.servo not in self._ids:
             known = ", ".join(map(str, self._ids))
             raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
-        if self._alone and (demand.target in ("esp32", "wire") or demand.what == "discharge"):
+        if self._alone and (
+            demand.target in ("esp32", "imu", "wire") or demand.what == "discharge"
+        ):
             raise BadInputError(
                 "--fault: expected one of a servo or the bus where there is no robot, found "
                 f"{demand.target}={demand.what}"
+            )
+        if demand.target == "imu" and not self._has_imu:
+            raise BadInputError(
+                "--fault: expected a robot with an inertial sensor (robot.imu.kind), found one "
+                f"without for {demand}"
             )
 
     def apply(self, twin: TwinRobot | ServoBox, t: float) -> None:
@@ -198,6 +216,8 @@ def _break_robot(robot: TwinRobot, demand: Demand) -> None:
     if demand.target == "wire":
         for noise in (robot.noise, robot.bus.noise):
             setattr(noise, demand.what, demand.size)
+    elif demand.target == "imu" and robot.imu is not None:
+        robot.imu.trouble = "" if demand.what == NONE else demand.what
     elif demand.what in _READINGS:
         robot.converter.set(demand.what, demand.size)
     elif demand.what == "ber":

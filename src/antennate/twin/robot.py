@@ -8,6 +8,7 @@ robot stands and the board repeats its first reading.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,18 +19,21 @@ from antennate.errors import SimulationError
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
 from antennate.params.hardware import BatteryParams
+from antennate.robots.imu import in_counts
 from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
-from antennate.twin.board import Converter, TouchStimulus
+from antennate.twin.board import Converter, ImuReadings, TouchStimulus
 from antennate.twin.orders import Plugging, Pushes
 from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
-from antennate.types import Floats
+from antennate.types import AntennaFrame, Floats
 
 GREETING_PERIOD = 1.0
 """Time between greetings of the board [s], as firmware/main.py."""
 BOARD_SETTINGS = (15, 34, 35)
 """Burst and pins of firmware/config.py."""
+IMU_SETTINGS = (21, 22, 0x6A, 1, 2, 3)
+"""Pins, address and axes of an inertial sensor, as docs/firmware.md wires it."""
 BOOT_TICKS = 50
 """Samples that a starting board does not send: half a second at 100 Hz."""
 _STANDING_NOISE = 2.5
@@ -59,6 +63,7 @@ class TwinRobot:
 
     Attributes:
         converter: Makes the board's codes of readings, and breaks them on demand.
+        imu: The same of its inertial sensor, None without one.
         bus: The servos on their wire.
         plugging: Plugs servos in and turns shafts, by orders.
         t: Time up to which everything has happened [s].
@@ -92,14 +97,18 @@ class TwinRobot:
         kinds = [robot.servos.of(name) for name in robot.servo_names]
         self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
         self._period = period
-        self._encoder = frame.SampleEncoder(boot_id)
+        self._encoder = frame.SampleEncoder(boot_id, robot.has_imu)
         self._boot_id = boot_id
         self._stream = bytearray()
-        self._buffer = bytearray(frame.SAMPLE_FRAME_SIZE)
+        self._buffer = bytearray(self._encoder.size)
         self._ticks = self._walked = self._booted = 0
         self._held_in_reset = self._off = False
         self.converter = Converter(boot_id, mains)
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
+        self._imu_params = robot.imu
+        self.imu: ImuReadings | None = None
+        if robot.has_imu:
+            self.imu = ImuReadings(robot.imu, period, boot_id if standing_noise else None)
         self.touch = touch or TouchStimulus((), robot.antenna)
         self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0
@@ -113,8 +122,23 @@ class TwinRobot:
         self._visit, self._touched = Visit(), False
         self._standing, self._start = True, body.world(0).state()
         self._show(self._shafts())
-        self._counts = body.read().counts[0]
+        self._read()
         self._sample()
+
+    def _read(self) -> None:
+        """Let the sensors of the body measure once."""
+        self._frame = self._body.read()
+        self._counts = self._frame.counts[0]
+
+    @property
+    def sample_size(self) -> int:
+        """Bytes of a frame with a sample of its board."""
+        return self._encoder.size
+
+    @property
+    def frame(self) -> AntennaFrame:
+        """What the body felt last, at the twin's time, before faults of the board."""
+        return replace(self._frame, t=np.array([self.t]))
 
     @property
     def failure(self) -> SimulationError | None:
@@ -171,7 +195,7 @@ class TwinRobot:
         self._body.world(0).servo_drives.set(drives)
         self._walked += 1
         self._body.clock.sleep_until(self._walked * self._period)
-        self._counts = self._body.read().counts[0]
+        self._read()
         self._watch(self._body.world(0))
         return self._shafts()
 
@@ -226,7 +250,7 @@ class TwinRobot:
             self.board_silent = True
         else:
             self._boot_id = (self._boot_id * 1_103_515_245 + 12_345) & 0xFFFFFFFF
-            self._encoder = frame.SampleEncoder(self._boot_id)
+            self._encoder = frame.SampleEncoder(self._boot_id, self.imu is not None)
             self._booted = self._ticks + BOOT_TICKS
 
     def order_touch(self, text: str) -> None:
@@ -268,7 +292,7 @@ class TwinRobot:
             self.servos, self._joints.positions(self._body.world(0).drives()).tolist(), strict=True
         ):
             servo.carry(ticks)
-        self._counts = self._body.read().counts[0]
+        self._read()
         self.on_return()
 
     def _shafts(self) -> Floats:
@@ -303,12 +327,25 @@ class TwinRobot:
         left, right = self.converter.codes(now, self._counts, noise)
         flags = _rail(left, frame.FLAG_LEFT_RAIL) | _rail(right, frame.FLAG_RIGHT_RAIL)
         ticks = round(1e6 * since * self._period) & frame.TICK_MASK
-        size = self._encoder.encode_sample_into(self._buffer, since, ticks, left, right, flags, 0)
+        imu = self._inertial()
+        misses = 0 if self.imu is None else self.imu.misses
+        size = self._encoder.encode_sample_into(
+            self._buffer, since, ticks, left, right, flags, 0, imu, misses
+        )
         self._stream += self._buffer[:size]
+
+    def _inertial(self) -> tuple[int, ...]:
+        """What the board sends of its inertial sensor; nothing without one."""
+        if self.imu is None:
+            return ()
+        felt = self._frame
+        counts = in_counts(self._imu_params, felt.angular_velocity, felt.linear_acceleration)[0]
+        return self.imu.sample(counts, self._standing)
 
     def _greet(self) -> None:
         rate = round(1 / self._period)
-        settings = frame.config_hash(rate, *BOARD_SETTINGS)
+        imu = () if self.imu is None else IMU_SETTINGS
+        settings = frame.config_hash(rate, *BOARD_SETTINGS, imu)
         reset = frame.RESET_HARD if self._booted else frame.RESET_POWER_ON
         self._stream += frame.encode_hello(self._boot_id, reset, settings, _DEVICE, rate)
 

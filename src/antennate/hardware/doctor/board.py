@@ -13,6 +13,7 @@ from antennate.antenna.curves import plateau_of
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError
 from antennate.hardware.config import DoctorConfig
+from antennate.hardware.doctor import inertial
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Finding, Opener
 from antennate.hardware.esp32 import frame
@@ -176,6 +177,7 @@ def findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding
         yield broken, "broken frames", "none"
         for side, name in enumerate(("left", "right")):
             yield from _antenna(board, config, name, board.counts[:, side].tolist())
+        yield from inertial.findings(board.readings, config)
     for sensor_id in dict.fromkeys((config.sensor_id, config.sensor_id_right)):
         try:
             require_sensor(hello, sensor_id)

@@ -279,6 +279,7 @@ class Report:
             "crc_errors": board.decoder.counters.crc_errors,
             "lost_samples": board.lost,
             "overdue_samples": board.overdue,
+            **({} if session.imu is None else {"imu_readings": dict(session.imu.result())}),
             "resets": board.clock.resets,
             "missed_answers": answers.misses,
             "stale_answers": answers.stale,

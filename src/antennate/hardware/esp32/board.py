@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from antennate.errors import reason
 from antennate.hardware.esp32.clock import DeviceClock, SampleState, Timed
-from antennate.hardware.esp32.frame import FLAG_LATE, SAMPLE_FRAME_SIZE, encode_request
+from antennate.hardware.esp32.frame import (
+    FLAG_LATE,
+    IMU_NONE,
+    SAMPLE_FRAME_SIZE,
+    encode_request,
+)
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample, objections
 from antennate.port import Port, PortError
 from antennate.types import Clock, Floats
@@ -141,6 +146,13 @@ class Board:
         return objections(hello, first.config_hash)
 
 
+def imu_counts(readings: Sequence[int]) -> Floats:
+    """Readings of an inertial sensor as a sample has them [counts], NaN for none, shape (6,)."""
+    counts = np.array(readings or (IMU_NONE,) * 6, float)
+    counts[counts == IMU_NONE] = math.nan
+    return counts
+
+
 class BoardReader:
     """Readings of a board for a loop, on the board's own time.
 
@@ -153,11 +165,14 @@ class BoardReader:
     Attributes:
         used: Usable samples that the last reading found.
         refused: Samples it found that may not be used.
+        imu: Readings of the inertial sensor [counts] in the same sample, gyroscopes first,
+            shape (6,), NaN where it did not answer; None where the sample is missing or too old.
     """
 
     def __init__(self, board: Board, clock: Clock) -> None:
         self._board, self._clock = board, clock
         self.used = self.refused = 0
+        self.imu: Floats | None = None
         self._stamp: Timed | None = None
         self._stamp_now: float | None = None
         self._stamp_t = self._t = 0.0
@@ -173,6 +188,7 @@ class BoardReader:
         self.refused = sum(states.values()) - before - self.used
         timed = self._board.newest(now)
         self._t = max(self._t, self._time(timed, now))
+        self.imu = None if timed is None else imu_counts(timed.sample.imu)
         if timed is None:
             return self._t, np.full((1, 2), math.nan)
         return self._t, np.array([[timed.sample.left, timed.sample.right]], float)

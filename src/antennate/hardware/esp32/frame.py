@@ -11,6 +11,10 @@ with what is known here and never executed.
 |---|---|
 | HELLO | version, kind, boot id, firmware, reset, config hash, device id, tick bits, rate [Hz] |
 | SAMPLE | version, kind, boot id, sequence number, ticks [us], left, right [counts], flags, drops |
+| MOTION | as SAMPLE; angular velocity x, y, z, specific force x, y, z [counts], misses |
+
+A board with an inertial sensor sends MOTION in place of SAMPLE. Its axes are those of the head: x
+forward, y to the left, z up.
 """
 
 import struct
@@ -28,16 +32,24 @@ FULL_SCALE = 4095
 HELLO = 1
 SAMPLE = 2
 REQUEST = 3
+MOTION = 5
+"""A sample with the readings of an inertial sensor; 4 is the first byte of an ASK."""
 
 HELLO_LAYOUT = "<BBIBBBBI8sBH"
 SAMPLE_LAYOUT = "<BBIIIHHBH"
+IMU_LAYOUT = "<6hH"
+"""What follows in MOTION."""
+IMU_NONE = -32768
+"""Six of these stand for no answer of the inertial sensor; no reading is lower than -32767."""
 HELLO_SIZE = struct.calcsize(HELLO_LAYOUT)
 SAMPLE_SIZE = struct.calcsize(SAMPLE_LAYOUT)
+MOTION_SIZE = SAMPLE_SIZE + struct.calcsize(IMU_LAYOUT)
 CRC_SIZE = 4
 WRAPPING = CRC_SIZE + 3
 """Bytes around a body of less than 250 bytes: CRC, one COBS code, two delimiters."""
 HELLO_FRAME_SIZE = HELLO_SIZE + WRAPPING
 SAMPLE_FRAME_SIZE = SAMPLE_SIZE + WRAPPING
+MOTION_FRAME_SIZE = MOTION_SIZE + WRAPPING
 
 RESET_UNKNOWN = 0
 RESET_POWER_ON = 1
@@ -111,11 +123,16 @@ class Packer:
 
 
 class SampleEncoder:
-    """Encodes samples of one boot without new buffers."""
+    """Encodes samples of one boot without new buffers, with an inertial sensor or without one.
 
-    def __init__(self, boot_id: int) -> None:
+    `size` is the length of each frame: SAMPLE_FRAME_SIZE or MOTION_FRAME_SIZE.
+    """
+
+    def __init__(self, boot_id: int, motion: bool = False) -> None:
         self._boot_id = boot_id
-        self._packer = Packer(SAMPLE_SIZE)
+        self._kind = MOTION if motion else SAMPLE
+        self._packer = Packer(MOTION_SIZE if motion else SAMPLE_SIZE)
+        self.size = MOTION_FRAME_SIZE if motion else SAMPLE_FRAME_SIZE
 
     def encode_sample_into(
         self,
@@ -126,27 +143,31 @@ class SampleEncoder:
         right: int,
         flags: int,
         drops: int,
+        imu: tuple[int, ...] = (),
+        misses: int = 0,
     ) -> int:
         """Write one sample as a frame.
 
         Args:
-            buffer: At least SAMPLE_FRAME_SIZE bytes.
+            buffer: At least `size` bytes.
             seq: Number of the sample since boot, modulo 2**32.
             ticks: When it was taken [us], modulo 2**TICK_BITS.
             left: Reading of the left antenna [counts].
             right: Reading of the right antenna [counts].
             flags: Sum of FLAG_ values.
             drops: Samples taken and not sent since boot, modulo 2**16.
+            imu: Readings of the inertial sensor [counts], gyroscopes first; none without one.
+            misses: Readings that it has not given since boot, modulo 2**16.
 
         Returns:
-            The frame's length, always SAMPLE_FRAME_SIZE.
+            The frame's length, always `size`.
         """
         struct.pack_into(
             SAMPLE_LAYOUT,
             self._packer.body,
             0,
             PROTOCOL,
-            SAMPLE,
+            self._kind,
             self._boot_id,
             seq & 0xFFFFFFFF,
             ticks,
@@ -155,6 +176,8 @@ class SampleEncoder:
             flags,
             drops & 0xFFFF,
         )
+        if self._kind == MOTION:
+            struct.pack_into(IMU_LAYOUT, self._packer.body, SAMPLE_SIZE, *imu, misses & 0xFFFF)
         return self._packer.pack_into(buffer)
 
 
@@ -195,6 +218,15 @@ def encode_request() -> bytes:
     return bytes(buffer)
 
 
-def config_hash(rate: int, burst: int, pin_left: int, pin_right: int) -> int:
-    """CRC-32 of a board's settings, by which host and board compare them."""
-    return crc32(struct.pack("<HHBB", rate, burst, pin_left, pin_right)) & 0xFFFFFFFF
+def config_hash(
+    rate: int, burst: int, pin_left: int, pin_right: int, imu: tuple[int, ...] = ()
+) -> int:
+    """CRC-32 of a board's settings, by which host and board compare them.
+
+    Those of an inertial sensor count where there is one: its pins SDA and SCL, its address, and
+    which of its axes point forward, left and up.
+    """
+    settings = struct.pack("<HHBB", rate, burst, pin_left, pin_right)
+    if imu:
+        settings += struct.pack("<BBBbbb", *imu)
+    return crc32(settings) & 0xFFFFFFFF

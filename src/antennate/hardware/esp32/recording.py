@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -21,9 +21,9 @@ import numpy as np
 from antennate import checks
 from antennate.errors import BadInputError
 from antennate.files import read_limited
-from antennate.hardware.esp32.board import Board
+from antennate.hardware.esp32.board import Board, imu_counts
 from antennate.hardware.esp32.clock import Timed
-from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL
+from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL, IMU_NONE
 from antennate.hardware.esp32.wire import Counters, FrameDecoder, Hello, Sample
 from antennate.messages import typed
 from antennate.notebook import from_columns
@@ -33,6 +33,8 @@ from antennate.types import Bools, Floats, Ints
 Ask: TypeAlias = Callable[[str], Callable[[], bool]]
 """Tells a person what to do; the function it returns says whether that has been confirmed."""
 
+IMU_COLUMNS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+"""Readings of an inertial sensor along the axes of the head [counts]; empty where it was silent."""
 SILENCE = DoctorParams().greeting
 """Time without a reading after which a recording ends; a board greets within it [s]."""
 _PATIENCE = 0.02
@@ -106,10 +108,13 @@ class Recorder:
                 self._row(f"{trial},{speed!r},{t:.6f},{self._counts(reading)},{way:.6f}")
 
     def _free(self) -> None:
-        self._write("time,left,right")
+        moves = self._last is not None and bool(self._last[0].sample.imu)
+        self._write(",".join(["time,left,right", *(IMU_COLUMNS if moves else ())]))
         for reading, t in self._for(self._params.duration or math.inf):
             sample = reading.sample
-            self._row(f"{t:.6f},{sample.left},{sample.right}")
+            felt = sample.imu or (IMU_NONE,) * len(IMU_COLUMNS)
+            more = ["" if n == IMU_NONE else str(n) for n in felt] if moves else []
+            self._row(",".join([f"{t:.6f},{sample.left},{sample.right}", *more]))
 
     def _row(self, line: str) -> None:
         self._write(line)
@@ -185,6 +190,8 @@ class Esp32Recording:
         counters: What became of every byte: good frames, CRC errors, noise, text.
         unknown_boot: Samples left out because no HELLO of their boot was recorded.
         unordered: Samples left out because the board's time did not rise from the one before.
+        imu: Readings of the inertial sensor [counts], gyroscopes first, NaN where it was silent,
+            shape (n, 6), or (n, 0) of a board without one.
     """
 
     t: Floats
@@ -196,6 +203,7 @@ class Esp32Recording:
     counters: Counters
     unknown_boot: int
     unordered: int
+    imu: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __repr__(self) -> str:
         """It in one line."""
@@ -214,6 +222,8 @@ class Esp32Recording:
     def to_dataframe(self) -> Any:
         """A pandas DataFrame: boot, seq, t [s], left, right [counts], left_rail, right_rail.
 
+        With an inertial sensor also the columns of `IMU_COLUMNS` [counts].
+
         Raises:
             MissingPackageError: pandas is not installed.
         """
@@ -226,6 +236,7 @@ class Esp32Recording:
                 "right": self.counts[:, 1],
                 "left_rail": self.rail[:, 0],
                 "right_rail": self.rail[:, 1],
+                **(dict(zip(IMU_COLUMNS, self.imu.T, strict=True)) if self.imu.size else {}),
             }
         )
 
@@ -261,6 +272,7 @@ def read_esp32(source: str | Path | bytes | bytearray | memoryview) -> Esp32Reco
         raise BadInputError(_empty(source, decoder.counters, len(hellos), len(samples), refused))
     parts = [_boot_arrays(samples[boot], hellos[boot]) for boot in known]
     t, seq, counts, flags = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    imu = np.concatenate([part[5] for part in parts])
     return Esp32Recording(
         t=t,
         boot=np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts]),
@@ -271,11 +283,17 @@ def read_esp32(source: str | Path | bytes | bytearray | memoryview) -> Esp32Reco
         counters=decoder.counters,
         unknown_boot=sum(len(samples[boot]) for boot in samples if boot not in hellos),
         unordered=sum(part[4] for part in parts),
+        imu=imu if any(s.imu for boot in known for s in samples[boot]) else imu[:, :0],
     )
 
 
-def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Floats, Ints, int]:
-    """Times [s], numbers, counts and flags of one boot in order, and how many were unordered."""
+def _boot_arrays(
+    samples: list[Sample], hello: Hello
+) -> tuple[Floats, Ints, Floats, Ints, int, Floats]:
+    """Times [s], numbers, counts and flags of one boot in order, and how many were unordered.
+
+    Last, what its inertial sensor read [counts], NaN for nothing.
+    """
     seq = np.array([sample.seq for sample in samples])
     ahead = (np.diff(seq, prepend=seq[0]) + (1 << 31)) % (1 << 32) - (1 << 31)
     number, first = np.unique(seq[0] + np.cumsum(ahead), return_index=True)
@@ -294,7 +312,8 @@ def _boot_arrays(samples: list[Sample], hello: Hello) -> tuple[Floats, Ints, Flo
     counts = np.array([(s.left, s.right) for s in chosen], dtype=np.float64)
     flags = np.array([s.flags for s in chosen], dtype=np.int64)
     t = 1e-6 * np.concatenate([[0], np.cumsum(step)])
-    return t, number[places], counts, flags, len(number) - len(places)
+    imu = np.array([imu_counts(s.imu) for s in chosen])
+    return t, number[places], counts, flags, len(number) - len(places), imu
 
 
 def _empty(

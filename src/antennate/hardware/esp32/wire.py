@@ -63,6 +63,9 @@ class Sample:
         left: Left reading [counts]; so `right`.
         flags: Sum of `frame.FLAG_` values.
         drops: Samples the board could not send since boot, modulo 2**16.
+        imu: Readings of its inertial sensor [counts], gyroscopes first, each `frame.IMU_NONE` where
+            it did not answer; empty of a board without one.
+        misses: Readings that it has not given since boot, modulo 2**16.
     """
 
     boot_id: int
@@ -72,6 +75,8 @@ class Sample:
     right: int
     flags: int
     drops: int
+    imu: tuple[int, ...] = ()
+    misses: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +87,11 @@ class Refused:
 
 
 Frame = Hello | Sample | Refused
+_SIZES = {
+    frame.HELLO: frame.HELLO_SIZE,
+    frame.SAMPLE: frame.SAMPLE_SIZE,
+    frame.MOTION: frame.MOTION_SIZE,
+}
 
 
 def parse(body: bytes | bytearray) -> Frame:
@@ -92,11 +102,11 @@ def parse(body: bytes | bytearray) -> Frame:
             f"the board speaks protocol version {version}, this host version {frame.PROTOCOL}: "
             "deploy the firmware of this release"
         )
-    sizes = {frame.HELLO: frame.HELLO_SIZE, frame.SAMPLE: frame.SAMPLE_SIZE}
-    if kind not in sizes:
-        return Refused(f"frame kind {kind} is unknown, valid are {frame.HELLO} and {frame.SAMPLE}")
-    if len(body) != sizes[kind]:
-        return Refused(f"frame kind {kind} has {sizes[kind]} bytes, found {len(body)}")
+    if kind not in _SIZES:
+        *others, last = map(str, _SIZES)
+        return Refused(f"frame kind {kind} is unknown, valid are {', '.join(others)} and {last}")
+    if len(body) != _SIZES[kind]:
+        return Refused(f"frame kind {kind} has {_SIZES[kind]} bytes, found {len(body)}")
     return _hello(body) if kind == frame.HELLO else _sample(body)
 
 
@@ -121,10 +131,15 @@ def _hello(body: bytes | bytearray) -> Hello | Refused:
 
 
 def _sample(body: bytes | bytearray) -> Sample | Refused:
-    _, _, boot_id, seq, ticks, left, right, flags, drops = struct.unpack(frame.SAMPLE_LAYOUT, body)
+    _, kind, boot_id, seq, ticks, left, right, flags, drops = struct.unpack_from(
+        frame.SAMPLE_LAYOUT, body
+    )
     if max(left, right) > frame.FULL_SCALE:
         return Refused(f"counts are at most {frame.FULL_SCALE}, found {left} and {right}")
-    return Sample(boot_id, seq, ticks, left, right, flags, drops)
+    imu, misses = (), 0
+    if kind == frame.MOTION:
+        *imu, misses = struct.unpack_from(frame.IMU_LAYOUT, body, frame.SAMPLE_SIZE)
+    return Sample(boot_id, seq, ticks, left, right, flags, drops, tuple(imu), misses)
 
 
 def objections(hello: Hello, config_hash: int | None = None) -> tuple[str, ...]:

@@ -23,7 +23,13 @@ from antennate.port import Port, PortError, port_errors
 
 _COUNTS, _TAG = datagram.COUNTS_SIZE, datagram.TAG_SIZE
 _GREETING_SIZE = frame.HELLO_FRAME_SIZE + _COUNTS + _TAG
-_FRAME_SIZE = frame.SAMPLE_FRAME_SIZE + _TAG
+_KINDS = {
+    _GREETING_SIZE: datagram.GREETING,
+    frame.SAMPLE_FRAME_SIZE + _TAG: datagram.FRAME,
+    frame.MOTION_FRAME_SIZE + _TAG: datagram.FRAME,
+}
+"""What a datagram of this size is."""
+_BODIES = (frame.SAMPLE_SIZE + frame.CRC_SIZE, frame.MOTION_SIZE + frame.CRC_SIZE)
 _NUMBERS = 1 << 32
 _OPEN_ASKS = 16
 """Asks that may still be answered: 4 s of them."""
@@ -111,7 +117,7 @@ class Verifier:
         """
         self.tally.received += 1
         content, tag = data[:-_TAG], data[-_TAG:]
-        kind = {_FRAME_SIZE: datagram.FRAME, _GREETING_SIZE: datagram.GREETING}.get(len(data))
+        kind = _KINDS.get(len(data))
         expected = b"" if kind is None else self._signer.tag(kind, self._nonce, content)
         if not hmac.compare_digest(expected, tag):
             self.tally.forged += 1
@@ -139,7 +145,7 @@ class Verifier:
 
     def _frame(self, content: bytes, now: float) -> bytes:
         body = frame.unstuff(content[1:-1])
-        if body is None or len(body) != frame.SAMPLE_SIZE + frame.CRC_SIZE:
+        if body is None or len(body) not in _BODIES:
             return content
         boot, seq = struct.unpack(frame.SAMPLE_LAYOUT, body[: frame.SAMPLE_SIZE])[2:4]
         ahead = 1 if self._seq is None else (seq - self._seq) % _NUMBERS

@@ -56,6 +56,12 @@ class Cause(Enum):
         "resting readings have drifted from the calibration",
         "let the antenna rest; if it stays, calibrate again",
     )
+    IMU = (
+        State.DEGRADED,
+        "the inertial sensor gives nothing that can be used",
+        "walk on without it; check its wires, its supply and the pins in firmware/config.py "
+        "(`antennate doctor`)",
+    )
     RATE = (State.DEGRADED, "samples do not come at the expected rate", _BOARD)
     LATE_ANSWERS = (State.DEGRADED, "servos answer late", f"close other programs; {_BUS}")
     SUPPLY_UNKNOWN = (

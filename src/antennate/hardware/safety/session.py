@@ -28,6 +28,7 @@ from antennate.hardware.joints import CommandError
 from antennate.hardware.safety import deadlines
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.controller import SupervisedController
+from antennate.hardware.safety.imu import ImuDiagnosis
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.hardware.timing import LoopTiming
@@ -63,6 +64,7 @@ class Session:
     Attributes:
         period: Control period [s].
         quality: What the readings of the antennae are worth.
+        imu: What those of the inertial sensor are worth, None without one.
         control: The controller under supervision.
         orders: Read in every tick.
         outputs: The supervisor's of the last tick, None before the first.
@@ -95,7 +97,9 @@ class Session:
         self.timing: LoopTiming | None = None
         self.outputs: Outputs | None = None
         self._angles = (math.nan,) * len(actuators.robot.ids)
-        self.frame = AntennaFrame(np.zeros(1), np.full((1, 2), math.nan), np.array([self._angles]))
+        robot = actuators.robot
+        self.imu = ImuDiagnosis(robot.imu) if robot.has_imu else None
+        self.frame = self._frame(0.0, [math.nan, math.nan])
         self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
         self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
@@ -117,15 +121,22 @@ class Session:
         empty = out is not None and any(a.cause is Cause.SUPPLY_WARN for a in out.causes)
         control.standing = self.actuators.resting or self.approaching
         control.rate = self._limits.slow_rate if empty else 1.0
-        self.frame = AntennaFrame(
-            np.array([control.time(t)]), np.array([counts]), np.array([self._angles])
-        )
+        self.frame = self._frame(control.time(t), counts)
         return self.frame
+
+    def _frame(self, t: float, counts: list[float]) -> AntennaFrame:
+        """These readings, and what else the robot feels now."""
+        parts = np.array([t]), np.array([counts]), np.array([self._angles])
+        if self.imu is None:
+            return AntennaFrame(*parts)
+        return AntennaFrame(*parts, self.imu.angular_velocity, self.imu.linear_acceleration)
 
     def _feel(self) -> float:
         """Judge the newest reading of the board: its time [s]."""
         t, counts = self.reader.read()
         self.quality.step(t, counts[0].tolist(), self.control.decision.contact)
+        if self.imu is not None:
+            self.imu.step(t, self.reader.imu)
         return t
 
     def write(self, command: JointCommand) -> None:
@@ -226,6 +237,7 @@ class Session:
             leaps=state.joints.leaps,
             modes=state.modes,
             drift=self.quality.drifted,
+            imu="" if self.imu is None else self.imu.fault,
             objections=() if self.actuators.enabled else self.quality.objections,
             unrecorded=self.unrecorded,
             arm=self.orders.arm,

@@ -95,6 +95,7 @@ class Inputs:
         leaps: Joints that have moved faster than they can, likewise.
         modes: Servos in a wrong operating mode, likewise.
         drift: How far resting readings have drifted, empty if not far.
+        imu: What is wrong with the inertial sensor, empty if nothing is or there is none.
         objections: Reasons not to arm, such as a failed touch check or unknown firmware.
         unrecorded: Whether a record that is required is not kept.
         stop: Whether the operator wants the torque off.
@@ -126,6 +127,7 @@ class Inputs:
     leaps: Mapping[int, str]
     modes: Mapping[int, str]
     drift: str
+    imu: str
     objections: tuple[str, ...]
     unrecorded: bool
     stop: bool
@@ -281,6 +283,8 @@ class Supervisor:
             causes[Cause.RATE] = f"{self.meter.rate:.0f} Hz"
         if inputs.drift:
             causes[Cause.DRIFT] = inputs.drift
+        if inputs.imu:
+            causes[Cause.IMU] = inputs.imu
         return causes
 
     def _servos(self, inputs: Inputs, causes: dict[Cause, str]) -> None:

@@ -1,0 +1,87 @@
+"""Reads ST's LSM6DSOX, three gyroscopes and three accelerometers, over I2C.
+
+Registers and their bits are those of ST's own driver, lsm6dsox_reg.h. It measures up to 1000 deg/s
+and 8 g, as the host's `robot.imu` says by default. A board without one needs no copy of this file.
+"""
+
+import struct
+
+import antenna_frame as frame
+import machine
+
+WHO_AM_I = 0x0F
+IDENTITY = 0x6C
+CTRL1_XL = 0x10
+CTRL2_G = 0x11
+CTRL3_C = 0x12
+OUTX_L_G = 0x22
+"""First of twelve registers: angular velocity, then specific force."""
+UP_TO_8_G = 3 << 2
+UP_TO_1000_DPS = 2 << 2
+WHOLE_READINGS = 0x44
+"""No register changes while one of its pair is read, and addresses rise by themselves."""
+SLOWEST = 4
+"""Code of 104 Hz; each further one doubles the rate."""
+FASTEST = 10
+TIMEOUT_US = 1000
+RETRY = 100
+"""Samples from one try to begin again to the next, once it has not answered."""
+
+
+class Imu:
+    """The sensor behind two pins."""
+
+    def __init__(self, sda, scl, address, axes, rate):
+        self._bus = machine.I2C(
+            0, scl=machine.Pin(scl), sda=machine.Pin(sda), freq=400000, timeout=TIMEOUT_US
+        )
+        self._address = address
+        self._axes = axes
+        self._code = SLOWEST
+        while self._code < FASTEST and 104 << (self._code - SLOWEST) < rate:
+            self._code += 1
+        self._raw = bytearray(12)
+        self._wait = 0
+        self._ready = False
+        self.misses = 0
+
+    def read_into(self, target, at):
+        """Write six readings along the axes of the head to a target from an index on."""
+        if not self._read():
+            self.misses += 1
+            for i in range(6):
+                target[at + i] = frame.IMU_NONE
+            return
+        readings = struct.unpack("<6h", self._raw)
+        for i in range(6):
+            axis = self._axes[i % 3]
+            reading = readings[i - i % 3 + abs(axis) - 1]
+            reading = reading if axis > 0 else -reading
+            target[at + i] = max(-32767, min(32767, reading))
+
+    def _read(self):
+        """Whether readings have come."""
+        if not self._ready:
+            self._wait -= 1
+            if self._wait > 0:
+                return False
+            self._wait = RETRY
+        try:
+            self._ready = self._ready or self._begin()
+            if self._ready:
+                self._bus.readfrom_mem_into(self._address, OUTX_L_G, self._raw)
+        except OSError:  # no answer
+            self._ready = False
+        return self._ready
+
+    def _begin(self):
+        """Set it up; False if another part answers."""
+        if self._bus.readfrom_mem(self._address, WHO_AM_I, 1)[0] != IDENTITY:
+            return False
+        for register, value in (
+            (CTRL3_C, WHOLE_READINGS),
+            (CTRL1_XL, self._code << 4 | UP_TO_8_G),
+            (CTRL2_G, self._code << 4 | UP_TO_1000_DPS),
+        ):
+            self._bus.writeto_mem(self._address, register, bytes([value]))
+        return True
