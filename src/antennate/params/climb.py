@@ -109,9 +109,9 @@ class FeelParams(Params):
     )
     """Elevation of the antennae before a raised head, from the plane of the tail."""
     check_sweep: float = number(
-        0.0,
+        math.radians(-15.0),
         "rad",
-        "fitted: walls of seed 3, of 64 it knows 62; at -30 deg 26 of 32",
+        "fitted: walls of seed 3, of 64 it knows 63; at -30 deg 26 of 32",
         ge=-0.8,
         le=0.8,
     )

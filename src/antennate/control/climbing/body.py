@@ -206,12 +206,12 @@ class Body:
         self.heading.step(frame, along, self._stands)
 
     def _back(self, maneuver: Ints) -> Floats:
-        """Yaw offset that keeps the heading of rows that push their head over an edge, shape (B,).
+        """Yaw offset that keeps the heading of rows whose head is at an edge [rad], shape (B,).
 
-        It is the heading that they had when the plan began, or when they last steered [rad].
+        It is the heading that they had when the plan began, or when they last steered.
         """
         forward = maneuver == int(Maneuver.FORWARD)
-        keep = self.head_is_up & (forward | (maneuver == int(Maneuver.HOLD)))
+        keep = self.nose_is_up & (forward | (maneuver == int(Maneuver.HOLD)))
         self.heading.mark(keep)
         self.heading.forget(~keep)
         turned = np.where(forward, self.heading.turned, 0.0)

@@ -194,7 +194,8 @@ class ClimbRule:
     def _lift(self, row: int, flex: Floats, steering: int) -> int:
         """Stand until the head is raised, then the antennae level before it.
 
-        They are spread: one that is pushed along its axis bends the other way, which is no touch.
+        They are spread a little: one that is pushed along its axis may bend the other way, which is
+        no touch.
         """
         late = self._since[row] > 0.5 * self._p.lift_time
         self._pose(row, self._feel.check if late else self._feel.highest, self._feel.check_sweep)
