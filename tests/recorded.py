@@ -81,7 +81,13 @@ def press(controller: Controller, control: ControlParams) -> None:
     for tick in range(round(60.0 / control.period)):
         pressed = 1.0 < tick * control.period < 35.0
         counts = np.array([[1400.0 if pressed else 1870.0, 1410.0 if pressed else 1870.0]])
-        controller.step(AntennaFrame(t=np.array([tick * control.period]), counts=counts))
+        controller.step(at_rest(tick * control.period, counts))
+
+
+def at_rest(t: float, counts: np.ndarray) -> AntennaFrame:
+    """The frame of a robot whose head does not move, at t [s]; counts of shape (1, 2)."""
+    still, upwards = np.zeros((1, 3)), np.array([[0.0, 0.0, 9.81]])
+    return AntennaFrame(np.array([t]), counts, angular_velocity=still, linear_acceleration=upwards)
 
 
 def meet_ground(control: ControlParams, robot: RobotSpec) -> None:
@@ -111,7 +117,6 @@ def climb_all(control: ControlParams, robot: RobotSpec) -> None:
             Stage.PROBE_DOWN: straight if even else bent,
             Stage.CHECK: bent if visits[stage] == 2 else floor,
         }.get(Stage(stage), floor)
-        t = np.array([tick * control.period])
-        controller.step(AntennaFrame(t=t, counts=np.full((1, 2), counts)))
+        controller.step(at_rest(tick * control.period, np.full((1, 2), counts)))
     rule.stage[0] = Stage.RETREAT  # as after a climb that failed
-    controller.step(AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), floor)))
+    controller.step(at_rest(0.0, np.full((1, 2), floor)))

@@ -18,6 +18,7 @@ from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.driving.teleop import KeyController
+from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams
 from antennate.robots.spec import RobotSpec
@@ -26,6 +27,7 @@ from antennate.telemetry.view.pace import Tuning
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'own_controller.py'}:OwnController"
 LIFTING = {"legs": {"kind": "lifting"}}
 RISING = {"pitch": {"kind": "actuated"}, "elevation": {"kind": "pair"}}
+FEELING = {"imu": {"kind": "head"}}
 CLIMBING = ("climb", "lifted", "rhythm", "edges")
 SWEEP = {f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency")}
 CARRY = {"climb.carry_gain", "climb.carry_rate"}
@@ -36,9 +38,10 @@ LINE = {
         *("frequency", "ahead"),
     )
 }
+HEADING = {f"climb.heading.{name}" for name in HeadingParams.model_fields}
 NO_EFFECT = {
     "climb": SWEEP,
-    "lifted": SWEEP | CARRY | LINE,
+    "lifted": SWEEP | CARRY | LINE | HEADING,
     "rhythm": SWEEP,
     "edges": SWEEP | CARRY,
 }
@@ -57,13 +60,15 @@ ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
 }
 
 
-@pytest.mark.parametrize("robot", [{}, LIFTING], ids=["rolling", "lifting"])
+@pytest.mark.parametrize(
+    "robot", [FEELING, LIFTING], ids=["rolling, with inertial sensor", "lifting"]
+)
 @pytest.mark.parametrize("trigger", ["repetition", "contact"])
 @pytest.mark.parametrize("name", ACTS)
 def test_what_a_controller_is_said_not_to_read_is_that(
     name: str, trigger: str, robot: dict[str, Any]
 ) -> None:
-    if name == "geometric" and robot:
+    if name == "geometric" and robot == LIFTING:
         pytest.skip("it refuses lifting legs (test_geometric.py)")
     control = ControlParams.model_validate({"rate": 25.0, "escape": {"trigger": trigger}})
     spec = RobotSpec.model_validate(robot | (RISING if name in CLIMBING else {}))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antennate.params.base import paths_of
-from antennate.params.climb import ClimbParams
+from antennate.params.climb import ClimbParams, HeadingParams
 from antennate.params.control import (
     CentreParams,
     ControlParams,
@@ -114,6 +114,7 @@ _FOLLOW = paths_of(FollowParams, "follow")
 _CENTRE = paths_of(CentreParams, "centre")
 _BLIND = (*_TIMED, *_SCHEDULE, *_ZIGZAG, *_RANDOM)
 _CLIMB = paths_of(ClimbParams, "climb")
+_HEADING = paths_of(HeadingParams, "climb.heading")
 _BODY = tuple(
     f"climb.{name}"
     for name in (
@@ -124,8 +125,8 @@ _BODY = tuple(
 """What raises a body."""
 _CARRY = ("climb.carry_gain", "climb.carry_rate")
 """What holds a raised head in spite of its load."""
-_RAISED = (*(path for path in _BODY if path not in _CARRY), "climb.feel.highest")
-"""The same with antennae held up, without that."""
+_RAISED = (*(path for path in _BODY if path not in _CARRY), *_HEADING, "climb.feel.highest")
+"""The same with antennae held up, without that, and what keeps its heading."""
 _SWEEP = ("gait.antenna_mean", "gait.antenna_amplitude", "gait.antenna_frequency")
 """How the gait moves the bases; those that climb move them themselves."""
 _RHYTHM = tuple(
@@ -222,7 +223,12 @@ def unread_by_all(
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
     paths = set.intersection(*(unread(name, control, knows) for name in names))
     reasons = {f"control.{path}": who for path in sorted(paths)}
-    return reasons | (unread_lift(robot, "control.gait") if set(names) <= set(UNREAD) else {})
+    if not set(names) <= set(UNREAD):
+        return reasons
+    if not robot.has_imu:
+        for path in _HEADING:
+            reasons.setdefault(f"control.{path}", "the robot has no inertial sensor")
+    return reasons | unread_lift(robot, "control.gait")
 
 
 def unread_limits(names: Sequence[str]) -> dict[str, str]:

@@ -98,8 +98,9 @@ class Body:
         self.still: Bools = np.zeros(batch, dtype=bool)
         self.measured: Floats = np.full((batch, robot.pitch_count), np.nan)
         self._yaw: Floats = np.full((batch, robot.yaw_count), np.nan)
-        self.heading = Heading(control.climb.heading, batch, control.period)
-        self._usual_turn = control.gait.turn_offset
+        self._heading: Heading | None = None
+        if robot.has_imu:
+            self._heading = Heading(control.climb.heading, batch, control.period)
         self._stands: Bools = np.zeros(batch, dtype=bool)
         self._sag: Floats = np.zeros((batch, robot.pitch_count))
         self._now: Floats = np.zeros((batch, robot.pitch_count + 2))
@@ -140,7 +141,8 @@ class Body:
         self.rise[rows], self.measured[rows] = self._params.rise, np.nan
         self.elevation[rows] = self.sweep[rows] = 0.0
         self._stands[rows], self._yaw[rows] = False, np.nan
-        self.heading.reset(rows)
+        if self._heading is not None:
+            self._heading.reset(rows)
 
     def begin(self, rows: Bools, rise: float | None = None) -> None:
         """Start a plan of some rows, shape (B,), for an edge ahead, where there is room for one.
@@ -175,7 +177,7 @@ class Body:
         self._amplitude += np.clip(wave - self._amplitude, -change, change)
         slow = np.logical_or.reduce(self.progress > -self._params.ahead, axis=1)
         self._gait.frequency = np.where(slow, self._slow, self._fast)
-        size = self._usual_turn if turn_offset is None else turn_offset
+        size = self._gait.params.turn_offset if turn_offset is None else turn_offset
         command = self._gait.steer(maneuver, STEER[maneuver] * size + self._back(maneuver))
         pitch = pitch_angles(self._params, self._robot, self.progress, self.rise)
         pitch[:, 0] += self.nod
@@ -202,20 +204,22 @@ class Body:
         if frame.positions.size:
             self._yaw = frame.positions[:, self._yaws]
             self.measured = frame.positions[:, self._pitches]
-        along = direction(np.nan_to_num(self._yaw), np.nan_to_num(self.measured))
-        self.heading.step(frame, along, self._stands)
+        if self._heading is not None:
+            along = direction(np.nan_to_num(self._yaw), np.nan_to_num(self.measured))
+            self._heading.step(frame, along, self._stands)
 
     def _back(self, maneuver: Ints) -> Floats:
         """Yaw offset that keeps the heading of rows whose head is at an edge [rad], shape (B,).
 
         It is the heading that they had when the plan began, or when they last steered.
         """
+        if self._heading is None:
+            return np.zeros(len(maneuver))
         forward = maneuver == int(Maneuver.FORWARD)
         keep = self.nose_is_up & (forward | (maneuver == int(Maneuver.HOLD)))
-        self.heading.mark(keep)
-        self.heading.forget(~keep)
-        turned = np.where(forward, self.heading.turned, 0.0)
-        return steer(self._params.heading, turned)
+        self._heading.mark(keep)
+        self._heading.forget(~keep)
+        return steer(self._params.heading, np.where(forward, self._heading.turned, 0.0))
 
     def _carry(self, goals: Floats, moves: Bools) -> None:
         """Integrate what the load takes off the pitch joints of held rows; let go of the others."""
