@@ -74,7 +74,7 @@ class Heading:
         """
         if frame.angular_velocity.size == 0:
             return
-        known = np.isfinite(frame.angular_velocity).all(axis=1)
+        known: Bools = np.logical_and.reduce(np.isfinite(frame.angular_velocity), axis=1)
         told = np.where(known[:, None], frame.angular_velocity, self._bias)
         rests = stands & known & (abs(told) < self._params.rest_rate).all(axis=1)
         self._rested = np.where(rests, self._rested + self._period, 0.0)
