@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
 from antennate.experiments.climb.crossing import ground_tables
 from antennate.experiments.climb.experiment import ClimbOutcome, tables
 from antennate.experiments.climb.figure import success
-from antennate.experiments.climb.measures import sentence, step_tables
+from antennate.experiments.climb.measures import pairs, sentence, step_tables
 from antennate.experiments.climb.physics import ClimbRow
 from antennate.experiments.tunnel.measures import CONTROLLER, paired, summary
 from antennate.experiments.tunnel.physics import TrialResult
@@ -29,6 +30,8 @@ HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
 GROUND = HERE / "climb_ground.csv"
 """A run on other grounds, and on steps that are too high."""
+WITHOUT = HERE / "climb_without.csv"
+"""The trials of `climb` of the first run again, by a robot without an inertial sensor."""
 PLANE = HERE / "climb_plane.csv"
 """Two runs of `tunnel`, one after the other: `scuttle3d` and `scuttle`."""
 CROSSED = [
@@ -37,6 +40,8 @@ CROSSED = [
     if measure.name.startswith(("success", "wilson", "timeouts", "left", "speed", "restricted"))
 ]
 """Measures of those that the page shows."""
+NONE = "0/0 -"
+"""A cell without a trial, which the page leaves out."""
 REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
 
 
@@ -55,6 +60,8 @@ def main() -> None:
         ground = outcome_of(GROUND).result()
         text += "\n### On other grounds\n\n"
         text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
+        text += "\n### Without the inertial sensor\n\n"
+        text += "\n".join(map(markdown, without(outcome)))
         text += f"\n### In the plane\n\n{markdown(plane())}"
     page = PAGE.read_text()
     new = REGION.sub(lambda found: f"{found[1]}\n{text}\n{found[2]}", page)
@@ -68,6 +75,25 @@ def first_of(result: Mapping[str, Any]) -> list[Table]:
     shown = [entry for entry in result["climbing"] if entry["conditions"]["climb"]["trials"]]
     found = step_tables({**result, "climbing": shown})
     return [table for table in found if table.title.startswith("Climbed")]
+
+
+def without(outcome: ClimbOutcome) -> Iterator[Table]:
+    """Success of `climb` without an inertial sensor, and the pairs with those of a run with it."""
+    rows = outcome_of(WITHOUT).rows
+    for table in first_of(outcome_of(WITHOUT).result()):
+        divisor = float(table.title.rpartition(" ")[2])
+        some = [
+            {(r.ground, r.trial): r for r in run if r.part == "climbing" and r.divisor == divisor}
+            for run in ([r for r in outcome.rows if r.condition == "climb"], rows)
+        ]
+        test = pairs({"climb": list(some[0].values()), "without": list(some[1].values())})
+        found = test["without"]
+        note = (
+            f"Seed {outcome.config.seed}. Of {found['trials']} pairs {found['only_climb']} were "
+            f"climbed with the sensor alone, {found['only_other']} without it alone; McNemar p "
+            f"{found['mcnemar_p']:.3g}."
+        )
+        yield replace(table, title=f"{table.title}, without", note=note)
 
 
 def plane() -> Table:
@@ -113,8 +139,15 @@ def outcome_of(path: Path) -> ClimbOutcome:
 
 def markdown(table: Table) -> str:
     """A table of a result as one of the page."""
-    lines: list[Sequence[str]] = [("", *table.columns), ("---",) * (len(table.columns) + 1)]
-    lines += [(name.strip(), *cells) for name, cells in table.rows]
+    every = list(zip(*(cells for _, cells in table.rows), strict=True))
+    kept = [i for i, cells in enumerate(every) if table.rows[0][0] != "trials" or cells[0] != "0"]
+    heads = [table.columns[i] for i in kept]
+    lines: list[Sequence[str]] = [("", *heads), ("---",) * (len(heads) + 1)]
+    lines += [
+        (name.strip(), *(cells[i] for i in kept))
+        for name, cells in table.rows
+        if set(cells) != {NONE}
+    ]
     body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     return f"**{table.title}**\n\n{body}\n\n{table.note}\n"
 

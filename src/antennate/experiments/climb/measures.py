@@ -354,6 +354,7 @@ def sentence(result: Mapping[str, Any]) -> str:
         each = ", ".join(
             f"{name} {share(s['successes'], s['trials'] - s['invalid'], s['wilson95'])}"
             for name, s in entry["conditions"].items()
+            if s["trials"]
         )
         parts.append(f"with gain divisor {entry['divisor']:g} {each}")
     lost = sum(s["invalid"] for e in result["climbing"] for s in e["conditions"].values())
