@@ -13,7 +13,7 @@ from antennate.control.registry import make_controller
 from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Floats
+from antennate.types import AntennaFrame, Floats, joint_angles
 
 PERIOD = 0.01
 PARAMS = HeadingParams()
@@ -77,22 +77,67 @@ def test_a_head_that_rocks_is_not_at_rest() -> None:
     assert heading.turned[0] == pytest.approx(0.15, abs=0.005)
 
 
-def test_readings_that_are_missing_are_no_turn_and_rows_are_their_own() -> None:
+@pytest.mark.parametrize(("missing", "told"), [(0.04, 0.48), (0.5, 0.0)])
+def test_a_moment_without_a_reading_is_no_turn_and_a_longer_one_ends_the_mark(
+    missing: float, told: float
+) -> None:
+    """Half a second at 0.5 rad/s, then nothing, then half a second more."""
+    heading, up = Heading(PARAMS, 1, PERIOD), np.array([0.0, 0.0, 1.0])
+    moves = np.array([False])
+    sound, silent = frame(0.5 * up - BIAS, up), frame(np.full(3, math.nan), np.full(3, math.nan))
+    heading.mark(np.array([True]))
+    for reading, seconds in ((sound, 0.5), (silent, missing), (sound, 0.46)):
+        for _ in range(round(seconds / PERIOD)):
+            heading.step(reading, AHEAD, moves)
+    assert heading.turned[0] == pytest.approx(told, abs=0.01)
+    heading.mark(np.array([True]))
+    heading.step(sound, AHEAD, moves)
+    assert heading.turned[0] == pytest.approx(told + 0.005, abs=0.01)
+
+
+def test_a_joint_that_is_not_told_ends_the_mark() -> None:
+    heading, up = Heading(PARAMS, 1, PERIOD), np.array([0.0, 0.0, 1.0])
+    heading.mark(np.array([True]))
+    for body in (AHEAD, np.full((1, 3), math.nan)):
+        for _ in range(10):
+            heading.step(frame(up - BIAS, up), body, np.array([False]))
+    assert heading.turned[0] == 0.0
+
+
+def test_rows_are_their_own_and_reset_alone() -> None:
     heading = Heading(PARAMS, 2, PERIOD)
     heading.mark(np.array([True, True]))
-    rates = np.array([[0.0, 0.0, 0.5], [math.nan] * 3])
-    forces = np.array([[0.0, 0.0, GRAVITY], [math.nan] * 3])
+    rates = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, -0.2]])
+    forces = np.array([[0.0, 0.0, GRAVITY], [0.0, 0.0, GRAVITY]])
+    reading = AntennaFrame(
+        np.zeros(2), np.zeros((2, 2)), angular_velocity=rates, linear_acceleration=forces
+    )
     for _ in range(100):
-        reading = AntennaFrame(
-            np.zeros(2),
-            np.zeros((2, 2)),
-            angular_velocity=rates,
-            linear_acceleration=forces,
-        )
         heading.step(reading, np.repeat(AHEAD, 2, axis=0), np.zeros(2, dtype=bool))
-    assert heading.turned == pytest.approx([0.5, 0.0], abs=0.01)
+    assert heading.turned == pytest.approx([0.5, -0.2], abs=0.01)
     heading.reset(np.array([0]))
-    assert heading.turned.tolist() == [0.0, 0.0]
+    assert heading.turned == pytest.approx([0.0, -0.2], abs=0.01)
+
+
+def test_a_force_straight_down_leaves_the_vertical_where_it_was() -> None:
+    heading = Heading(HeadingParams(level_time=2.0 * PERIOD), 1, PERIOD)
+    heading.mark(np.array([True]))
+    for up in (-1.0, 1.0, 1.0):
+        vertical = np.array([0.0, 0.0, up])
+        heading.step(frame(np.array([0.0, 0.0, 1.0]) - BIAS, vertical), AHEAD, np.array([False]))
+    assert heading.turned[0] == pytest.approx(0.03, abs=0.001)
+
+
+def test_a_later_rest_does_not_undo_a_longer_one() -> None:
+    """Ten seconds at rest, then it is pushed round at 3 deg/s for a second."""
+    heading, up = Heading(PARAMS, 1, PERIOD), np.array([0.0, 0.0, 1.0])
+    for rate, seconds in ((0.0, 10.0), (1.0, 0.1), (0.05, 1.0)):
+        for _ in range(round(seconds / PERIOD)):
+            heading.step(frame(rate * up, up), AHEAD, np.array([True]))
+    heading.mark(np.array([True]))
+    for _ in range(1000):
+        heading.step(frame(np.zeros(3), up), AHEAD, np.array([False]))
+    assert abs(heading.turned[0]) < 0.05
 
 
 def rotation(axis: int, angle: float) -> Floats:
@@ -119,22 +164,33 @@ def test_who_was_turned_to_the_left_steers_to_the_right_up_to_a_limit() -> None:
     assert offsets.tolist() == pytest.approx([PARAMS.gain * 0.1, -PARAMS.gain * 0.1, 0.3])
 
 
-@pytest.mark.parametrize(("kind", "steers"), [("head", True), ("none", False)])
-def test_a_robot_that_climbs_steers_back_where_it_feels_that_it_is_turned(
-    kind: str, steers: bool
-) -> None:
+def walked(sensor: str) -> Floats:
+    """Yaw joints of `rhythm` at last, which is turned while it climbs [rad], shape (Y,).
+
+    Its joints are where they were told to be.
+    """
     scuttle3d = RobotSpec.named("scuttle3d").model_dump()
+    kind = "none" if sensor == "none" else "head"
     robot = RobotSpec.model_validate(scuttle3d | {"imu": {"kind": kind}})
-    control = ControlParams.model_validate({"gait": {"amplitude": 0.0}})
+    control = ControlParams()
     controller = make_controller("rhythm", control, robot, 1)
     controller.reset(np.array([0]))
     climb = control.climb
     begins = climb.walk_time + climb.retreat_time + climb.lift_time + climb.approach_time
-    up = np.array([0.0, 0.0, 1.0])
-    for tick in range(round((begins + 1.0) / PERIOD)):
+    up, angles, yaw = np.array([0.0, 0.0, 1.0]), np.zeros((1, len(robot.joint_names))), np.zeros(0)
+    for tick in range(round((begins + 2.0) / PERIOD)):
         now = tick * PERIOD
-        reading = frame((0.2 if now > begins else 0.0) * up - BIAS, up)
-        if kind == "none":
+        rate = (0.2 if now > begins else 0.0) * up - BIAS
+        reading = frame(rate if sensor == "sound" else np.full(3, math.nan), up)
+        if sensor == "none":
             reading = AntennaFrame(reading.t, reading.counts)
-        command = controller.step(replace(reading, t=np.array([now])))
-    assert (command.yaw[0].mean() > 0.05) == steers
+        command = controller.step(replace(reading, t=np.array([now]), positions=angles.copy()))
+        angles, yaw = joint_angles(command, robot.command_shapes()), command.yaw[0]
+    return yaw
+
+
+def test_a_robot_that_climbs_steers_back_where_it_feels_that_it_is_turned() -> None:
+    """A silent sensor lets it alone, as none does."""
+    alone = walked("none")
+    assert walked("sound") - alone == pytest.approx(0.3, abs=0.1)
+    assert walked("silent").tolist() == alone.tolist()

@@ -161,7 +161,7 @@ class HeadingParams(Params):
     rest_time: float = number(0.4, "s", "assumed: it has come to rest by then", ge=0, le=10)
     """How long it has to be at rest until what the gyroscopes tell is their error."""
     rest_rate: float = number(
-        0.1, "rad/s", "assumed: over three times the error of a cheap gyroscope", gt=0, le=5
+        0.07, "rad/s", "datasheet: four times the zero-rate level of an LSM6DSOX", gt=0, le=5
     )
     """Angular velocity under which it can be at rest."""
 

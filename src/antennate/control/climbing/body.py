@@ -101,6 +101,7 @@ class Body:
         self._heading: Heading | None = None
         if robot.has_imu:
             self._heading = Heading(control.climb.heading, batch, control.period)
+        self._joints: Floats = np.zeros((batch, robot.pitch_count))
         self._stands: Bools = np.zeros(batch, dtype=bool)
         self._sag: Floats = np.zeros((batch, robot.pitch_count))
         self._now: Floats = np.zeros((batch, robot.pitch_count + 2))
@@ -140,7 +141,7 @@ class Body:
         self._sag[rows], self.held[rows], self.still[rows] = 0.0, False, False
         self.rise[rows], self.measured[rows] = self._params.rise, np.nan
         self.elevation[rows] = self.sweep[rows] = 0.0
-        self._stands[rows], self._yaw[rows] = False, np.nan
+        self._stands[rows], self._yaw[rows], self._joints[rows] = False, np.nan, 0.0
         if self._heading is not None:
             self._heading.reset(rows)
 
@@ -184,18 +185,18 @@ class Body:
         goals = np.column_stack([pitch, self.elevation, self.sweep])
         most = np.full(goals.shape[1], self._params.rate * self._period)
         moves = ~self.still[:, None]
-        change = np.clip(goals - self._now, -most, most) * moves
-        self._now += change
-        rests = ~np.logical_or.reduce(abs(change[:, :-2]) > _REST, axis=1)
-        self._stands = rests & (maneuver == int(Maneuver.HOLD))
+        self._now += np.clip(goals - self._now, -most, most) * moves
         self._carry(goals[:, :-2], moves)
         limit, most = self._robot.pitch.largest, self._robot.elevation.largest
         joints = np.clip(self._now[:, :-2] + self._sag, -limit, limit)
+        rests = np.logical_and.reduce(abs(joints - self._joints) < _REST, axis=1)
+        self._stands = rests & (maneuver == int(Maneuver.HOLD))
+        self._joints = joints
         lowered = np.clip(self._now[:, -2] - self._now[:, :-2].sum(axis=1), -most, most)
         return replace(
             command,
             antenna=np.repeat(self._now[:, -1:], 2, axis=1),
-            pitch=joints,
+            pitch=joints.copy(),
             elevation=np.repeat(lowered[:, None], 2, axis=1),
         )
 
@@ -205,7 +206,7 @@ class Body:
             self._yaw = frame.positions[:, self._yaws]
             self.measured = frame.positions[:, self._pitches]
         if self._heading is not None:
-            along = direction(np.nan_to_num(self._yaw), np.nan_to_num(self.measured))
+            along = direction(self._yaw, self.measured)
             self._heading.step(frame, along, self._stands)
 
     def _back(self, maneuver: Ints) -> Floats:

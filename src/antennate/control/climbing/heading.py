@@ -13,6 +13,12 @@ _UP = np.array([0.0, 0.0, 1.0])
 _AHEAD = np.array([1.0, 0.0, 0.0])
 _LEAST = 1.0
 """Specific force under which a sensor tells no direction [m/s²]: it falls."""
+_GAP = 0.05
+"""Longest time without a rate that is taken for no turn [s]."""
+_SHORT = 1e-6
+"""Length under which a vector has no direction."""
+_MEMORY = 30.0
+"""Time at rest over which the error of a gyroscope is averaged at most [s]."""
 
 
 class Heading:
@@ -20,7 +26,8 @@ class Heading:
 
     Two directions of the world are carried along in the axes of the head by its angular velocity:
     the vertical, which is drawn to the specific force, and one across it, which nothing corrects. A
-    gyroscope is wrong by a constant: what it tells of a robot that is at rest.
+    gyroscope is wrong by a constant: what it tells of a robot that is at rest. Where rates or
+    joints are missing for longer than a moment, nothing is known, and a mark is gone.
 
     Args:
         params: Its numbers.
@@ -29,7 +36,7 @@ class Heading:
 
     Attributes:
         turned: How far the body has turned since `mark` [rad], positive to the left, shape (B,); 0
-            without a mark, and where the robot has no such sensor.
+            without a mark, and where nothing is known.
     """
 
     def __init__(self, params: HeadingParams, batch: int, period: float) -> None:
@@ -37,7 +44,7 @@ class Heading:
         self._up: Floats = np.tile(_UP, (batch, 1))
         self._across: Floats = np.tile(_AHEAD, (batch, 1))
         self._bias: Floats = np.zeros((batch, 3))
-        self._rested: Floats = np.zeros(batch)
+        self._rested, self._averaged, self._lost = np.zeros((3, batch))
         self._now: Floats = np.zeros(batch)
         self._from: Floats = np.full(batch, np.nan)
 
@@ -45,7 +52,8 @@ class Heading:
         """Some rows begin anew, upright, without a mark."""
         self._up[rows], self._across[rows] = _UP, _AHEAD
         self._bias[rows] = 0.0
-        self._rested[rows] = self._now[rows] = 0.0
+        for memory in (self._rested, self._averaged, self._lost, self._now):
+            memory[rows] = 0.0
         self._from[rows] = np.nan
 
     @property
@@ -56,8 +64,8 @@ class Heading:
         return turned
 
     def mark(self, rows: Bools) -> None:
-        """Measure from here on in those of these rows, shape (B,), that have no mark."""
-        rows = rows & np.isnan(self._from)
+        """Measure from here on in those of these rows, shape (B,), that are known and unmarked."""
+        rows = rows & np.isnan(self._from) & (self._lost == 0.0)
         self._from[rows] = self._now[rows]
 
     def forget(self, rows: Bools) -> None:
@@ -65,40 +73,55 @@ class Heading:
         self._from[rows] = np.nan
 
     def step(self, frame: AntennaFrame, body: Floats, stands: Bools) -> None:
-        """Take one reading; a rate that is missing counts as none.
+        """Take one reading.
 
         Args:
-            frame: The reading.
-            body: Direction of the body in the axes of the head, of any length, shape (B, 3).
+            frame: The reading, NaN where the sensor gave none.
+            body: Direction of the body in the axes of the head, of any length, shape (B, 3); NaN
+                where it is not known.
             stands: Rows whose joints have been told to stand, shape (B,).
         """
         if frame.angular_velocity.size == 0:
             return
-        known: Bools = np.logical_and.reduce(np.isfinite(frame.angular_velocity), axis=1)
-        told = np.where(known[:, None], frame.angular_velocity, self._bias)
-        rests = stands & known & (abs(told) < self._params.rest_rate).all(axis=1)
-        self._rested = np.where(rests, self._rested + self._period, 0.0)
-        over = self._rested - self._params.rest_time
-        share = np.where(over > 0.0, self._period / np.maximum(over, self._period), 0.0)
-        self._bias += share[:, None] * (told - self._bias)  # the mean since then
-        turn = (told - self._bias) * self._period
+        dt = self._period
+        told, seen = np.isfinite(frame.angular_velocity), np.isfinite(body)
+        known: Bools = np.logical_and.reduce(told & seen, axis=1)
+        self._lost = np.where(known, 0.0, self._lost + dt)
+        self.forget(self._lost > _GAP)
+        rate = np.where(known[:, None], frame.angular_velocity, self._bias)
+        self._learn(rate, stands & known)
+        turn = (rate - self._bias) * dt
         self._level(turn, np.nan_to_num(frame.linear_acceleration))
         across = self._across + np.cross(self._across, turn)
         across -= (across * self._up).sum(axis=1, keepdims=True) * self._up
-        self._across = _unit(across)
+        self._across = _unit(across, self._across)
         side = np.cross(self._up, self._across)
-        self._now = np.arctan2((body * side).sum(axis=1), (body * self._across).sum(axis=1))
+        now = np.arctan2((body * side).sum(axis=1), (body * self._across).sum(axis=1))
+        self._now = np.where(known, now, self._now)
+
+    def _learn(self, rate: Floats, stands: Bools) -> None:
+        """Average what gyroscopes tell of rows at rest [rad/s], over all rests."""
+        rests = stands & np.logical_and.reduce(abs(rate) < self._params.rest_rate, axis=1)
+        self._rested = np.where(rests, self._rested + self._period, 0.0)
+        settled = self._rested > self._params.rest_time
+        self._averaged = np.where(
+            settled, np.minimum(self._averaged + self._period, _MEMORY), self._averaged
+        )
+        share = np.where(settled, self._period / np.maximum(self._averaged, self._period), 0.0)
+        self._bias += share[:, None] * (rate - self._bias)
 
     def _level(self, turn: Floats, force: Floats) -> None:
         """Carry the vertical along, and draw it to the specific force [m/s²]."""
         up = self._up + np.cross(self._up, turn)
         size = np.sqrt((force**2).sum(axis=1, keepdims=True))
         share = np.where(size > _LEAST, min(self._period / self._params.level_time, 1.0), 0.0)
-        self._up = _unit(up + share * (force / np.maximum(size, _LEAST) - up))
+        self._up = _unit(up + share * (force / np.maximum(size, _LEAST) - up), self._up)
 
 
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+def _unit(vectors: Floats, before: Floats) -> Floats:
+    """Vectors of length 1; where one has none, that of before."""
+    size = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+    return np.where(size > _SHORT, vectors / np.maximum(size, _SHORT), before)
 
 
 def direction(yaw: Floats, pitch: Floats) -> Floats:
