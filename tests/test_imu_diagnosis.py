@@ -31,7 +31,7 @@ def withheld(readings: Floats, rate: float = 100.0) -> list[bool]:
     """Which of these readings were not handed on; never in part."""
     unknown = np.isnan(judged(readings, rate)[1])
     assert (unknown.all(axis=1) == unknown.any(axis=1)).all()
-    return unknown.all(axis=1).tolist()
+    return [bool(row.all()) for row in unknown]
 
 
 def test_sound_readings_are_what_their_counts_mean() -> None:
