@@ -47,6 +47,16 @@ def require_rotation(axes):
     )
 
 
+def sensor(config):
+    """The sensor that these settings name; ValueError if they cannot be used."""
+    sda, scl = config.PIN_SDA, config.PIN_SCL
+    if sda is None or scl is None:
+        raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, found one")
+    if sda == scl or {sda, scl} & {config.PIN_LEFT, config.PIN_RIGHT, config.PIN_BUTTON}:
+        raise ValueError("config.py: expected pins for PIN_SDA and PIN_SCL alone")
+    return Imu(sda, scl, config.IMU_ADDRESS, config.IMU_AXES, config.RATE)
+
+
 class Imu:
     """The sensor behind two pins.
 

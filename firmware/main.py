@@ -197,17 +197,12 @@ def inertial():
 
     One that cannot be used is told in a line, and stops no antenna.
     """
-    sda, scl = config.PIN_SDA, config.PIN_SCL
-    if sda is None and scl is None:
+    if config.PIN_SDA is None and config.PIN_SCL is None:
         return None
     try:
-        if sda is None or scl is None:
-            raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, found one")
-        if sda == scl or {sda, scl} & {config.PIN_LEFT, config.PIN_RIGHT, config.PIN_BUTTON}:
-            raise ValueError("config.py: expected pins for PIN_SDA and PIN_SCL alone")
         import imu  # a board without one needs no copy of it
 
-        return imu.Imu(sda, scl, config.IMU_ADDRESS, config.IMU_AXES, config.RATE)
+        return imu.sensor(config)
     except Exception as error:  # noqa: BLE001  (antennae come first)
         print("no inertial sensor:", error)  # noqa: T201
         return Silent()
