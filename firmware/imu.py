@@ -36,7 +36,8 @@ SETTLING = 10
 
 def require_rotation(axes):
     """Raise ValueError unless these are the axes of a sensor that is mounted in some way."""
-    if len(axes) == 3 and {abs(axis) for axis in axes} == {1, 2, 3}:
+    whole = all(isinstance(axis, int) for axis in axes)
+    if whole and len(axes) == 3 and {abs(axis) for axis in axes} == {1, 2, 3}:
         x, y, z = axes
         a, b, c = abs(x), abs(y), abs(z)
         if (b - a) * (c - b) * (c - a) * x * y * z > 0:  # not a mirror image
@@ -54,6 +55,10 @@ def sensor(config):
         raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, found one")
     if sda == scl or {sda, scl} & {config.PIN_LEFT, config.PIN_RIGHT, config.PIN_BUTTON}:
         raise ValueError("config.py: expected pins for PIN_SDA and PIN_SCL alone")
+    if config.IMU_ADDRESS not in (0x6A, 0x6B):
+        raise ValueError(
+            f"config.py: expected IMU_ADDRESS 0x6A or 0x6B, found {config.IMU_ADDRESS}"
+        )
     return Imu(sda, scl, config.IMU_ADDRESS, config.IMU_AXES, config.RATE)
 
 

@@ -157,6 +157,8 @@ def impossible(number: int, **_: object) -> Any:
         ({"IMU_AXES": (2, 1, 3)}, "found (2, 1, 3)"),  # a mirror image
         ({"IMU_AXES": (-1, -2, -3)}, "found (-1, -2, -3)"),
         ({"IMU_AXES": (1, 2)}, "found (1, 2)"),
+        ({"IMU_AXES": (1.0, 2, 3)}, "found (1.0, 2, 3)"),
+        ({"IMU_ADDRESS": 0x16A}, "config.py: expected IMU_ADDRESS 0x6A or 0x6B, found 362"),
         ({"IMU_AXES": None}, "NoneType"),
         ({"I2C": impossible}, "invalid pin"),
         ({"imu": None}, "imu"),
