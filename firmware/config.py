@@ -18,7 +18,8 @@ PIN_SCL: int | None = None
 IMU_ADDRESS = 0x6A
 """Its address on I2C; 0x6B if its pin SA0 is high."""
 IMU_AXES = (1, 2, 3)
-"""Which of its axes (1 is x) point forward, to the left and up; negative: the other way."""
+"""Which of its axes (1 is x) point forward, to the left and up; negative: the other way. After a
+quarter turn of the sensor to the right it is (2, -1, 3)."""
 
 WIFI = ""
 """Name of the network to join; empty: frames go over USB, and no radio is switched on."""

@@ -53,6 +53,11 @@ class Sampler:
         """Whether samples hold readings of an inertial sensor."""
         return self._imu is not None
 
+    @property
+    def imu_settings(self):
+        """Settings of the inertial sensor for the hash of the greeting; none without one."""
+        return () if self._imu is None else self._imu.settings
+
     def sample(self, _timer):
         """Read both antennae in turn; the time is that of the first reading."""
         ticks = time.ticks_us() & frame.TICK_MASK  # pyright: ignore[reportOperatorIssue]  (an int)
@@ -172,30 +177,41 @@ def channel(pin):
     return machine.ADC(machine.Pin(pin), atten=machine.ADC.ATTN_11DB)
 
 
-def imu_settings():
-    """Pins, address and axes of the inertial sensor; nothing if the settings name none."""
-    sda, scl = config.PIN_SDA, config.PIN_SCL
-    if sda is None and scl is None:
-        return ()
-    if sda is None or scl is None:
-        raise ValueError("config.py: expected both of PIN_SDA and PIN_SCL, or neither, found one")
-    return (sda, scl, config.IMU_ADDRESS) + config.IMU_AXES  # noqa: RUF005  (MicroPython)
+class Silent:
+    """In place of an inertial sensor that cannot be used: it never answers."""
+
+    settings = (0, 0, 0, 0, 0, 0)
+
+    def __init__(self):
+        self.misses = 0
+
+    def read_into(self, target, at):
+        """Write that there are no readings to a target from an index on."""
+        self.misses += 1
+        for i in range(6):
+            target[at + i] = frame.IMU_NONE
 
 
 def inertial():
-    """The inertial sensor that the settings name, None for none."""
-    settings = imu_settings()
-    if not settings:
+    """The inertial sensor that the settings name, None for none.
+
+    One that cannot be used is told in a line, and stops no antenna.
+    """
+    if config.PIN_SDA is None and config.PIN_SCL is None:
         return None
-    import imu  # a board without one needs no copy of it
+    try:
+        import imu  # a board without one needs no copy of it
 
-    return imu.Imu(*settings[:3], settings[3:], config.RATE)
+        return imu.sensor(config)
+    except Exception as error:  # noqa: BLE001  (antennae come first)
+        print("no inertial sensor:", error)  # noqa: T201
+        return Silent()
 
 
-def greeting(boot_id):
+def greeting(boot_id, imu_settings):
     """Frame that says who speaks, since when and with which settings."""
     settings = frame.config_hash(
-        config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT, imu_settings()
+        config.RATE, config.BURST, config.PIN_LEFT, config.PIN_RIGHT, imu_settings
     )
     return frame.encode_hello(boot_id, reset_reason(), settings, machine.unique_id(), config.RATE)
 
@@ -243,9 +259,8 @@ def joined():
     return wifi.Station(config.WIFI, config.PASSWORD)
 
 
-def outlet(station, boot_id, size):
-    """The way out of frames of this size."""
-    hello = greeting(boot_id)
+def outlet(station, boot_id, hello, size):
+    """The way out of frames of this size, greeting first."""
     if station is None:
         return Usb(hello)
     import wifi
@@ -259,7 +274,8 @@ def stream(sampler, button):
     station = joined()  # before numbers are drawn: its noise makes them random
     boot_id = random_id()
     encoder = frame.SampleEncoder(boot_id, sampler.moves)
-    way = outlet(station, boot_id, encoder.size)
+    hello = greeting(boot_id, sampler.imu_settings)
+    way = outlet(station, boot_id, hello, encoder.size)
     buffer = bytearray(encoder.size)
     while button.value():
         if not sampler.encode_next_into(encoder, buffer):

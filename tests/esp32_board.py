@@ -227,7 +227,7 @@ class I2C:
 
 
 import config
-config.PIN_SDA, config.PIN_SCL, config.IMU_AXES = 21, 22, (-2, 1, 3)
+config.PIN_SDA, config.PIN_SCL, config.IMU_AXES = 21, 22, (2, -1, 3)
 machine.I2C = I2C
 """
 """Into WHOLE_PROGRAM, before it imports main: an inertial sensor that is silent for a while."""

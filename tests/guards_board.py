@@ -113,17 +113,21 @@ STREAM = [
     Guard(
         "repeated readings of an inertial sensor",
         put(imu, "STUCK", 1 << 30),
-        test_imu.test_one_that_repeats_itself_is_withheld_after_100_ms,
+        partial(test_imu.test_one_that_repeats_itself_is_withheld_after_100_ms, 100),
     ),
     Guard(
         "end of the range of an inertial sensor",
         put(imu, "RAILED", 1 << 30),
-        test_imu.test_an_axis_at_its_end_is_withheld_after_100_ms,
+        partial(
+            test_imu.test_an_axis_at_its_end_is_withheld_at_once_and_the_others_after_100_ms,
+            100,
+            1.0,
+        ),
     ),
     Guard(
         "answer of an inertial sensor",
         put(imu, "SILENT", 1 << 30),
-        test_imu.test_what_is_missing_is_withheld_at_once_and_named_after_100_ms,
+        partial(test_imu.test_what_is_missing_is_withheld_at_once_and_named_after_100_ms, 100),
     ),
     Guard("firmware", put(board, "objections", constant(())), OLD_FIRMWARE),
     Guard(

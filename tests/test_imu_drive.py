@@ -139,7 +139,7 @@ def faulty(fault: str, robot: RobotSpec = ROBOT) -> tuple[Report, Session, list[
     [
         ("imu=silent", "no answer", 0.02),
         ("imu=stuck", "always the same readings", 0.12),
-        ("imu=railed", "readings at the end of the range", 0.12),
+        ("imu=railed", "readings at the end of the range", 0.02),
     ],
 )
 def test_a_sensor_that_is_lost_makes_its_numbers_nan_and_stops_nothing(
@@ -158,10 +158,34 @@ def test_a_sensor_that_is_lost_makes_its_numbers_nan_and_stops_nothing(
     assert np.isnan(ticks[-1].linear_acceleration).all()
     assert np.isfinite(ticks[-1].counts).all()
     counted: Any = report.result(session)["imu_readings"]
-    assert counted[{"silent": "missing"}.get(fault[4:], fault[4:])] >= len(lost) - 3
+    unnamed = 10 if fault == "imu=railed" else 0  # those of the first 100 ms
+    assert counted[{"silent": "missing"}.get(fault[4:], fault[4:])] >= len(lost) - unnamed - 3
     assert counted["ok"] > 100
     sent = [tick.sent for tick in ticks if tick.now > lost[0]]
     assert sent[-1] - sent[0] > 80  # it walks on
+
+
+def test_a_controller_at_less_than_full_pace_is_told_no_rates() -> None:
+    """With a low battery it is left out in every second tick, and would miss half of a turn."""
+    made = rig(TwinConfig(robot=ROBOT, scene="flat"), "turning")
+    faults = Faults([read("bus=discharge:0.3@1.0s")], ROBOT.ids, has_imu=True)
+    config = DriveConfig(robot=ROBOT, dry_run=0.3, duration=3.5, touch_check=False)
+    full, slow = list[Tick](), list[Tick]()
+
+    def on_tick(session: Session, t: float) -> None:
+        faults.apply(made.robot, made.robot.t)
+        if t > 1.0:
+            (full if session.control.rate == 1.0 else slow).append(Tick.of(session, t))
+
+    report = drive(made.session, config, arm=True, on_tick=on_tick)
+    assert report.ended == "the end of its time"
+    assert len(full) > 30
+    assert len(slow) > 30
+    for ticks, unknown in ((full, False), (slow, True)):
+        values = np.array([[tick.angular_velocity, tick.linear_acceleration] for tick in ticks])
+        assert np.isnan(values).all() == np.isnan(values).any() == unknown
+    assert made.session.imu is not None
+    assert made.session.imu.finding is ImuFinding.OK  # nothing is wrong with the sensor
 
 
 def test_one_that_comes_back_is_used_again() -> None:
@@ -172,6 +196,8 @@ def test_one_that_comes_back_is_used_again() -> None:
     assert made.session.imu is not None
     assert made.session.imu.finding is ImuFinding.OK
     assert 25 <= made.session.imu.counted[ImuFinding.MISSING] <= 35
+    missed = made.robot.imu.misses  # pyright: ignore[reportOptionalMemberAccess]
+    assert made.session.imu.result()["missed_by_board"] == missed >= 25
 
 
 def test_a_robot_without_one_is_told_nothing_and_refuses_its_faults() -> None:
@@ -292,6 +318,7 @@ def test_the_doctor_names_it(fault: str, found: str) -> None:
     assert row.found.startswith(found)
     assert row.grade == "warn"
     assert row.cure
+    assert row.found.endswith("missed since the board began") == (fault == "imu=silent")
 
 
 def test_the_doctor_says_where_up_is() -> None:
@@ -302,6 +329,31 @@ def test_the_doctor_says_where_up_is() -> None:
     row = wrong(patient.examine(bus=False))["esp32: upwards"]
     assert "IMU_AXES" in row.cure
     assert float(row.found.split(", ")[2].split()[0]) == pytest.approx(0.8 * G, abs=0.06 * G)
+    assert row.found.endswith("m/s²")
+
+
+@pytest.mark.parametrize(
+    ("axes", "name"),
+    [((1, -3, 2), "-y"), ((-1, -2, 3), ""), ((1, -2, -3), "-z"), ((-3, 2, 1), "-x")],
+)
+def test_the_doctor_says_which_axis_is_up(axes: tuple[int, int, int], name: str) -> None:
+    """Axes of the head as such a setting of the board makes them of a sensor as printed."""
+    patient = Patient(robot=ROBOT)
+    sensor = patient.robot.imu
+    assert sensor is not None
+    order = [abs(axis) - 1 for axis in axes]
+    signs, plain = np.sign(axes), sensor.sample
+
+    def sample(counts: Floats, standing: bool) -> tuple[int, ...]:
+        readings = np.array(plain(counts, standing)).reshape(2, 3)
+        return tuple((readings[:, order] * signs).ravel().tolist())
+
+    sensor.sample = sample  # pyright: ignore[reportAttributeAccessIssue]
+    rows = wrong(patient.examine(bus=False))
+    if not name:
+        assert "esp32: upwards" not in rows
+        return
+    assert rows["esp32: upwards"].found.endswith(f"m/s², so {name} points up")
 
 
 def test_the_doctor_names_a_sensor_that_only_one_of_both_knows() -> None:
@@ -309,6 +361,8 @@ def test_the_doctor_names_a_sensor_that_only_one_of_both_knows() -> None:
     patient.spec = ROBOT.model_copy(update={"imu": ImuParams()})
     row = wrong(patient.examine(bus=False))["esp32: inertial sensor"]
     assert row.found == "answers, and nothing reads it"
+    assert "under [robot.imu] of robot.toml" in row.cure
+    assert "under [imu] of the file of the robot" in row.cure
     patient = Patient(robot=patient.spec)
     patient.spec = ROBOT
     row = wrong(patient.examine(bus=False))["esp32: inertial sensor"]

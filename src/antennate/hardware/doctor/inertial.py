@@ -14,8 +14,9 @@ from antennate.hardware.safety.imu import ImuDiagnosis, ImuFinding
 from antennate.params.scene import GRAVITY
 
 _WIRES = (
-    "check its wires and its supply of 3.3 V; PIN_SDA, PIN_SCL and IMU_ADDRESS in "
-    "firmware/config.py"
+    "check its wires and its supply of 3.3 V; PIN_SDA, PIN_SCL, IMU_ADDRESS and IMU_AXES in "
+    "firmware/config.py, and that imu.py lies on the board: as it starts it says in a line what it "
+    "cannot use"
 )
 _CURES = {
     ImuFinding.MISSING: _WIRES,
@@ -28,6 +29,8 @@ _MOUNTED = (
 )
 _OFTEN = 0.1
 """Share of the readings that makes it bad, although most of them are good."""
+_MOSTLY = 0.7
+"""Share of gravity along an axis that points up, 45 degrees off at most."""
 
 
 def findings(readings: Sequence[Timed], config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
@@ -35,7 +38,10 @@ def findings(readings: Sequence[Timed], config: DoctorConfig) -> Iterator[tuple[
     sends = any(reading.sample.imu for reading in readings)
     if not config.robot.has_imu:
         if sends:
-            cure = 'set kind = "head" under [robot.imu] to use it'
+            cure = (
+                'to use it, set kind = "head" under [robot.imu] of robot.toml, or under [imu] of '
+                "the file of the robot"
+            )
             yield Finding("answers, and nothing reads it", "warn", cure), "inertial sensor", "none"
         return
     if not sends:
@@ -53,9 +59,25 @@ def findings(readings: Sequence[Timed], config: DoctorConfig) -> Iterator[tuple[
     shown = worst if counted[worst] > _OFTEN * len(readings) else ImuFinding.OK
     lost = f" ({counted[worst]} of {len(readings)} readings)" if shown is worst else ""
     grade = "ok" if shown is ImuFinding.OK else "warn"
-    yield Finding(f"{shown.value}{lost}", grade, _CURES.get(shown, "")), "inertial sensor", "ok"
+    text = f"{shown.value}{lost}{_missed(readings)}"
+    yield Finding(text, grade, _CURES.get(shown, "")), "inertial sensor", "ok"
     if shown is ImuFinding.OK:
         yield from _at_rest(np.mean(good, axis=0), config)
+
+
+def _missed(readings: Sequence[Timed]) -> str:
+    """Readings that the sensor has not given since the board began, also those of lost samples."""
+    misses = readings[-1].sample.misses
+    return f", {misses} missed since the board began" if misses else ""
+
+
+def _upwards(force: np.ndarray) -> str:
+    """The axis that points up by a specific force, shape (3,), with its sign; z is none to name."""
+    axis = int(abs(force).argmax())
+    if abs(force[axis]) < _MOSTLY * GRAVITY:
+        return ""
+    name = f"{'-' if force[axis] < 0.0 else ''}{'xyz'[axis]}"
+    return "" if name == "z" else f", so {name} points up"
 
 
 def _at_rest(felt: np.ndarray, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
@@ -64,7 +86,7 @@ def _at_rest(felt: np.ndarray, config: DoctorConfig) -> Iterator[tuple[Finding, 
     error = config.doctor.gravity_error
     away = np.linalg.norm(force - [0.0, 0.0, GRAVITY])
     up = Finding(
-        f"{', '.join(f'{part:.2f}' for part in force)} m/s²",
+        f"{', '.join(f'{part:.2f}' for part in force)} m/s²{_upwards(force)}",
         "ok" if away <= error * GRAVITY else "warn",
         _MOUNTED,
     )

@@ -167,12 +167,15 @@ class BoardReader:
         refused: Samples it found that may not be used.
         imu: Readings of the inertial sensor [counts] in the same sample, gyroscopes first,
             shape (6,), NaN where it did not answer; None where the sample is missing or too old.
+        misses: Readings that the sensor has not given since the board began, modulo 65536, as the
+            newest sample says.
     """
 
     def __init__(self, board: Board, clock: Clock) -> None:
         self._board, self._clock = board, clock
         self.used = self.refused = 0
         self.imu: Floats | None = None
+        self.misses = 0
         self._stamp: Timed | None = None
         self._stamp_now: float | None = None
         self._stamp_t = self._t = 0.0
@@ -191,6 +194,7 @@ class BoardReader:
         self.imu = None if timed is None else imu_counts(timed.sample.imu)
         if timed is None:
             return self._t, np.full((1, 2), math.nan)
+        self.misses = timed.sample.misses
         return self._t, np.array([[timed.sample.left, timed.sample.right]], float)
 
     def _time(self, timed: Timed | None, now: float) -> float:

@@ -15,14 +15,18 @@ import numpy as np
 from antennate.robots.imu import AXES, ImuParams, measured
 from antennate.types import Floats
 
-STUCK = 10
-"""Equal readings of all six axes in a row that mean a stuck sensor: 100 ms. With the noise of the
-datasheet two in a row are equal once in 10^4 (computed)."""
-RAILED = 10
-"""Readings in a row at the end of the range of an axis that mean a broken one; a knock is over
+STUCK = 0.1
+"""Time for which all six axes say the same that means a stuck sensor [s] (assumed), in `EQUAL`
+readings at least. With the noise of the datasheet two in a row are once in 10^4 (computed)."""
+EQUAL = 4
+"""Equal readings in a row without which none is called stuck, however seldom they come."""
+RAILED = 0.1
+"""Time for which an axis is at the end of its range that means a broken one [s]; a knock is over
 sooner (assumed)."""
-SILENT = 10
-"""Readings missing in a row from which on it is named (assumed)."""
+SILENT = 0.1
+"""Time without a reading from which on it is named [s] (assumed)."""
+_TOLERANCE = 1e-3
+"""Times of readings are no rounder than that [s]."""
 
 
 class ImuFinding(Enum):
@@ -37,6 +41,8 @@ class ImuFinding(Enum):
 class ImuDiagnosis:
     """Judges the readings of one inertial sensor.
 
+    An axis at the end of its range is NaN at once: it may turn, or be knocked, by any more.
+
     Args:
         params: The sensor.
 
@@ -45,6 +51,8 @@ class ImuDiagnosis:
         counted: Readings by what they were found to be.
         angular_velocity: For the controller [rad/s], shape (1, 3); NaN where it cannot be used.
         linear_acceleration: The same of the specific force [m/s²].
+        misses: Readings that the sensor has not given since the board began, as the board counts
+            them modulo 65536; 0 before the first sample.
     """
 
     def __init__(self, params: ImuParams) -> None:
@@ -53,10 +61,12 @@ class ImuDiagnosis:
         self.counted = dict.fromkeys(ImuFinding, 0)
         self._unknown: Floats = np.full((1, AXES), math.nan)
         self.angular_velocity = self.linear_acceleration = self._unknown
+        self.misses = 0
         self._t = -math.inf
         self._counts: Floats = np.full(2 * AXES, math.nan)
-        self._missing = self._equal = 0
-        self._at_end: Floats = np.zeros(2 * AXES)
+        self._equal = 0
+        self._missing_since = self._equal_since = math.inf
+        self._railed_since: Floats = np.full(2 * AXES, math.inf)
 
     def step(self, t: float, counts: Floats | None) -> None:
         """Take the newest reading.
@@ -71,35 +81,44 @@ class ImuDiagnosis:
             return
         if t > self._t:
             self._t = t
-            self._judge(counts)
+            self._judge(t, counts)
             self.counted[self.finding] += 1
-        good = counts if self.finding is ImuFinding.OK else np.full_like(counts, math.nan)
+        known = (self.finding is ImuFinding.OK) & (abs(counts) < self._params.most)
+        good = np.where(known, counts, math.nan)
         self.angular_velocity, self.linear_acceleration = measured(self._params, good[None])
 
-    def _judge(self, counts: Floats) -> None:
+    def _judge(self, t: float, counts: Floats) -> None:
         missing = bool(np.isnan(counts).any())
-        self._missing = self._missing + 1 if missing else 0
-        self._equal = self._equal + 1 if np.array_equal(counts, self._counts) else 1
-        self._at_end = np.where(abs(counts) >= self._params.most, self._at_end + 1, 0)
-        self._counts = counts
+        self._missing_since = min(self._missing_since, t) if missing else math.inf
+        if np.array_equal(counts, self._counts):
+            self._equal += 1
+        else:
+            self._equal, self._equal_since, self._counts = 1, t, counts
+        at_end = abs(counts) >= self._params.most
+        self._railed_since = np.where(at_end, np.minimum(self._railed_since, t), math.inf)
         self.finding = (
             ImuFinding.MISSING
             if missing
             else ImuFinding.RAILED
-            if self._at_end.max() >= RAILED
+            if self._lasts(float(self._railed_since.min()), RAILED)
             else ImuFinding.STUCK
-            if self._equal >= STUCK
+            if self._equal >= EQUAL and self._lasts(self._equal_since, STUCK)
             else ImuFinding.OK
         )
+
+    def _lasts(self, since: float, limit: float) -> bool:
+        """Whether something has lasted from a time [s] until now for as long as a limit [s]."""
+        return self._t - since >= limit - _TOLERANCE
 
     @property
     def fault(self) -> str:
         """What is wrong with it for longer than a moment, empty if nothing is."""
-        soon = self.finding is ImuFinding.MISSING and self._missing < SILENT
-        if soon or self.finding is ImuFinding.OK:
+        missing = self.finding is ImuFinding.MISSING
+        if missing and not self._lasts(self._missing_since, SILENT):
             return ""
-        return self.finding.value
+        return "" if self.finding is ImuFinding.OK else self.finding.value
 
     def result(self) -> Mapping[str, int]:
-        """How many readings were found to be what."""
-        return {finding.name.lower(): count for finding, count in self.counted.items()}
+        """How many readings were found to be what, and how many the board has missed."""
+        counted = {finding.name.lower(): count for finding, count in self.counted.items()}
+        return {**counted, "missed_by_board": self.misses}

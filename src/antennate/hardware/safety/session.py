@@ -129,7 +129,10 @@ class Session:
         parts = np.array([t]), np.array([counts]), np.array([self._angles])
         if self.imu is None:
             return AntennaFrame(*parts)
-        return AntennaFrame(*parts, self.imu.angular_velocity, self.imu.linear_acceleration)
+        motion = np.array([self.imu.angular_velocity, self.imu.linear_acceleration])
+        if self.control.rate < 1.0:  # it is not asked in every tick, so its sum would be no turn
+            motion[:] = math.nan
+        return AntennaFrame(*parts, *motion)
 
     def _feel(self) -> float:
         """Judge the newest reading of the board: its time [s]."""
@@ -137,6 +140,7 @@ class Session:
         self.quality.step(t, counts[0].tolist(), self.control.decision.contact)
         if self.imu is not None:
             self.imu.step(t, self.reader.imu)
+            self.imu.misses = self.reader.misses
         return t
 
     def write(self, command: JointCommand) -> None:
