@@ -91,7 +91,7 @@ class Heading:
         rate = np.where(known[:, None], frame.angular_velocity, self._bias)
         self._learn(rate, stands & known)
         turn = (rate - self._bias) * dt
-        self._level(turn, np.nan_to_num(frame.linear_acceleration))
+        self._level(turn, frame.linear_acceleration)
         across = self._across + np.cross(self._across, turn)
         across -= (across * self._up).sum(axis=1, keepdims=True) * self._up
         self._across = _unit(across, self._across)
@@ -111,7 +111,9 @@ class Heading:
         self._bias += share[:, None] * (rate - self._bias)
 
     def _level(self, turn: Floats, force: Floats) -> None:
-        """Carry the vertical along, and draw it to the specific force [m/s²]."""
+        """Carry the vertical along, and draw it to the specific force [m/s²] where that is known."""
+        whole = np.logical_and.reduce(np.isfinite(force), axis=1)
+        force = np.where(whole[:, None], force, 0.0)
         up = self._up + np.cross(self._up, turn)
         size = np.sqrt((force**2).sum(axis=1, keepdims=True))
         share = np.where(size > _LEAST, min(self._period / self._params.level_time, 1.0), 0.0)
