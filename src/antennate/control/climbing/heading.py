@@ -111,7 +111,7 @@ class Heading:
         self._bias += share[:, None] * (rate - self._bias)
 
     def _level(self, turn: Floats, force: Floats) -> None:
-        """Carry the vertical along, and draw it to the specific force [m/s²] where that is known."""
+        """Carry the vertical along, and draw it to a force that is known whole [m/s²]."""
         whole = np.logical_and.reduce(np.isfinite(force), axis=1)
         force = np.where(whole[:, None], force, 0.0)
         up = self._up + np.cross(self._up, turn)
