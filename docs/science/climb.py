@@ -93,7 +93,7 @@ def without(outcome: ClimbOutcome) -> Iterator[Table]:
             f"climbed with the sensor alone, {found['only_other']} without it alone; McNemar p "
             f"{found['mcnemar_p']:.3g}."
         )
-        yield replace(table, title=f"{table.title}, without", note=note)
+        yield replace(table, title=f"{table.title}, without the sensor", note=note)
 
 
 def plane() -> Table:

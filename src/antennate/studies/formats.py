@@ -200,7 +200,8 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
         yield ""
         yield f"[{'.'.join(path)}]"
     groups = []
-    for name in type(group).model_fields:
+    written = group.model_dump()
+    for name in (name for name in type(group).model_fields if name in written):
         value = getattr(group, name)
         if isinstance(value, Params):
             groups.append((name, value))

@@ -97,7 +97,7 @@ class Body:
         self.held: Bools = np.zeros(batch, dtype=bool)
         self.still: Bools = np.zeros(batch, dtype=bool)
         self.measured: Floats = np.full((batch, robot.pitch_count), np.nan)
-        self._yaw: Floats = np.full((batch, robot.yaw_count), np.nan)
+        self._reported: Floats = np.full((batch, robot.yaw_count), np.nan)
         self._heading: Heading | None = None
         if robot.has_imu:
             self._heading = Heading(control.climb.heading, batch, control.period)
@@ -141,7 +141,7 @@ class Body:
         self._sag[rows], self.held[rows], self.still[rows] = 0.0, False, False
         self.rise[rows], self.measured[rows] = self._params.rise, np.nan
         self.elevation[rows] = self.sweep[rows] = 0.0
-        self._stands[rows], self._yaw[rows], self._joints[rows] = False, np.nan, 0.0
+        self._stands[rows], self._reported[rows], self._joints[rows] = False, np.nan, 0.0
         if self._heading is not None:
             self._heading.reset(rows)
 
@@ -203,10 +203,10 @@ class Body:
     def feel(self, frame: AntennaFrame) -> None:
         """Take where the joints are and how the head turns, where the robot can tell."""
         if frame.positions.size:
-            self._yaw = frame.positions[:, self._yaws]
+            self._reported = frame.positions[:, self._yaws]
             self.measured = frame.positions[:, self._pitches]
         if self._heading is not None:
-            along = direction(self._yaw, self.measured)
+            along = direction(self._reported, self.measured)
             self._heading.step(frame, along, self._stands)
 
     def _back(self, maneuver: Ints) -> Floats:
