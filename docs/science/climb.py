@@ -41,7 +41,7 @@ CROSSED = [
 ]
 """Measures of those that the page shows."""
 NONE = "0/0 -"
-"""A cell without a trial, which the page leaves out."""
+"""A cell without a trial."""
 REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
 
 
@@ -144,7 +144,7 @@ def markdown(table: Table) -> str:
     heads = [table.columns[i] for i in kept]
     lines: list[Sequence[str]] = [("", *heads), ("---",) * (len(heads) + 1)]
     lines += [
-        (name.strip(), *(cells[i] for i in kept))
+        (name.strip(), *("-" if cells[i] == NONE else cells[i] for i in kept))
         for name, cells in table.rows
         if set(cells) != {NONE}
     ]
