@@ -161,9 +161,17 @@ class HeadingParams(Params):
     rest_time: float = number(0.4, "s", "assumed: it has come to rest by then", ge=0, le=10)
     """How long it has to be at rest until what the gyroscopes tell is their error."""
     rest_rate: float = number(
-        0.07, "rad/s", "datasheet: four times the zero-rate level of an LSM6DSOX", gt=0, le=5
+        0.07, "rad/s", "assumed: four times the zero-rate level of an LSM6DSOX", gt=0, le=5
     )
     """Angular velocity under which it can be at rest."""
+    memory_time: float = number(
+        30.0, "s", "assumed: the error of a gyroscope drifts with its warmth", gt=0, le=3600
+    )
+    """Time at rest over which that error is averaged at most."""
+    gap_time: float = number(
+        0.05, "s", "assumed: at 1 rad/s 3 deg of turn are lost in it", ge=0, le=1
+    )
+    """Longest time without a reading that is taken for no turn; a longer one ends what is kept."""
 
 
 class ClimbParams(Params):

@@ -13,12 +13,8 @@ _UP = np.array([0.0, 0.0, 1.0])
 _AHEAD = np.array([1.0, 0.0, 0.0])
 _LEAST = 1.0
 """Specific force under which a sensor tells no direction [m/s²]: it falls."""
-_GAP = 0.05
-"""Longest time without a rate that is taken for no turn [s]."""
 _SHORT = 1e-6
 """Length under which a vector has no direction."""
-_MEMORY = 30.0
-"""Time at rest over which the error of a gyroscope is averaged at most [s]."""
 
 
 class Heading:
@@ -87,7 +83,7 @@ class Heading:
         told, seen = np.isfinite(frame.angular_velocity), np.isfinite(body)
         known: Bools = np.logical_and.reduce(told & seen, axis=1)
         self._lost = np.where(known, 0.0, self._lost + dt)
-        self.forget(self._lost > _GAP)
+        self.forget(self._lost > self._params.gap_time)
         rate = np.where(known[:, None], frame.angular_velocity, self._bias)
         self._learn(rate, stands & known)
         turn = (rate - self._bias) * dt
@@ -104,9 +100,8 @@ class Heading:
         rests = stands & np.logical_and.reduce(abs(rate) < self._params.rest_rate, axis=1)
         self._rested = np.where(rests, self._rested + self._period, 0.0)
         settled = self._rested > self._params.rest_time
-        self._averaged = np.where(
-            settled, np.minimum(self._averaged + self._period, _MEMORY), self._averaged
-        )
+        longer = np.minimum(self._averaged + self._period, self._params.memory_time)
+        self._averaged = np.where(settled, longer, self._averaged)
         share = np.where(settled, self._period / np.maximum(self._averaged, self._period), 0.0)
         self._bias += share[:, None] * (rate - self._bias)
 
