@@ -16,9 +16,11 @@ from antennate.errors import BadInputError
 from antennate.experiments.climb import measures
 from antennate.experiments.climb.config import ClimbConfig, cells, config_of
 from antennate.experiments.climb.criterion import is_over
-from antennate.experiments.climb.experiment import EXPERIMENT, every, run
+from antennate.experiments.climb.experiment import EXPERIMENT, ClimbOutcome, every, run
 from antennate.experiments.climb.physics import ClimbRow, carry_out
 from antennate.experiments.climb.sensing import Verdict
+from antennate.robots.imu import ImuParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import draw_trial, scene_of
 
 TINY = {
@@ -200,6 +202,9 @@ def test_a_run_leaves_its_tables_and_figures(tmp_path):
         (["--heights", "0.6"], "--heights: expected a number of at most 0.5, found 0.6"),
         (["--robot.links", "3", "--heights", "0.4"], "expected at most the length of the robot"),
         (["--heights", "0.05", "0.05"], "heights must differ"),
+        (["--robot", "hexapod"], "expected a robot with pitch joints and antennae that rise"),
+        (["--start", "0.1", "1"], "start must rise from at least 0.25 to at most 10 m, found 0.1"),
+        (["--start", "0.35"], "--start: expected at least 2 values, found 1"),
         (["--conditions", "fly"], "expected one of locked, level, lifted, rhythm, climb or edges"),
         (["--divisors", "0"], "--divisors: expected a number above 0, found 0.0"),
         (["--robot.servos.xc430-w240.gain-divisor", "9"], "divisors says it"),
@@ -218,6 +223,31 @@ def test_a_robot_of_its_own_begins_with_the_one_that_climbs():
     assert ClimbConfig.model_validate({"robot": {"mass": 2.5}}).robot.pitch_count == 5
     with pytest.raises(BadInputError, match="expected a robot with pitch joints"):
         ClimbConfig(robot={"pitch": {"kind": "locked"}})  # pyright: ignore[reportArgumentType]
+
+
+def test_steps_and_gaps_stand_as_far_as_is_asked():
+    config = ClimbConfig(
+        heights=(0.05,), conditions=("climb",), grounds=("gap:0.1",), start=(2.0, 2.1), sensing=0
+    )
+    for cell in cells(config).values():
+        one = config_of(config, cell)
+        drawn: Any = scene_of(one).draw(one.robot, np.random.default_rng(1))
+        assert 2.0 <= drawn.edges[0].x - drawn.start[0] <= 2.1
+
+
+def test_a_whole_robot_takes_nothing_from_the_one_that_climbs():
+    own = RobotSpec.named("scuttle3d").model_copy(update={"imu": ImuParams()})
+    table = {"robot": own.model_dump(mode="json")}
+    assert ClimbConfig.model_validate(table).robot == own
+
+
+def test_a_run_that_was_stopped_tells_of_the_divisors_that_it_came_to():
+    config = ClimbConfig(heights=(0.05,), conditions=("climb",))
+    one = ClimbOutcome(config, [row("climb", "success")], {}, interrupted=True)
+    told = measures.sentence(one.result())
+    assert told.endswith("with gain divisor 256 climb 1 of 1 (0.21 to 1.00).")
+    none = ClimbOutcome(config, [], {}, interrupted=True)
+    assert measures.sentence(none.result()).endswith(": none.")
 
 
 @pytest.mark.slow

@@ -66,6 +66,13 @@ def test_elevation_servos_are_bought_fed_and_cabled() -> None:
     assert rows["servo bus", "cable with three wires, JST EHR-03 at both ends"] == 27
 
 
+def test_an_inertial_sensor_is_wired_where_there_is_one() -> None:
+    """The pins are those of docs/firmware.md."""
+    for name, wired in (("scuttle3d", True), ("scuttle", False)):
+        told = [text.get_text() for text in wiring(RobotSpec.named(name)).axes[0].texts]
+        assert any("GPIO21, 22" in text for text in told) == wired
+
+
 def test_one_plug_feeds_no_more_than_its_contacts_stand() -> None:
     """JST EH: 3 A. Two stalled XC430-W240-T draw 2.6 A, three 3.9 A."""
     power = supply(RobotSpec())

@@ -6,6 +6,7 @@ runs that the page names; with --check the page is only compared.
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,11 +14,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
 from antennate.experiments.climb.crossing import ground_tables
 from antennate.experiments.climb.experiment import ClimbOutcome, tables
 from antennate.experiments.climb.figure import success
-from antennate.experiments.climb.measures import pairs, sentence, step_tables
+from antennate.experiments.climb.measures import PLAN_BAND, pairs, sentence, step_tables
 from antennate.experiments.climb.physics import ClimbRow
 from antennate.experiments.tunnel.measures import CONTROLLER, paired, summary
 from antennate.experiments.tunnel.physics import TrialResult
@@ -40,6 +43,8 @@ CROSSED = [
     if measure.name.startswith(("success", "wilson", "timeouts", "left", "speed", "restricted"))
 ]
 """Measures of those that the page shows."""
+FELT = (0.045, 0.065, 0.08)
+"""Heights by the probe between which plans are taken together [m]."""
 NONE = "0/0 -"
 """A cell without a trial."""
 REGION = re.compile(r"(<!-- climb: [^>]*-->\n).*(<!-- end of climb -->)", re.DOTALL)
@@ -54,6 +59,7 @@ def main() -> None:
         text = f"{sentence(result)}\n\n"
         text += "![Success over heights of steps and widths of gaps](climb.png)\n\n"
         text += "\n".join(map(markdown, tables(result)))
+        text += f"\n{lead(outcome.rows)}\n"
         if "--check" not in sys.argv[1:]:
             grounds = outcome_of(GROUND).result()["grounds"]
             FIGURE.write_bytes(render(success(result["climbing"], grounds))["png"])
@@ -94,6 +100,30 @@ def without(outcome: ClimbOutcome) -> Iterator[Table]:
             f"{found['mcnemar_p']:.3g}."
         )
         yield replace(table, title=f"{table.title}, without the sensor", note=note)
+
+
+def lead(rows: Sequence[ClimbRow]) -> str:
+    """How good the plan of `climb` is, less what half of the trials tell of its error."""
+    (low, high), words = PLAN_BAND, list[str]()
+    for divisor in sorted({row.divisor for row in rows}, reverse=True):
+        halves: tuple[dict[tuple[int, int], list[float]], ...] = ({}, {})
+        for row in rows:
+            if (row.part, row.condition, row.divisor) == ("climbing", "climb", divisor):
+                felt = math.inf if row.felt_height_m is None else row.felt_height_m
+                for link, error in (part.split(":") for part in row.plan_error_m.split()):
+                    place = int(link), int(np.digitize(felt, FELT))
+                    halves[row.trial % 2].setdefault(place, []).append(float(error))
+        told, asked = halves
+        rest = np.concatenate(
+            [np.array(errors) - np.median(told.get(at, [0.0])) for at, errors in asked.items()]
+        )
+        rest += (low + high) / 2
+        words.append(f"{np.mean((low < rest) & (rest < high)):.0%} ({divisor:g})")
+    return (
+        "Less the median error of its link and of its height by the probe, in the trials of even "
+        f"number, the plan of the others is within {100 * low:+g} to {100 * high:+g} cm in "
+        f"{' and '.join(words)}."
+    )
 
 
 def plane() -> Table:

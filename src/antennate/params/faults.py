@@ -126,6 +126,8 @@ def describe(
     place = where(path) if path else "the file"
     if kind == "json_invalid":
         return f"{place}: expected JSON, found {context['error']}".replace("EOF", "its end")
+    if kind == "missing" and path and isinstance(path[-1], int):
+        return f"{place}: expected at least {path[-1] + 1} values, found {path[-1]}{more}"
     value = "none" if kind == "missing" else found(first["input"])
     return f"{place}: expected {_expected(kind, context) or first['msg']}, found {value}{more}"
 

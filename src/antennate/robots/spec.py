@@ -49,7 +49,7 @@ class RobotSpec(Params):
     links: int = number(6, "1", "paper: six links", ge=2, le=50)
     """Number of links."""
     link_pitch: float = number(
-        0.12, "m", "assumed: servos of 46.5 mm for yaw and pitch; legs stay apart", gt=0.03
+        0.12, "m", "assumed: servos of 46.5 mm for yaw and pitch; legs stay apart", gt=0.03, le=1
     )
     """Joint spacing."""
     mass: float = number(

@@ -65,7 +65,7 @@ def wiring(robot: RobotSpec) -> Figure:
             else 1.24
         )
         _box(axes, places[name], f"{servo_id}  {name}\n{kind.product}", colour, width)
-    _electronics(axes, power, bool(robot.antenna_count), converter)
+    _electronics(axes, power, robot, converter)
     axes.text(0.1, end - 0.45, legend, fontsize=_LETTERS, va="top", linespacing=1.4)
     return figure
 
@@ -178,7 +178,7 @@ def _box(
     axes.text(x, y, text, ha="center", va="center", fontsize=_LETTERS, zorder=3)
 
 
-def _electronics(axes: Axes, power: Supply, antennae: bool, converter: float) -> None:
+def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) -> None:
     """Battery, fuse, stop, converter and adapter above, and the board of the antennae."""
     main = power.rails[0].voltage
     for step, text in enumerate(
@@ -192,8 +192,8 @@ def _electronics(axes: Axes, power: Supply, antennae: bool, converter: float) ->
     _line(axes, [(_ADAPTER, _TOP), (_ADAPTER, _TOP - _STEP)], _DATA, 1.6)
     _box(axes, (_ADAPTER, _TOP), "computer", style.INK, 0.9)
     _box(axes, (_ADAPTER, _TOP - _STEP), "USB adapter\n(U2D2)", _DATA, 0.9)
-    if antennae:
-        _board(axes)
+    if robot.antenna_count:
+        _board(axes, robot.has_imu)
     for rail in power.rails[1:]:
         text = f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
         _box(axes, (_SUPPLY, converter), text, _LOW, 1.0)
@@ -201,11 +201,11 @@ def _electronics(axes: Axes, power: Supply, antennae: bool, converter: float) ->
             _line(axes, [(line, converter + y), (_SUPPLY, converter + y)], colour, 1.4)
             _joint(axes, (line, converter + y), colour)
         _voltage(axes, (_SUPPLY + 0.62, converter + 0.04), rail.voltage, _LOW)
-        _warning(axes, main, rail.voltage)
+        _warning(axes, main, rail.voltage, 0.26 if robot.has_imu else 0.0)
 
 
-def _board(axes: Axes) -> None:
-    """The board of the antennae and their dividers, right of the computer."""
+def _board(axes: Axes, imu: bool) -> None:
+    """The board of the antennae, and what hangs on it, right of the computer."""
     ink, above = style.INK, _TOP + 0.27
     _line(axes, [(_ADAPTER, _TOP), (_BOARD, _TOP), (_BOARD, _TOP - _STEP)], ink, 1.1)
     _line(axes, [(_BOARD, _TOP), (_BOARD, above), (_GROUND, above), (_GROUND, _TOP)], ink, 0.9)
@@ -213,13 +213,17 @@ def _board(axes: Axes) -> None:
     _box(axes, (_BOARD, _TOP), "antenna board (ESP32)\n3V3, GPIO34, 35", ink, 1.38)
     dividers = "two dividers:\nflex sensor above,\nresistor to ground"
     _box(axes, (_BOARD, _TOP - _STEP), dividers, ink, 1.2, 0.42)
+    if imu:
+        beside, sensor = _BOARD + 0.67, _TOP - 1.85 * _STEP
+        _line(axes, [(beside, _TOP), (beside, sensor)], ink, 1.1)
+        _box(axes, (_BOARD, sensor), "inertial sensor\n3V3, GPIO21, 22", ink, 1.38)
 
 
-def _warning(axes: Axes, high: float, low: float) -> None:
-    """What must not be joined, in letters that nobody overlooks."""
+def _warning(axes: Axes, high: float, low: float, lower: float) -> None:
+    """What must not be joined, in letters that nobody overlooks, below what hangs on the board."""
     axes.text(
         (_ADAPTER + style.WIDTH) / 2,
-        (_TOP - _STEP + _ANTENNAE) / 2 - 0.05,
+        (_TOP - _STEP + _ANTENNAE) / 2 - 0.05 - lower,
         f"{high:g} V destroys the\n{low:g} V servos (orange). No\nsupply wire between them!",
         ha="center",
         va="center",

@@ -28,7 +28,7 @@ from antennate.params.base import (
     require_whole_steps,
 )
 from antennate.params.control import ControlParams
-from antennate.params.scene import PhysicsParams, VariationParams
+from antennate.params.scene import GroundParams, PhysicsParams, VariationParams
 from antennate.robots.spec import RobotSpec
 
 ROBOT = "scuttle3d"
@@ -153,6 +153,11 @@ class ClimbConfig(Params):
         1, "1", "assumed: shows how it works; 25 tell something", ge=0, le=100_000
     )
     """Trials of each ground that `climb` feels; 0 for none."""
+    start: tuple[float, float] = number(
+        GroundParams().start, "m", "assumed: a robot that walks for 5 s is at the edge"
+    )
+    """Distance of the first edge from the head at the start, nearest and farthest, of steps and of
+    grounds that are no tunnel."""
     time_limit: float = number(
         60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
     )
@@ -170,11 +175,19 @@ class ClimbConfig(Params):
     def _known(cls, words: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(Terrain.of(word).word for word in words)
 
+    @field_validator("start")
+    @classmethod
+    def _in_front(cls, start: tuple[float, float]) -> tuple[float, float]:
+        try:
+            return from_values(GroundParams, {"start": start}).start
+        except ConfigError as error:
+            raise ValueError(str(error)) from None
+
     @field_validator("robot", mode="before")
     @classmethod
     def _over_base(cls, robot: Any) -> Any:
-        """What is not given is that of the robot that climbs."""
-        if isinstance(robot, Mapping):
+        """What is not given is that of the robot that climbs; a whole robot lacks nothing."""
+        if isinstance(robot, Mapping) and RobotSpec.model_fields.keys() - robot.keys() - {"imu"}:
             return put_over(RobotSpec.named(ROBOT).model_dump(mode="json"), dict(robot))
         return robot
 
@@ -276,6 +289,8 @@ def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
     sizes = {} if cell.height is None else {"height": cell.height}
     if cell.part == "ground":
         sizes = Terrain.of(cell.ground).values
+    if sizes and cell.part != "sensing" and cell.scene != "step_tunnel":
+        sizes = {**sizes, "start": config.start}
     if sizes:
         values["ground"] = sizes
     scene = from_values(TunnelConfig, values)

@@ -80,7 +80,7 @@ class Terrain:
             from_values(GroundParams, {KINDS[scene].size: size})
         except ConfigError as error:
             raise ValueError(f"{scene}: {error}") from None
-        return cls(f"{scene}:{size:g}", scene, size)
+        return cls(f"{scene}:{size:.12g}", scene, size)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class Terrain:
         if self.size is None:
             return FLAT
         kind = KINDS[self.scene]
-        return kind.label.format(f"{kind.scale * self.size:g}")
+        return kind.label.format(f"{kind.scale * self.size:.12g}")
 
     @property
     def patience(self) -> float:

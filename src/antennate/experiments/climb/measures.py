@@ -356,8 +356,10 @@ def sentence(result: Mapping[str, Any]) -> str:
             for name, s in entry["conditions"].items()
             if s["trials"]
         )
-        parts.append(f"with gain divisor {entry['divisor']:g} {each}")
+        if each:
+            parts.append(f"with gain divisor {entry['divisor']:g} {each}")
     lost = sum(s["invalid"] for e in result["climbing"] for s in e["conditions"].values())
     lost += sum(entry["invalid"] for entry in result["sensing"])
     why = f" Invalid trials: {lost}; trials.csv gives the reason of each." if lost else ""
-    return f"Steps climbed, all heights (95 % interval): {'; '.join(parts)}.{why}"
+    told = "; ".join(parts) or "none"
+    return f"Steps climbed, all heights (95 % interval): {told}.{why}"
