@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import antennate
+from antennate import experiments
 from antennate.cli import commands, main
 from antennate.cli.arguments import FromFile, parse
 from antennate.errors import ConfigError
-from antennate.experiments.gait.experiment import GaitStudyConfig
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import one_line
 from antennate.params.base import read_file
@@ -425,8 +425,9 @@ def test_json_is_strict_and_keeps_its_contract(capsys, tmp_path):
     ].keys()
 
 
-@pytest.mark.parametrize("config", [TunnelConfig(), GaitStudyConfig()])
-def test_config_survives_the_round_trip(tmp_path, config):
+@pytest.mark.parametrize("name", experiments.names())
+def test_config_survives_the_round_trip(tmp_path, name):
+    config = experiments.load(name).config()
     path = tmp_path / "c.toml"
     path.write_text(to_toml(config), encoding="utf-8")
     assert read_file(path, type(config)) == config

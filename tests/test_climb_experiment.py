@@ -19,6 +19,7 @@ from antennate.experiments.climb.criterion import is_over
 from antennate.experiments.climb.experiment import EXPERIMENT, ClimbOutcome, every, run
 from antennate.experiments.climb.physics import ClimbRow, carry_out
 from antennate.experiments.climb.sensing import Verdict
+from antennate.params.base import read_file
 from antennate.robots.imu import ImuParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import draw_trial, scene_of
@@ -239,6 +240,42 @@ def test_a_whole_robot_takes_nothing_from_the_one_that_climbs():
     own = RobotSpec.named("scuttle3d").model_copy(update={"imu": ImuParams()})
     table = {"robot": own.model_dump(mode="json")}
     assert ClimbConfig.model_validate(table).robot == own
+
+
+SHORT = (
+    *("climb", "--heights", "0.05", "--grounds", "flat", "--conditions", "level", "--sensing", "0"),
+    *("--divisors", "256", "--time-limit", "0.1", "--no-figures", "--workers", "1"),
+)
+
+
+@pytest.mark.parametrize(
+    ("file", "mass", "sensor"),
+    [
+        ('robot = "scuttle3d"', 2.4, True),
+        ('[robot]\nbase = "scuttle3d"\nmass = 2.5', 2.5, True),
+        ("[robot]\nmass = 2.5", 2.5, True),
+        ('[robot.imu]\nkind = "none"', 2.4, False),
+    ],
+)
+def test_a_configuration_names_its_robot_as_anywhere(file, mass, sensor, tmp_path):
+    """And what a run wrote is read as it was."""
+    given, out, again = (tmp_path / name for name in ("given.toml", "out", "again"))
+    given.write_text(f"{file}\n")
+    assert main([*SHORT, "--config", str(given), "--out", str(out)]) == 0
+    robot = read_file(out / "config.toml", ClimbConfig).robot
+    assert (robot.mass, robot.has_imu, robot.pitch_count) == (mass, sensor, 5)
+    kept = ["--no-figures", "--workers", "1", "--out", str(again)]
+    assert main(["climb", "--config", str(out / "config.toml"), *kept]) == 0
+    assert (again / "trials.csv").read_bytes() == (out / "trials.csv").read_bytes()
+
+
+def test_shards_are_merged(tmp_path):
+    folders = [str(tmp_path / name) for name in ("one", "two")]
+    for i, folder in enumerate(folders, 1):
+        assert main([*SHORT, "--shard", f"{i}/2", "--out", folder]) == 0
+    assert main(["study", "merge", *folders, "--out", str(tmp_path / "all")]) == 0
+    with (tmp_path / "all" / "trials.csv").open(newline="") as file:
+        assert len(list(csv.DictReader(file))) == 2
 
 
 def test_a_run_that_was_stopped_tells_of_the_divisors_that_it_came_to():

@@ -176,7 +176,7 @@ def walked(sensor: str) -> Floats:
     controller = make_controller("rhythm", control, robot, 1)
     controller.reset(np.array([0]))
     climb = control.climb
-    begins = climb.walk_time + climb.retreat_time + climb.lift_time + climb.approach_time
+    begins = climb.walk_time + climb.retreat_time + climb.lift_time + climb.come_time
     up, angles, yaw = np.array([0.0, 0.0, 1.0]), np.zeros((1, len(robot.joint_names))), np.zeros(0)
     for tick in range(round((begins + 2.0) / PERIOD)):
         now = tick * PERIOD

@@ -130,7 +130,7 @@ _RAISED = (*(path for path in _BODY if path not in _CARRY), *_HEADING, "climb.fe
 _SWEEP = ("gait.antenna_mean", "gait.antenna_amplitude", "gait.antenna_frequency")
 """How the gait moves the bases; those that climb move them themselves."""
 _RHYTHM = tuple(
-    f"climb.{name}" for name in ("walk_time", "retreat_time", "lift_time", "approach_time", "pace")
+    f"climb.{name}" for name in ("walk_time", "retreat_time", "lift_time", "come_time", "pace")
 )
 """A round of `rhythm`."""
 _OTHERS = (*_BLIND, *_FOLLOW, *_CENTRE, *_CLIMB)
@@ -178,7 +178,7 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "random": _without(_RANDOM, *_TURNING),
     "climb": (
         *(*_TABLE, *_BLIND, *_FOLLOW, *_CENTRE, *_OTHER_ESCAPE, *_GEOMETRIC),
-        *("climb.lift", "climb.walk_time", *_SWEEP),
+        *("climb.lift", "climb.walk_time", "climb.come_time", *_SWEEP),
     ),
     "lifted": _without(("climb.rate", "climb.lift"), *_ESCAPE, *_SWEEP),
     "rhythm": _without((*_RAISED, *_CARRY, *_RHYTHM), *_ESCAPE, *_SWEEP),

@@ -286,9 +286,11 @@ class ClimbParams(Params):
     lift: float = number(0.35, "rad", "assumed: above it the head costs speed", ge=0, le=1)
     """Lift of the head of `lifted`."""
     walk_time: float = number(
-        5.0, "s", "fitted: best of 3, 5 and 8 s at 10 cm (docs/science/climb.md)", ge=0, le=60
+        4.0, "s", "fitted: trials of seeds 3, 4; 4, 5 and 6 s (docs/science/climb.md)", ge=0, le=60
     )
     """Time that `rhythm` walks between two climbs."""
+    come_time: float = number(2.0, "s", "fitted: as walk_time; 0.3, 1 and 2 s", ge=0, le=10)
+    """Time that `rhythm` walks with its head raised before its plan goes on."""
 
     @model_validator(mode="after")
     def _low_is_low(self) -> ClimbParams:

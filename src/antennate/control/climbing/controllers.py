@@ -90,7 +90,7 @@ class _RhythmRule:
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> None:
         p = control.climb
         self._body, self._period, self._elevation = body, control.period, 0.5 * p.feel.highest
-        self._ends = np.cumsum([p.walk_time, p.retreat_time, p.lift_time, p.approach_time])
+        self._ends = np.cumsum([p.walk_time, p.retreat_time, p.lift_time, p.come_time])
         self._time: Floats = np.zeros(batch)
 
     def reset(self, rows: Ints | Bools) -> None:

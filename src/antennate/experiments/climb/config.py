@@ -187,9 +187,11 @@ class ClimbConfig(Params):
     @classmethod
     def _over_base(cls, robot: Any) -> Any:
         """What is not given is that of the robot that climbs; a whole robot lacks nothing."""
-        if isinstance(robot, Mapping) and RobotSpec.model_fields.keys() - robot.keys() - {"imu"}:
-            return put_over(RobotSpec.named(ROBOT).model_dump(mode="json"), dict(robot))
-        return robot
+        if not isinstance(robot, Mapping):
+            return robot
+        if RobotSpec.model_fields.keys() - robot.keys() - {"imu"}:
+            robot = put_over(RobotSpec.named(ROBOT).model_dump(), robot)
+        return _with_tuples(robot)
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
@@ -232,6 +234,13 @@ class ClimbConfig(Params):
     def terrains(self) -> tuple[Terrain, ...]:
         """The other grounds."""
         return tuple(map(Terrain.of, self.grounds))
+
+
+def _with_tuples(value: Any) -> Any:
+    """What a file holds as a model takes it: tuples in place of lists, at any depth."""
+    if isinstance(value, Mapping):
+        return {key: _with_tuples(inner) for key, inner in value.items()}
+    return tuple(map(_with_tuples, value)) if isinstance(value, (list, tuple)) else value
 
 
 def cells(config: ClimbConfig) -> Mapping[str, Cell]:
