@@ -17,15 +17,11 @@ from antennate.sim.export.urdf import BETWEEN_MASS
 from antennate.types import Floats
 
 CLOSE = 1e-9
-HEAD = '<robot name="robot">'
-WHOLE = f'{HEAD}<mujoco><compiler fusestatic="false" discardvisual="false"/></mujoco>'
-"""Lets the reader keep link0, which is fixed to its world, and shapes that touch nothing."""
 
 
 def models(robot: RobotSpec) -> tuple[mujoco.MjModel, mujoco.MjModel]:
     text = str(export_urdf(robot).files["robot.urdf"])
-    assert HEAD in text
-    urdf = mujoco.MjModel.from_xml_string(text.replace(HEAD, WHOLE))
+    urdf = mujoco.MjModel.from_xml_string(text)
     return urdf, mujoco.MjModel.from_xml_string(str(export_mjcf(robot).files["robot.xml"]))
 
 

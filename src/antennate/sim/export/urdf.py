@@ -28,6 +28,9 @@ BETWEEN_MASS = 1e-6
 BETWEEN_INERTIA = 1e-9
 """Its inertia about any axis [kg·m²]."""
 _GEOMS = mujoco.mjtGeom
+_FOR_MUJOCO = {"fusestatic": "false", "discardvisual": "false"}
+"""So MuJoCo's reader keeps link0, which it fixes to the world, and shapes that touch nothing;
+other readers pass over it."""
 LACKS = (
     "springs: antenna hinges and locked pitch joints",
     "the law of the servos: gain, armature, friction that grows with the load",
@@ -72,6 +75,7 @@ def to_urdf(robot: RobotSpec, title: str) -> str:
     add_robot(spec, robot, physics)
     model = spec.compile()
     root = Element("robot", name="robot")
+    SubElement(SubElement(root, "mujoco"), "compiler", _FOR_MUJOCO)
     anchors = {0: np.zeros(3), 1: np.zeros(3)}
     _add_link(root, model, 1, anchors[1])
     for body in range(2, model.nbody):
