@@ -61,6 +61,11 @@ many = gym.make_vec("antennate/Tunnel-v1", num_envs=24)  # in lockstep, in one p
 before `gymnasium`. After `SCENES.add("mine", ...)`, `antennate.envs.register()` adds an
 environment for your [own scene](scenes.md).
 
+`scuttle`, the robot if none is named, climbs no step of 8 cm. For ground with edges take a robot
+that leaves the plane, `robot=RobotSpec.named("scuttle3d"), action="joints"` beside
+`"antennate/StepUp-v1"`: the action then has its pitch joints and the elevation of its antennae. Its
+inertial sensor is not observed.
+
 {ids}
 
 - **An episode** follows from its seed and number alone, never from what ran before. It is the
