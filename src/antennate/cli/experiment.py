@@ -321,7 +321,8 @@ def _end(
         raise
     show_result(result, options, *_shown(experiment, result), experiment.explained)
     if interrupted:
-        rest = f"kept {len(outcome.rows)} trials, all that had ended"
+        number = len(outcome.rows)
+        rest = f"kept {number} trial{'s' * (number != 1)}, all that had ended"
         sys.stderr.write(f"{title}: interrupted: {rest}\n{again}")
         return INTERRUPTED
     if options.video:

@@ -37,7 +37,7 @@ def figures(outcome: ClimbOutcome) -> dict[str, Figure]:
     path = example(outcome)
     if path is not None:
         drawn["side"] = side(path)
-    if result["climbing"][0]["plan"]:
+    if any(row["crossings"] for entry in result["climbing"] for row in entry["plan"] or ()):
         drawn["plan"] = plan(result["climbing"])
     if result["sensing"]:
         drawn["felt"] = felt(result["sensing"])
@@ -127,7 +127,8 @@ def side(path: ClimbPath) -> Figure:
     x = path.links[:, :, 0] - path.edge
     near = np.flatnonzero((x[:, 0] > -0.2) & (x[:, -1] < 0.25))
     first, last = (int(near[0]), int(near[-1])) if len(near) else (0, len(x) - 1)
-    left, right = float(x[first : last + 1].min()) - 0.06, float(x[first : last + 1].max()) + 0.06
+    shown = x[first : last + 1]
+    left, right = float(shown.min()) - 0.06, max(float(shown.max()), 0.06) + 0.06
     for panel, moment in zip(panels, np.linspace(first, last, _MOMENTS).round(), strict=True):
         at = int(moment)
         panel.fill_between([left, 0.0], -0.03, 0.0, color=style.FAINT, linewidth=0)
@@ -142,6 +143,9 @@ def side(path: ClimbPath) -> Figure:
         panel.set(xlim=(left, right), ylim=(-0.03, path.height + 0.22))
         panel.set_aspect("equal", adjustable="box")
         panel.grid(visible=False)
+    panels[0].set_title(
+        f"step of {100 * path.height:g} cm, {path.t[first]:.1f} s", fontsize=8, pad=2
+    )
     panels[-1].set_xlabel("from the edge [m]; dashed: the head by the plan")
     panels[_MOMENTS // 2].set_ylabel("height [m]")
     return figure
