@@ -1,7 +1,7 @@
 """Tables and figure of docs/science/climb.md: `python docs/science/climb.py`.
 
-They are made of docs/science/climb.csv, climb_ground.csv and climb_plane.csv, the trials.csv of the
-runs that the page names; with --check the page is only compared.
+They are made of docs/science/climb*.csv, the trials.csv of the runs that the page names; with
+--check the page is only compared.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ GROUND = HERE / "climb_ground.csv"
 """A run on other grounds, and on steps that are too high."""
 WITHOUT = HERE / "climb_without.csv"
 """The trials of `climb` of the first run again, by a robot without an inertial sensor."""
+FAR = HERE / "climb_far.csv"
+"""Steps that stand up to 2.35 m ahead, for touch and for a clock that was tuned for them."""
 PLANE = HERE / "climb_plane.csv"
 """Two runs of `tunnel`, one after the other: `scuttle3d` and `scuttle`."""
 CROSSED = [
@@ -66,6 +68,8 @@ def main() -> None:
         ground = outcome_of(GROUND).result()
         text += "\n### On other grounds\n\n"
         text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
+        text += "\n### Where a step may stand anywhere\n\n"
+        text += "\n".join(map(markdown, far()))
         text += "\n### Without the inertial sensor\n\n"
         text += "\n".join(map(markdown, without(outcome)))
         text += f"\n### In the plane\n\n{markdown(plane())}"
@@ -100,6 +104,20 @@ def without(outcome: ClimbOutcome) -> Iterator[Table]:
             f"{found['mcnemar_p']:.3g}."
         )
         yield replace(table, title=f"{table.title}, without the sensor", note=note)
+
+
+def far() -> Iterator[Table]:
+    """Success where the distance of the step is drawn from two metres, and the pairs."""
+    result = outcome_of(FAR).result()
+    for table, entry in zip(first_of(result), result["climbing"], strict=True):
+        test = entry["pairs"]["rhythm"]
+        note = (
+            f"Steps 0.35 to 2.35 m ahead, within {result['time_limit_s']:g} s, seed "
+            f"{outcome_of(FAR).config.seed}; `rhythm` walks for 10 s. Of {test['trials']} pairs "
+            f"{test['only_climb']} were climbed by climb alone, {test['only_other']} by rhythm "
+            f"alone; McNemar p {test['mcnemar_p']:.3g}."
+        )
+        yield replace(table, note=note)
 
 
 def lead(rows: Sequence[ClimbRow]) -> str:
