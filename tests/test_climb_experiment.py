@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy import stats
 
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.climbing.rule import Ground, Stage
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.climb import measures
 from antennate.experiments.climb.config import ClimbConfig, cells, config_of
 from antennate.experiments.climb.criterion import is_over
 from antennate.experiments.climb.experiment import EXPERIMENT, ClimbOutcome, every, run
 from antennate.experiments.climb.physics import ClimbRow, carry_out
 from antennate.experiments.climb.sensing import Verdict
-from antennate.params.base import read_file
+from antennate.params.base import from_values, read_file
 from antennate.robots.imu import ImuParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import draw_trial, scene_of
@@ -205,7 +206,7 @@ def test_a_run_leaves_its_tables_and_figures(tmp_path):
         (["--heights", "0.05", "0.05"], "heights must differ"),
         (["--robot", "hexapod"], "expected a robot with pitch joints and antennae that rise"),
         (["--start", "0.1", "1"], "start must rise from at least 0.25 to at most 10 m, found 0.1"),
-        (["--start", "0.35"], "--start: expected at least 2 values, found 1"),
+        (["--start", "0.35"], "--start: expected 2 values, found 1"),
         (["--conditions", "fly"], "expected one of locked, level, lifted, rhythm, climb or edges"),
         (["--divisors", "0"], "--divisors: expected a number above 0, found 0.0"),
         (["--robot.servos.xc430-w240.gain-divisor", "9"], "divisors says it"),
@@ -234,6 +235,31 @@ def test_steps_and_gaps_stand_as_far_as_is_asked():
         one = config_of(config, cell)
         drawn: Any = scene_of(one).draw(one.robot, np.random.default_rng(1))
         assert 2.0 <= drawn.edges[0].x - drawn.start[0] <= 2.1
+
+
+def test_what_is_felt_and_tunnels_stay_where_they_are():
+    grounds = ("step_tunnel:0.08",)
+    far, near = (
+        ClimbConfig(heights=(0.05,), conditions=("climb",), grounds=grounds, start=start)
+        for start in ((2.0, 2.1), (0.35, 0.95))
+    )
+    for name, cell in cells(far).items():
+        same = config_of(far, cell) == config_of(near, cells(near)[name])
+        assert same == (cell.part != "climbing")
+
+
+def test_a_robot_that_lacks_one_table_has_that_of_the_one_that_climbs():
+    table = RobotSpec.named("scuttle").model_dump(mode="json")
+    del table["pitch"]
+    with pytest.raises(ValidationError, match="antennae that rise"):
+        ClimbConfig.model_validate({"robot": table})
+    del table["elevation"]
+    assert ClimbConfig.model_validate({"robot": table}).robot.pitch_count == 5
+
+
+def test_a_list_that_is_too_short_says_how_much():
+    with pytest.raises(ConfigError, match=r"start: expected 2 values, found 0"):
+        from_values(ClimbConfig, {"start": []})
 
 
 def test_a_whole_robot_takes_nothing_from_the_one_that_climbs():

@@ -68,7 +68,7 @@ def main() -> None:
         ground = outcome_of(GROUND).result()
         text += "\n### On other grounds\n\n"
         text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
-        text += "\n### Where a step may stand anywhere\n\n"
+        text += "\n### Steps 0.35 to 2.35 m ahead\n\n"
         text += "\n".join(map(markdown, far()))
         text += "\n### Without the inertial sensor\n\n"
         text += "\n".join(map(markdown, without(outcome)))
@@ -117,7 +117,7 @@ def far() -> Iterator[Table]:
             f"{test['only_climb']} were climbed by climb alone, {test['only_other']} by rhythm "
             f"alone; McNemar p {test['mcnemar_p']:.3g}."
         )
-        yield replace(table, note=note)
+        yield replace(table, title=f"{table.title}, 0.35 to 2.35 m ahead", note=note)
 
 
 def lead(rows: Sequence[ClimbRow]) -> str:
@@ -133,13 +133,13 @@ def lead(rows: Sequence[ClimbRow]) -> str:
                     halves[row.trial % 2].setdefault(place, []).append(float(error))
         told, asked = halves
         rest = np.concatenate(
-            [np.array(errors) - np.median(told.get(at, [0.0])) for at, errors in asked.items()]
+            [np.array(errors) - np.median(told[at]) for at, errors in asked.items() if at in told]
         )
-        rest += (low + high) / 2
         words.append(f"{np.mean((low < rest) & (rest < high)):.0%} ({divisor:g})")
     return (
-        "Less the median error of its link and of its height by the probe, in the trials of even "
-        f"number, the plan of the others is within {100 * low:+g} to {100 * high:+g} cm in "
+        "Less the median error of its link and its height by the probe (to 4.5, 6.5, 8 cm, and "
+        "more), in the trials of even number, the plan of the others is within "
+        f"{100 * low:+g} to {100 * high:+g} cm in "
         f"{' and '.join(words)}."
     )
 

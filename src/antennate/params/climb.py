@@ -252,7 +252,7 @@ class ClimbParams(Params):
     approach_time: float = number(
         1.0, "s", "fitted: trials of seed 0; the robot comes up to the edge in it", ge=0, le=10
     )
-    """Time that it walks with its head raised before the plan goes on."""
+    """Time that `climb` walks with its head raised before the plan goes on."""
     sink_rate: float = number(
         0.025, "m/s", "fitted: trials of seed 3; at 0.05 it lies on its belly at 15 cm", gt=0, le=1
     )
@@ -278,7 +278,7 @@ class ClimbParams(Params):
     attempts: int = number(3, "1", "assumed: thrice the same place is a wall", ge=1, le=20)
     """Climbs one after the other that make a wall."""
     retreat_time: float = number(1.0, "s", "assumed: a link and a half", gt=0, le=30)
-    """Time to back off from a step that was not climbed."""
+    """Time to back off from a step: of `climb` one that was not climbed, of `rhythm` each."""
     back_time: float = number(3.0, "s", "assumed: as search.reverse_time and a little", gt=0, le=30)
     """Time to back off from ground that is missing."""
     turn_time: float = number(6.5, "s", "assumed: it then walks away from the edge", gt=0, le=30)

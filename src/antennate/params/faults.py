@@ -7,6 +7,7 @@ from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from antennate.messages import nearest, one_line, shortened, shown
 
@@ -127,9 +128,16 @@ def describe(
     if kind == "json_invalid":
         return f"{place}: expected JSON, found {context['error']}".replace("EOF", "its end")
     if kind == "missing" and path and isinstance(path[-1], int):
-        return f"{place}: expected at least {path[-1] + 1} values, found {path[-1]}{more}"
+        return _too_few(faults, path[:-1], where)
     value = "none" if kind == "missing" else found(first["input"])
     return f"{place}: expected {_expected(kind, context) or first['msg']}, found {value}{more}"
+
+
+def _too_few(faults: Sequence[ErrorDetails], path: Place, where: Callable[[Place], str]) -> str:
+    """A list at `path` that is too short: its first place is the first that is lacking."""
+    lacking = [fault["loc"][-1] for fault in faults if fault["loc"][:-1] == path]
+    most = max(place for place in lacking if isinstance(place, int)) + 1
+    return f"{where(path)}: expected {most} values, found {most - len(lacking)}"
 
 
 def _expected(kind: str, context: Mapping[str, Any]) -> str | None:

@@ -153,11 +153,9 @@ class ClimbConfig(Params):
         1, "1", "assumed: shows how it works; 25 tell something", ge=0, le=100_000
     )
     """Trials of each ground that `climb` feels; 0 for none."""
-    start: tuple[float, float] = number(
-        GroundParams().start, "m", "assumed: a robot that walks for 5 s is at the edge"
-    )
-    """Distance of the first edge from the head at the start, nearest and farthest, of steps and of
-    grounds that are no tunnel."""
+    start: tuple[float, float] = number(GroundParams().start, "m", "assumed: as ground.start")
+    """Distance of the first edge from the head at the start, nearest and farthest; not of what is
+    felt, nor in tunnels."""
     time_limit: float = number(
         60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
     )
@@ -186,7 +184,10 @@ class ClimbConfig(Params):
     @field_validator("robot", mode="before")
     @classmethod
     def _over_base(cls, robot: Any) -> Any:
-        """What is not given is that of the robot that climbs; a whole robot lacks nothing."""
+        """What is not given is that of the robot that climbs; a whole robot lacks nothing.
+
+        One without an inertial sensor is written without `imu`, and is whole.
+        """
         if not isinstance(robot, Mapping):
             return robot
         if RobotSpec.model_fields.keys() - robot.keys() - {"imu"}:

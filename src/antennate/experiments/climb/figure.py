@@ -143,10 +143,8 @@ def side(path: ClimbPath) -> Figure:
         panel.set(xlim=(left, right), ylim=(-0.03, path.height + 0.22))
         panel.set_aspect("equal", adjustable="box")
         panel.grid(visible=False)
-    panels[0].set_title(
-        f"step of {100 * path.height:g} cm, {path.t[first]:.1f} s", fontsize=8, pad=2
-    )
-    panels[-1].set_xlabel("from the edge [m]; dashed: the head by the plan")
+    step = f"a step of {100 * path.height:g} cm"
+    panels[-1].set_xlabel(f"from the edge of {step} [m]; dashed: the head by the plan")
     panels[_MOMENTS // 2].set_ylabel("height [m]")
     return figure
 

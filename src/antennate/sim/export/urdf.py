@@ -30,7 +30,7 @@ BETWEEN_INERTIA = 1e-9
 _GEOMS = mujoco.mjtGeom
 _FOR_MUJOCO = {"fusestatic": "false", "discardvisual": "false"}
 """So MuJoCo's reader keeps link0, which it fixes to the world, and shapes that touch nothing;
-other readers pass over it."""
+yourdfpy passes over it."""
 LACKS = (
     "springs: antenna hinges and locked pitch joints",
     "the law of the servos: gain, armature, friction that grows with the load",
