@@ -361,5 +361,5 @@ def sentence(result: Mapping[str, Any]) -> str:
     lost = sum(s["invalid"] for e in result["climbing"] for s in e["conditions"].values())
     lost += sum(entry["invalid"] for entry in result["sensing"])
     why = f" Invalid trials: {lost}; trials.csv gives the reason of each." if lost else ""
-    told = "; ".join(parts) or "none"
-    return f"Steps climbed, all heights (95 % interval): {told}.{why}"
+    shares = "; ".join(parts) or "none"
+    return f"Steps climbed, all heights (95 % interval): {shares}.{why}"
