@@ -45,10 +45,11 @@ class Tab:
         )
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """Call a method of the DevTools; its result."""
+        """Call a method of the DevTools; its result. A page that hangs still sends events."""
         number = self._send(method, params)
+        end = time.monotonic() + _STARTING
         while True:
-            answer = json.loads(self._connection.recv(_STARTING))
+            answer = json.loads(self._connection.recv(max(0.0, end - time.monotonic())))
             if answer.get("id") == number:
                 assert "error" not in answer, (method, answer)
                 return answer["result"]
