@@ -300,6 +300,12 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     assert figure.axes[1].lines[-1].get_ydata() == [0.4, 0.4]
     assert phone.smallest(figure) >= phone.LEAST
     assert style.render(figure) == style.render(draw(course))
+    raised = {"pitch": np.full((n, 5), 0.5), "elevation": np.full((n, 2), -0.25)}
+    panel = draw(dataclasses.replace(course, **raised)).axes[3]
+    assert panel.get_title(loc="left") == "Raised"
+    assert [line.get_ydata()[0] for line in panel.lines] == pytest.approx(
+        [28.65] * 5 + [-14.32] * 2, abs=0.01
+    )
     simulated = draw(dataclasses.replace(course, replayed=None, state=[""] * n))
     rows = [label.get_text() for label in simulated.axes[3].get_yticklabels()]
     assert rows == ["recorded"]  # no supervisor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from matplotlib.patches import Patch
 
 from antennate import figures as style
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.ticks import Pair
 from antennate.types import Contact, Floats, Ints, Maneuver
 
 _MOST_DRAWN = 5000
@@ -58,6 +57,8 @@ class Course:
         replayed: `Maneuver` decided now, shape (n,); None without a replay.
         state: The supervisor's, n of them; empty text without one.
         threshold: Level from which on there is contact; NaN if it is not known.
+        pitch: Commanded pitch joints, head first [rad], shape (n, P); P is 0 without them.
+        elevation: Commanded elevations of the antennae [rad], shape (n, 2), (n, 0) without them.
     """
 
     t: Floats
@@ -68,6 +69,8 @@ class Course:
     replayed: Ints | None
     state: Sequence[str]
     threshold: float
+    pitch: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    elevation: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
     def of(cls, log: LogReader, count: int, replayed: Sequence[int] | None = None) -> Course:
@@ -80,6 +83,8 @@ class Course:
         """
         step = -(-count // _MOST_DRAWN)
         ticks = list(islice(log, 0, None, step))
+        robot = log.header.robot
+        angles = _drawable([tick.angles for tick in ticks])
         return cls(
             t=_drawable([tick.now for tick in ticks]),
             reading=_drawable([tick.reading for tick in ticks]),
@@ -89,6 +94,8 @@ class Course:
             replayed=None if replayed is None else np.array(replayed[::step]),
             state=[tick.state for tick in ticks],
             threshold=log.header.params.rule.threshold,
+            pitch=angles[:, robot.places("pitch")],
+            elevation=angles[:, robot.places("elevation")],
         )
 
 
@@ -109,7 +116,7 @@ def of_arrays(
     )
 
 
-def _drawable(values: Floats | Sequence[float] | Sequence[Pair]) -> Floats:
+def _drawable(values: Floats | Sequence[float] | Sequence[tuple[float, ...]]) -> Floats:
     """Numbers as they are, NaN for those that no axis can show."""
     numbers = np.array(values)
     return np.where(np.abs(numbers) <= _LARGEST, numbers, np.nan)
@@ -139,6 +146,8 @@ def replay(course: Course) -> Figure:
         parts.append((3.0, _draw_levels))
     if (course.contact != Contact.UNKNOWN).any():
         parts.append((1.2, _draw_contact))
+    if course.pitch.size or course.elevation.size:
+        parts.append((3.0, _draw_raised))
     if any(course.state) or (course.recorded >= 0).any() or course.replayed is not None:
         parts.append((1.8, _draw_decisions))
     heights = [height for height, _ in parts]
@@ -175,6 +184,18 @@ def _draw_contact(panel: Axes, course: Course) -> None:
     contacts = {Contact(kind).name.lower(): colour for kind, colour in _CONTACTS.items()}
     panel.legend(handles=_patches(contacts), **_BESIDE_THE_TITLE)
     panel.grid(visible=False)
+
+
+def _draw_raised(panel: Axes, course: Course) -> None:
+    for joint, angles in enumerate(np.degrees(course.pitch.T)):
+        shade = style.INK if joint == 0 else style.MUTED
+        name = {0: "first joint", 1: "others"}.get(joint)
+        panel.plot(course.t, angles, color=shade, linewidth=1.2 if joint == 0 else 0.6, label=name)
+    for side, angles in enumerate(np.degrees(course.elevation.T)):
+        name = None if side else "antennae"
+        panel.plot(course.t, angles, color=style.series(3)[2], linewidth=1, label=name)
+    panel.set(ylabel="up [°]", title="Raised")
+    panel.legend(**{**_BESIDE_THE_TITLE, "ncols": 3}, handlelength=1.2, columnspacing=1.0)
 
 
 def _draw_decisions(panel: Axes, course: Course) -> None:
