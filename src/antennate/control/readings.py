@@ -31,6 +31,8 @@ OWN, NONE, SWAPPED, DELAYED, YOKED = "own", "none", "swapped", "delayed", "yoked
 KINDS = (OWN, NONE, SWAPPED, f"{DELAYED}:S", YOKED)
 LONGEST_DELAY = 100.0
 """Longest delay [s]: what was read in so long is kept in memory."""
+_LONGEST_LABEL = 21
+"""Letters of a label: a figure has room for these on a phone."""
 ABOUT: Mapping[str, str] = {
     NONE: "given two antennae that touch nothing",
     SWAPPED: "given left and right exchanged",
@@ -103,23 +105,32 @@ def parts_of(name: str) -> tuple[str, str]:
 
 
 def short_names(conditions: Iterable[str]) -> dict[str, str]:
-    """A label for each condition: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME.
+    """A label for each condition: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME, or FILE.onnx.
 
-    Where two share it, FILE.py:NAME, and all of it where they share that. Readings that are not its
-    own, as of `closed@delayed:0.5`, stay behind it.
+    Where two share it, FILE.py:NAME, then with the folder, and all of it where they share that,
+    too. Of a long one the middle is left out. Readings that are not its own, as of
+    `closed@delayed:0.5`, stay behind it.
     """
     parts = {name: parts_of(name) for name in conditions}
-    ends = [
-        {
-            name: condition(each.rpartition(mark)[2], readings)
-            for name, (each, readings) in parts.items()
-        }
-        for mark in ":/"
+    paths = {name: each.split("/") for name, (each, _) in parts.items()}
+    cuts = [
+        {name: path[-1].rpartition(":")[2] for name, path in paths.items()},
+        {name: path[-1] for name, path in paths.items()},
+        {name: "/".join(path[-2:]) for name, path in paths.items()},
+    ]
+    labels = [
+        {name: condition(_clipped(cut), parts[name][1]) for name, cut in each.items()}
+        for each in cuts
     ]
     return {
-        name: next((e[name] for e in ends if list(e.values()).count(e[name]) == 1), name)
+        name: next((e[name] for e in labels if list(e.values()).count(e[name]) == 1), name)
         for name in parts
     }
+
+
+def _clipped(label: str) -> str:
+    half = (_LONGEST_LABEL - 1) // 2
+    return label if len(label) <= _LONGEST_LABEL else f"{label[:half]}…{label[-half:]}"
 
 
 def about_readings(names: Iterable[str]) -> list[str]:
