@@ -55,6 +55,9 @@ def test_it_is_registered_with_all_its_cells():
     assert [n for n, robot in robots.items() if not robot.pitch_count] == ["locked"]
     divisors = {config_of(config, c).robot.servos.xc430_w240.gain_divisor for c in climbs}
     assert divisors == {256.0, 128.0}
+    other = from_values(ClimbConfig, {"robot": {"pitch": {"servo": "xl430_w250"}}})
+    servos = [config_of(other, cell).robot.servos for cell in cells(other).values()]
+    assert {each.of("xl430_w250").gain_divisor for each in servos} == {256.0, 128.0}
 
 
 def test_a_trial_starts_alike_for_all_conditions():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -76,14 +77,20 @@ def test_without_readings_no_joint_moves(name: str) -> None:
     t = iter(np.arange(2000) * 0.01)
 
     def command(counts: float) -> np.ndarray:
+        if name == "edges":
+            edge = Knowledge(edges=np.array([[-0.3, math.nan, math.nan, math.nan]]))
+            controller.know(edge)  # pyright: ignore[reportAttributeAccessIssue]
         frame = AntennaFrame(np.array([next(t)]), np.full((1, 2), counts))
         return joint_angles(controller.step(frame), ROBOT.command_shapes())
 
+    moved = 0
     for tick in range(900):
-        command(BENT if 200 < tick < 260 else FLOOR)
-        if tick % 150 == 100:
-            blind = [command(math.nan) for _ in range(20)]
-            assert (np.array(blind[1:]) == blind[0]).all()
+        last = command(BENT if 200 < tick < 260 else FLOOR)
+        if tick in (4, 10) or tick % 150 == 100:
+            moved += not (last == command(FLOOR)).all()
+            last = command(FLOOR)
+            assert all((command(math.nan) == last).all() for _ in range(20))
+    assert moved > 2  # at many of these times it would have moved
 
 
 def test_a_plan_that_is_told_goes_on_at_its_pace_and_back_with_the_robot() -> None:
@@ -175,6 +182,24 @@ def test_missing_ground_without_a_floor_within_reach_is_backed_off_from() -> Non
     stage, ground, maneuvers = felt(STRAIGHT, STRAIGHT, seconds=2.5)
     assert (stage, ground) == (Stage.BACK, Ground.DROP)
     assert maneuvers[-1] == Maneuver.REVERSE
+
+
+def test_a_bump_behind_a_cliff_is_walked_over() -> None:
+    """What it backed off from says nothing of what it meets next: no second retreat."""
+    control = ControlParams()
+    controller = make_controller("climb", control, ROBOT, 1)
+    controller.reset(np.array([0]))
+    stages = []
+    for tick in range(1800):
+        t = tick * control.period
+        counts = STRAIGHT if 2.0 < t < 5.0 or t > 14.3 else BENT if t > 14.0 else FLOOR
+        controller.step(AntennaFrame(np.array([t]), np.full((1, 2), counts)))
+        rule = controller.rule  # pyright: ignore[reportAttributeAccessIssue]
+        stages.append(Stage(int(rule.stage[0])))
+    met = [stage for stage, then in pairwise(stages) if stage != then]
+    assert met[:4] == [Stage.WALK, Stage.PROBE_DOWN, Stage.BACK, Stage.TURN]
+    assert met[4:6] == [Stage.WALK, Stage.PROBE_UP]
+    assert Stage.RETREAT not in stages
 
 
 @pytest.mark.parametrize("counts", [(math.nan, FLOOR), (BENT, math.nan)])

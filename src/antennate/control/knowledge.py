@@ -21,7 +21,7 @@ KNOWABLE: tuple[Kind, ...] = get_args(Kind)
 
 
 EDGES = 4
-"""Edges that a robot can be on at once, at most: its length over the depth of a step, and more."""
+"""Edges that a robot is told at once, at most: those of usual stairs it is on, and the next."""
 
 
 @dataclass(frozen=True, slots=True)

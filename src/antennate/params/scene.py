@@ -202,7 +202,7 @@ class CorridorsParams(Params):
 class GroundParams(Params):
     """Sizes of ground that is not flat; each scene of it reads its own."""
 
-    height: float = number(0.10, "m", "assumed: 8 to 15 cm are to be climbed", gt=0.0, le=0.5)
+    height: float = number(0.10, "m", "assumed: 8 to 15 cm are to be climbed", ge=0.001, le=0.5)
     """Height of a step, of each step of stairs, or of a ramp."""
     start: tuple[float, float] = number(
         (0.35, 0.95), "m", "assumed: the antennae do not touch it yet, and a body length more"
@@ -210,7 +210,9 @@ class GroundParams(Params):
     """Distance of the first edge from the head at the start, nearest and farthest."""
     width: float = number(0.10, "m", "assumed: a link pitch", gt=0.0, le=0.5)
     """Width of a gap."""
-    depth: float = number(0.35, "m", "assumed: half the robot; it does not come out", gt=0.0, le=1)
+    depth: float = number(
+        0.35, "m", "assumed: half the robot; it does not come out", ge=0.001, le=1
+    )
     """Depth of a gap."""
     steps: int = number(3, "1", "assumed: enough to be on two edges at once", ge=1, le=20)
     """Steps of stairs."""

@@ -31,6 +31,8 @@ STRAIGHT = math.radians(10.0)
 JAM_GAIN = 0.02
 """The head of a jammed robot gets on by less than this in a gait cycle [m]: a seventh of what a
 free one walks in it, and the gain that the tables call stuck."""
+_FRONT = 0.4
+"""Share of the robot behind its head about which edges are told if there are too many."""
 _RAYS = np.radians([-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0])
 """Directions in which the way ahead is looked at, from the head's [rad]."""
 ON_ROUTE: tuple[Kind, ...] = ("side", "facing", "map")
@@ -121,7 +123,8 @@ class Truths:
 def edges_near(edges: Floats, x: float, length: float) -> Floats:
     """Distance of a head at x past the edges that its body is on, or will be next [m], (EDGES,).
 
-    An edge keeps its place in the array for as long as it is told.
+    An edge keeps its place in the array for as long as it is told. Of too many those are told that
+    are nearest to the front half of the body, where the line is steep.
 
     Args:
         edges: Where the ground rises along x [m], in their order along the way, shape (n,).
@@ -129,7 +132,8 @@ def edges_near(edges: Floats, x: float, length: float) -> Floats:
         length: Of the robot; farther behind, an edge is left out [m].
     """
     past = x - edges
-    near = np.flatnonzero((past < 1.5 * length) & (past > -length))[:EDGES]
+    near = np.flatnonzero((past < 1.5 * length) & (past > -length))
+    near = near[np.argsort(np.abs(past[near] - _FRONT * length), kind="stable")[:EDGES]]
     told = np.full(EDGES, math.nan)
     told[near % EDGES] = past[near]
     return told

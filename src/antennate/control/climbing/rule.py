@@ -137,7 +137,7 @@ class ClimbRule:
             return Maneuver.FORWARD
         if self._felt[row] > self._feel.touch_time:
             self._passed[row] = np.nan
-            over = self.height[row] < self._p.lowest  # what it thought to walk over holds it
+            over = abs(self.height[row]) < self._p.lowest  # what it thought to walk over holds it
             self._close[row] = over and self._since[row] < self._p.over_time
             self._to(row, Stage.PROBE_UP)
         elif self._misses_ground(row) and not above.any():

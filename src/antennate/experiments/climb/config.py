@@ -29,6 +29,7 @@ from antennate.params.base import (
 )
 from antennate.params.control import ControlParams
 from antennate.params.scene import GroundParams, PhysicsParams, VariationParams
+from antennate.robots.servos import ServoName
 from antennate.robots.spec import RobotSpec
 
 ROBOT = "scuttle3d"
@@ -77,7 +78,6 @@ _OF_OTHERS = tuple(
     )
 )
 """Parameters that none of these controllers reads."""
-_DIVISOR = "robot.servos.xc430_w240.gain_divisor"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class ClimbConfig(Params):
         1, "1", "assumed: shows how it works in minutes; 25 tell something", ge=1, le=100_000
     )
     """Trials of each condition, ground and divisor."""
-    heights: tuple[Annotated[float, Field(gt=0, le=0.5)], ...] = number(
+    heights: tuple[Annotated[float, Field(ge=0.001, le=0.5)], ...] = number(
         (0.05, 0.08, 0.10, 0.12, 0.15),
         "m",
         "assumed: 8 to 15 cm are to be climbed",
@@ -148,7 +148,7 @@ class ClimbConfig(Params):
         min_length=1,
         max_length=10,
     )
-    """Gain divisors of the XC430-W240 of the body."""
+    """Gain divisors of the servos of the body."""
     sensing: int = number(
         1, "1", "assumed: shows how it works; 25 tell something", ge=0, le=100_000
     )
@@ -157,7 +157,7 @@ class ClimbConfig(Params):
     """Distance of the first edge from the head at the start, nearest and farthest; not of what is
     felt, nor in tunnels."""
     time_limit: float = number(
-        60.0, "s", "assumed: three times what a climb takes by the plan", gt=0, le=3600
+        60.0, "s", "assumed: twice what a climb takes by the plan", gt=0, le=3600
     )
     """Time after which a trial on one step has failed; on stairs and in tunnels twice it."""
     seed: int = number(2711, "1", "assumed: any but 0, by which the controllers were tuned", ge=0)
@@ -208,7 +208,10 @@ class ClimbConfig(Params):
         }
         if "locked" in self.conditions:
             reasons.pop("robot.pitch.stiffness", None)
-        return reasons | {_DIVISOR: "divisors says it"}
+        return reasons | {
+            f"robot.servos.{name}.gain_divisor": "divisors says it"
+            for name in _body_servos(self.robot)
+        }
 
     @model_validator(mode="after")
     def _agree(self) -> ClimbConfig:
@@ -268,9 +271,10 @@ def cells(config: ClimbConfig) -> Mapping[str, Cell]:
 
 
 def seed_of(config: ClimbConfig, cell: Cell) -> int:
-    """Seed of the trials of a cell: the same for all who meet this ground, and for no other one.
+    """Seed of the trials of a cell: the same for all who meet this ground.
 
-    So trials of several heights are independent of one another, and can be pooled.
+    Steps of heights that differ by more than 0.1 mm have other ones, so that their trials can be
+    pooled. A step that is felt has the same draws as one of that height that is climbed.
     """
     if cell.part == "ground":
         return config.seed + Terrain.of(cell.ground).seed
@@ -286,13 +290,19 @@ def limit_of(config: ClimbConfig, cell: Cell) -> float:
     return config.time_limit * Terrain.of(cell.ground).patience
 
 
+def _body_servos(robot: RobotSpec) -> set[ServoName]:
+    """The servos that turn the joints of the body."""
+    return {robot.yaw.servo, robot.pitch.servo}
+
+
 def config_of(config: ClimbConfig, cell: Cell) -> TunnelConfig:
     """What is simulated in a cell."""
     robot = config.robot
-    servo = robot.servos.xc430_w240.model_copy(update={"gain_divisor": cell.divisor})
-    changes: dict[str, Any] = {
-        "servos": robot.servos.model_copy(update={"xc430_w240": servo}),
+    servos = {
+        name: robot.servos.of(name).model_copy(update={"gain_divisor": cell.divisor})
+        for name in _body_servos(robot)
     }
+    changes: dict[str, Any] = {"servos": robot.servos.model_copy(update=servos)}
     if cell.condition == "locked":
         changes["pitch"] = robot.pitch.model_copy(update={"kind": "locked"})
     values: dict[str, Any] = {"scene": cell.scene, "seed": seed_of(config, cell)}
