@@ -24,6 +24,8 @@ _WORDS = (
     "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0"
 )
 _STARTING = 120.0
+_ANSWERING = 300.0
+"""Longest that a page may take to answer [s]: it is drawn without a graphics card."""
 
 
 class Tab:
@@ -47,7 +49,7 @@ class Tab:
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         """Call a method of the DevTools; its result. A page that hangs still sends events."""
         number = self._send(method, params)
-        end = time.monotonic() + _STARTING
+        end = time.monotonic() + _ANSWERING
         while True:
             answer = json.loads(self._connection.recv(max(0.0, end - time.monotonic())))
             if answer.get("id") == number:

@@ -137,10 +137,9 @@ def lead(rows: Sequence[ClimbRow]) -> str:
         )
         words.append(f"{np.mean((low < rest) & (rest < high)):.0%} ({divisor:g})")
     return (
-        "Less the median error of its link and its height by the probe (to 4.5, 6.5, 8 cm, and "
-        "more), in the trials of even number, the plan of the others is within "
-        f"{100 * low:+g} to {100 * high:+g} cm in "
-        f"{' and '.join(words)}."
+        "The median error of each link and height by the probe (to 4.5, 6.5, 8 cm, and more) in "
+        "the trials of even number is taken off in those of odd number. Then "
+        f"{' and '.join(words)} of these are within {100 * low:+g} to {100 * high:+g} cm."
     )
 
 

@@ -79,7 +79,7 @@ class FeelParams(Params):
     level_height: float = number(
         0.024,
         "m",
-        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        "fitted: probes of steps, seed 5 (docs/science/climb.md)",
         ge=-0.5,
         le=0.5,
     )
@@ -87,7 +87,7 @@ class FeelParams(Params):
     height_slope: float = number(
         0.061,
         "m/rad",
-        "fitted: probes of steps of 2 to 6 cm, seed 5 (docs/science/climb.md)",
+        "fitted: probes of steps, seed 5 (docs/science/climb.md)",
         ge=0,
         le=1,
     )
