@@ -28,6 +28,7 @@ from antennate.figures import render
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies.formats import from_csv
 from antennate.studies.measures import Table
+from antennate.studies.statistics import mean95
 
 HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
@@ -151,10 +152,17 @@ def plane() -> Table:
     columns = {name: summary(own, TIME_LIMIT) for name, own in robots.items()}
     pair = paired(robots, TIME_LIMIT)["scuttle3d-scuttle"]
     low, high = pair["time_difference_95"]
+    better = [
+        (a.outcome == "success") - (b.outcome == "success")
+        for a, b in zip(*robots.values(), strict=True)
+    ]
+    mean, ends = mean95(100.0 * np.array(better))
+    assert ends is not None
     note = (
         f"`closed` in {half} tunnels, seed {rows[0].seed}. Only scuttle3d crossed "
         f"{pair['only_first']}, only scuttle {pair['only_second']}; McNemar p "
-        f"{pair['mcnemar_p']:.3g}. Time, a failure as the limit: {pair['time_difference_s']:+.1f} "
+        f"{pair['mcnemar_p']:.3g}; {mean:+.1f} points ({ends[0]:+.1f} to {ends[1]:+.1f}, Student's "
+        f"of the pairs). Time, a failure as the limit: {pair['time_difference_s']:+.1f} "
         f"s ({low:+.1f} to {high:+.1f})."
     )
     return Table.of(
