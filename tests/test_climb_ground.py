@@ -183,7 +183,10 @@ def test_a_robot_that_feels_nothing_crosses_what_is_small_and_falls_into_what_is
     [
         (["--grounds", "gap:0.6"], "--grounds: gap: width: expected a number of at most 0.5"),
         (["--grounds", "ramp:80"], "--grounds: ramp: slope: expected a number of at most 45"),
-        (["--grounds", "stairs:0"], "--grounds: stairs: height: expected a number of at least 0.001"),
+        (
+            ["--grounds", "stairs:0"],
+            "--grounds: stairs: height: expected a number of at least 0.001",
+        ),
         (["--grounds", "gap:nan"], "--grounds: gap: width: expected"),
         (["--grounds", "gap"], "expected flat or one of gap:WIDTH, step_down:HEIGHT"),
         (["--grounds", "pond:1"], "found 'pond:1'"),
