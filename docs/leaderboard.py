@@ -1,13 +1,15 @@
 """Write the board of docs/leaderboard.md from docs/leaderboard.csv; with --check only compare it.
 
-The table holds the rows of one run or more of `antennate compete`, as their trials.csv has them.
-What stands outside of the two marks is written by hand. Without --check it draws the figures, too.
+The table holds the rows of one run or more of `antennate compete`: `python docs/leaderboard.py
+runs/*/trials.csv` joins theirs first. What stands outside of the two marks is written by hand.
+Without --check it draws the figures, too.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from antennate.experiments.compete.config import CompeteConfig
 from antennate.experiments.compete.episodes import Episode, all_drawn
 from antennate.experiments.compete.page import markdown, sentence
 from antennate.experiments.compete.standings import standings
+from antennate.studies.formats import to_csv
 
 HERE = Path(__file__).parent
 ROWS = Path(__file__).with_suffix(".csv")
@@ -62,8 +65,20 @@ def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
+def joined(paths: Sequence[str]) -> str:
+    """The table of several runs, controller by controller and scene by scene."""
+    rows = [row for path in paths for row in read_rows(Path(path))]
+    names, scenes = (
+        list(dict.fromkeys(getattr(r, n) for r in rows)) for n in ("controller", "scene")
+    )
+    rows.sort(key=lambda r: (names.index(r.controller), scenes.index(r.scene), r.seed, r.trial))
+    return to_csv(asdict(row) for row in rows)
+
+
 def main() -> None:
     """Write the page and the figures, or compare the page."""
+    if paths := [word for word in sys.argv[1:] if not word.startswith("-")]:
+        ROWS.write_text(joined(paths), encoding="utf-8")
     rows = read_rows(ROWS)
     result = result_of(rows)
     page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")

@@ -52,6 +52,17 @@ def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -
     assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
 
 
+def test_tables_of_several_runs_are_joined(page: Path, tmp_path: Path) -> None:
+    file = page.with_suffix(".csv")
+    (tmp_path / "a.csv").write_text(file.read_text())
+    (tmp_path / "b.csv").write_text(file.read_text().replace(",5,0,", ",9,0,"))
+    done = run(page.parent, str(tmp_path / "b.csv"), str(tmp_path / "a.csv"))
+    assert done.returncode == 0, done.stderr
+    assert "hidden seeds 5, 9" in page.read_text()
+    assert "| `closed` | 1 (1 to 2) | 2 of 2 |" in page.read_text()
+    assert file.read_text().count("closed") == 2
+
+
 def test_a_seed_that_was_not_drawn_is_not_told_as_hidden(page: Path) -> None:
     file = page.with_suffix(".csv")
     file.write_text(file.read_text().replace("True", "False", 1))
