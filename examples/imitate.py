@@ -1,20 +1,19 @@
-"""Teach a network to escape by touch, by imitation of `closed`; write it as ONNX.
+"""Teach a network to escape by touch, by imitation of `geometric`; write it as ONNX.
 
-    python examples/imitate.py --out my_policy                   # some 10 minutes on one core
-    antennate tunnel --scene uturn --controllers timed closed my_policy/policy.onnx --seed 5
+    python examples/imitate.py --out my_policy                   # some 15 minutes on one core
+    antennate tunnel --scene uturn --controllers timed geometric my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 
-The teacher is the search of `closed`, in the time scale of a faster gait. The student learns on its
-own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in turns
-with the teacher; the teacher says at each decision how to go on after what the student did; the
-student learns all that it was told.
+The teacher is the search of `geometric`, its ways and angles by a faster gait. The student learns
+on its own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in
+turns with the teacher; the teacher says at each decision how to go on after what the student did;
+the student learns all that it was told.
 """
 
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import time
 from pathlib import Path
@@ -27,15 +26,17 @@ from torch import nn
 import antennate.envs  # registers the environments
 from antennate.control.conditioning import RepetitionDetector
 from antennate.control.escape import Search
+from antennate.control.geometric import TwoGaits, sizes_of
 from antennate.control.policy.contract import contract_of
 from antennate.control.policy.writer import write_policy
-from antennate.params.control import ControlParams, SearchParams
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
 
 SCENES = {scene: name for name, scene in antennate.envs.ids().items()}
 FREQUENCY = 1.0
 """Gait cycles a second [Hz]."""
-INTERFACE = {"action": "gait", "ticks": 20, "history": 60, "memory_time": 30.0}
-"""A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last 12 s."""
+INTERFACE = {"action": "gait", "ticks": 20, "history": 10, "memory_time": 30.0}
+"""A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last two."""
 DECISION, WINDOW, PATIENCE = 0.2, 0.8, 3
 """Time of a decision [s]; gait cycles in which readings repeat; decisions of another will."""
 HISTORY, CHANNELS = INTERFACE["history"], 7
@@ -48,32 +49,34 @@ CHOICES = np.array(
 """Amplitude, offset, frequency and direction of what it chooses from, shape (4, 4)."""
 ROWS, SEGMENT = 12, 25
 """Robots of each scene; decisions for which one of the two walks."""
+SLIP, SHORTEST, LONGEST = 0.01, 5, 20
+"""Chance of a decision to begin a slip: so many decisions of something else than was chosen, from
+which the student learns to go on (Laskey et al. 2017, arXiv:1703.09327)."""
 ROUND = 50
 """Decisions of each robot between two trainings."""
 TEACHING = 0.45
 """Share of the time in which the teacher walks less and less, down to never."""
-UNITS, BATCH, RATE, EPOCHS = 64, 256, 1e-3, 2
-
-
-def faster(search: SearchParams, factor: float) -> SearchParams:
-    """A search whose times fit a gait that many times as fast."""
-    times = {n: getattr(search, n) / factor for n in type(search).model_fields if n != "growth"}
-    return search.model_copy(update=times)
+UNITS, GROUP, RATE, EPOCHS = 64, 8, 2e-3, 2
+"""Units of the memory; robots of a batch; step size; trainings over all that was told a round."""
 
 
 class Teacher(Search):
-    """The search of `closed`, told what the student did.
+    """The search of `geometric` at 1 Hz, told what the student did.
 
     Its clock stands still while the student does something else than it was told. After PATIENCE
     decisions of that it goes on as if it had wanted that itself.
 
     Args:
         control: All numbers of the control.
+        robot: The robot that walks and turns.
         batch: Number of robots B.
     """
 
-    def __init__(self, control: ControlParams, batch: int) -> None:
-        super().__init__(faster(control.search, FREQUENCY / control.gait.frequency), batch)
+    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        gait = control.gait.model_copy(update={"frequency": FREQUENCY})
+        own = control.geometric.model_copy(update={"forward": "gait"})
+        moves = TwoGaits(control.model_copy(update={"gait": gait, "geometric": own}), robot, 1)
+        super().__init__(sizes_of(control, moves.speed, moves.turning), batch)
         repetition = control.repetition.model_copy(update={"window_cycles": WINDOW})
         self._pressure = repetition.pressure
         self._detector = RepetitionDetector(repetition, batch, DECISION, FREQUENCY)
@@ -128,9 +131,12 @@ class Class:
         words = {"num_envs": ROWS, "interface": INTERFACE, "autoreset_mode": "SAME_STEP"}
         self.envs = gym.make_vec(SCENES[scene], **words)
         self.scene, self.blind = scene, readings == "none"
-        self.teacher = Teacher(self.envs.unwrapped.config.control, ROWS)
-        self.done = np.zeros(ROWS, np.int64)
+        config = self.envs.unwrapped.config
+        self.teacher = Teacher(config.control, config.robot, ROWS)
+        self.done, self.new = np.zeros(ROWS, np.int64), np.ones(ROWS, bool)
+        self.memory = torch.zeros(ROWS, UNITS)
         self.taught = np.ones(ROWS, bool)
+        self.slips, self.other = np.zeros((2, ROWS), np.int64)
         self.observation, _ = self.envs.reset(seed=seed)
         self.ends: list[tuple[str, float, bool]] = []
         self.alone = np.ones(ROWS, bool)
@@ -140,14 +146,14 @@ class Class:
         return untouched(self.observation) if self.blind else self.observation
 
     def walk(self, network: Network, share: float, rng: np.random.Generator):
-        """Walk a round; observations (n, inputs) and advice (n,).
+        """Walk a round; observations (ROUND, B, n), advice and first decisions (ROUND, B).
 
         Args:
             network: The student.
             share: Chance that the teacher walks a segment.
             rng: Says in which.
         """
-        given, told = [], []
+        given, told, first = [], [], []
         for i in range(ROUND):
             if i % SEGMENT == 0:
                 self.taught = rng.random(ROWS) < share
@@ -155,16 +161,28 @@ class Class:
             advice, seen = self.teacher.advise(flex, self.done), self.seen()
             given.append(seen.copy())
             told.append(advice)
-            self.done = np.where(self.taught, advice, network.choose(seen))
+            first.append(self.new.copy())
+            chosen, self.memory = network.choose(seen, self.memory, self.new)
+            self.done = np.where(self.taught, advice, chosen)
+            self.slip(rng)
             self.alone &= ~self.taught
             self.step()
-        return np.concatenate(given), np.concatenate(told)
+        return np.stack(given), np.stack(told), np.stack(first)
+
+    def slip(self, rng: np.random.Generator) -> None:
+        """Let some robots do something else than was chosen, for a while."""
+        begins = (self.slips == 0) & (rng.random(ROWS) < SLIP)
+        self.slips = np.where(begins, rng.integers(SHORTEST, LONGEST + 1, ROWS), self.slips)
+        self.other = np.where(begins, rng.integers(len(CHOICES), size=ROWS), self.other)
+        self.done = np.where(self.slips > 0, self.other, self.done)
+        self.slips = np.maximum(self.slips - 1, 0)
 
     def step(self) -> None:
         """Carry out what was chosen."""
         actions = CHOICES[self.done].astype(np.float32)
         self.observation, _, ended, cut, infos = self.envs.step(actions)
-        if (over := ended | cut).any():
+        self.new = over = ended | cut
+        if over.any():
             final = infos["final_info"]
             for row in np.flatnonzero(over):
                 end = final["outcome"][row], float(final["t"][row]), bool(self.alone[row])
@@ -174,7 +192,7 @@ class Class:
 
 
 def untouched(observation: np.ndarray) -> np.ndarray:
-    """Observations, shape (n, inputs), as of two antennae that touch nothing."""
+    """Observations, shape (B, n), as of two antennae that touch nothing."""
     blind, past = observation.copy(), CHANNELS * HISTORY
     blind[:, : 4 * HISTORY] = blind[:, past : past + 4] = 0.0
     return blind
@@ -184,80 +202,97 @@ def untouched(observation: np.ndarray) -> np.ndarray:
 def blindfold(network: Network) -> None:
     """Let a network see nothing of its antennae, whatever they read."""
     past = CHANNELS * HISTORY
-    network.layers[0].weight[:, : 4 * HISTORY] = 0.0
-    network.layers[0].weight[:, past : past + 4] = 0.0
+    network.memory.weight_ih[:, : 4 * HISTORY] = 0.0
+    network.memory.weight_ih[:, past : past + 4] = 0.0
 
 
 def mirrored(observation: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Observations and advice with left and right exchanged; the gait phase is half a turn off."""
-    past, means, phase = np.split(observation, [CHANNELS * HISTORY, CHANNELS * (HISTORY + 1)], 1)
+    past, means, phase = np.split(observation, [CHANNELS * HISTORY, CHANNELS * (HISTORY + 1)], -1)
     order, sign = [1, 0, 3, 2, 4, 5, 6], np.array([1, 1, 1, 1, 1, -1, 1], np.float32)
-    past = past.reshape(-1, CHANNELS, HISTORY)[:, order] * sign[:, None]
-    parts = [past.reshape(len(past), -1), means[:, order] * sign, -phase]
-    return np.concatenate(parts, 1), np.array([FORWARD, TURN_R, TURN_L, REVERSE])[told]
+    shape = (*past.shape[:-1], CHANNELS, HISTORY)
+    turned = (past.reshape(shape)[..., order, :] * sign[:, None]).reshape(past.shape)
+    other = np.concatenate([turned, means[..., order] * sign, -phase], -1)
+    return other, np.array([FORWARD, TURN_R, TURN_L, REVERSE])[told]
 
 
 class Network(nn.Module):
-    """Scores of the four choices; it normalises an observation by itself."""
+    """Scores of the four choices; it normalises an observation by itself, and has a memory."""
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
-        sizes = [inputs, UNITS, UNITS, len(CHOICES)]
-        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in itertools.pairwise(sizes))
+        self.memory, self.scores = nn.GRUCell(inputs, UNITS), nn.Linear(UNITS, len(CHOICES))
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("scale", torch.ones(inputs))
 
-    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+    def forward(self, observation: torch.Tensor, memory: torch.Tensor, first: torch.Tensor):
+        """Scores (B, 4) and memory (B, UNITS) after it; rows that begin remember nothing."""
         x = ((observation - self.mean) / self.scale).clamp(-5.0, 5.0)
-        for layer in self.layers[:-1]:
-            x = torch.tanh(layer(x))
-        return self.layers[-1](x)
+        memory = self.memory(x, torch.where(first[:, None], 0.0, memory))
+        return self.scores(memory), memory
 
     @torch.no_grad()
-    def choose(self, observation: np.ndarray) -> np.ndarray:
-        """The choice for each observation, shape (B,)."""
-        return self(torch.from_numpy(observation)).argmax(1).numpy()
+    def choose(self, observation: np.ndarray, memory: torch.Tensor, first: np.ndarray):
+        """The choice for each observation, shape (B,), and the memory after it."""
+        scores, memory = self(torch.from_numpy(observation), memory, torch.from_numpy(first))
+        return scores.argmax(1).numpy(), memory
 
     def save(self, path: Path, config, about: str) -> Path:
         """Write it as a policy."""
         contract = contract_of(config.interface, config.control, config.robot, about=about)
-        layers = [(x.weight.detach().numpy(), x.bias.detach().numpy()) for x in self.layers]
-        mean, scale = self.mean.numpy(), self.scale.numpy()
-        return write_policy(path, contract, layers, mean, scale, 5.0, CHOICES)
+        unit, last = self.memory, self.scores
+        own = (unit.weight_ih, unit.weight_hh, unit.bias_ih, unit.bias_hh)
+        memory = [part.detach().numpy() for part in own]
+        layers = [(last.weight.detach().numpy(), last.bias.detach().numpy())]
+        normal = self.mean.numpy(), self.scale.numpy(), 5.0
+        return write_policy(path, contract, layers, *normal, CHOICES, memory)
 
 
 class Lessons:
-    """All that the student was told, and its training."""
+    """All that the student was told, robot by robot in the order of time, and its training."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
         self._optimiser = torch.optim.AdamW(network.parameters(), RATE, weight_decay=1e-3)
-        self._given: list[torch.Tensor] = []
-        self._told: list[torch.Tensor] = []
+        self._rounds: list[list[torch.Tensor]] = []
 
-    def add(self, given: np.ndarray, told: np.ndarray) -> None:
-        """Take observations and advice, as they are and mirrored."""
-        for x, y in ((given, told), mirrored(given, told)):
-            self._given.append(torch.from_numpy(x))
-            self._told.append(torch.from_numpy(y))
+    def add(self, walks: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+        """Take a round of observations, advice and first decisions, as they are and mirrored."""
+        both = [(*pair, first) for x, y, first in walks for pair in ((x, y), mirrored(x, y))]
+        joined = (np.concatenate(parts, axis=1) for parts in zip(*both, strict=True))
+        self._rounds.append([torch.from_numpy(part) for part in joined])
 
     def train(self, epochs: int = EPOCHS, rate: float = RATE) -> float:
         """Some epochs over all; the share of advice that the student repeats, of the last one."""
-        given, told = torch.cat(self._given), torch.cat(self._told)
-        network, right = self._network, 0
-        network.mean.copy_(given.mean(0))
-        network.scale.copy_(given.std(0).clamp(min=0.02))
+        network, right, count = self._network, 0, 0
+        seen = torch.cat([given.flatten(0, 1) for given, _, _ in self._rounds])
+        network.mean.copy_(seen.mean(0))
+        network.scale.copy_(seen.std(0).clamp(min=0.02))
         self._optimiser.param_groups[0]["lr"] = rate
         for _ in range(epochs):
-            right = 0
-            for some in torch.randperm(len(told)).split(BATCH):
-                scores = network(given[some])
-                loss = nn.functional.cross_entropy(scores, told[some])
-                self._optimiser.zero_grad()
-                loss.backward()
-                self._optimiser.step()
-                right += int((scores.argmax(1) == told[some]).sum())
-        return right / len(told)
+            right = count = 0
+            for rows in torch.randperm(self._rounds[0][1].shape[1]).split(GROUP):
+                memory = torch.zeros(len(rows), UNITS)
+                for given, told, first in self._rounds:
+                    memory, good = self._learn(
+                        given[:, rows], told[:, rows], first[:, rows], memory
+                    )
+                    right, count = right + good, count + told[:, rows].numel()
+        return right / count
+
+    def _learn(self, given, told, first, memory):
+        """Learn one round of some robots; the memory after it, and how often it was right."""
+        scores = []
+        for i in range(len(told)):
+            score, memory = self._network(given[i], memory, first[i])
+            scores.append(score)
+        scores = torch.stack(scores)
+        loss = nn.functional.cross_entropy(scores.flatten(0, 1), told.flatten())
+        self._optimiser.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(self._network.parameters(), 1.0)
+        self._optimiser.step()
+        return memory.detach(), int((scores.argmax(2) == told).sum())
 
 
 def teach(options: argparse.Namespace) -> Path:
@@ -273,9 +308,8 @@ def teach(options: argparse.Namespace) -> Path:
     lessons, start, decisions = Lessons(network), time.monotonic(), 0
     while decisions < options.decisions:
         share = max(0.0, 1.0 - decisions / (TEACHING * options.decisions))
-        for group in classes:
-            lessons.add(*group.walk(network, share, rng))
-            decisions += ROUND * ROWS
+        lessons.add([group.walk(network, share, rng) for group in classes])
+        decisions += ROUND * ROWS * len(classes)
         right = lessons.train()
         minutes = (time.monotonic() - start) / 60.0
         own = [end for group in classes for end in group.ends[-25:] if end[2]]
@@ -301,7 +335,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument("--scene", nargs="+", default=["uturn", "room"], choices=[*SCENES])
     parser.add_argument("--readings", default="own", choices=["own", "none"])
-    parser.add_argument("--decisions", type=int, default=20_000)
+    parser.add_argument("--decisions", type=int, default=30_000)
     parser.add_argument("--seed", type=int, default=1)
     print(teach(parser.parse_args()))
 

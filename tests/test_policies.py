@@ -70,6 +70,26 @@ def test_a_file_answers_as_its_layers_do(tmp_path: Path, mode: str) -> None:
     assert np.abs(np.array(answers) - (hidden @ v.T + c)).max() < 1e-4
 
 
+def test_a_file_with_a_memory_answers_as_its_equations_do(tmp_path: Path) -> None:
+    """Those of the gated recurrent unit, over 30 decisions: h decides what is told."""
+    rng, made, h = np.random.default_rng(3), contract(), 5
+    size = len(made.observations)
+    shapes = (3 * h, size), (3 * h, h), 3 * h, 3 * h
+    w, u, b, c = memory = [rng.normal(0.0, 0.3, shape) for shape in shapes]
+    layers = [(rng.normal(size=(4, h)), rng.normal(size=4))]
+    parts = {"mean": np.zeros(size), "scale": np.ones(size), "clip": 10.0, "memory": memory}
+    policy = Policy(write_policy(tmp_path / "p.onnx", made, layers, **parts))
+    states, now = policy.start(), np.zeros(h)
+    for x in rng.normal(0.0, 0.3, (30, size)):
+        given, kept = np.split(w @ x + b, 3), np.split(u @ now + c, 3)
+        reset, update = (1.0 / (1.0 + np.exp(-given[i] - kept[i])) for i in range(2))
+        now = (1.0 - update) * np.tanh(given[2] + reset * kept[2]) + update * now
+        answer, states = policy.answer(x[None].astype(np.float32), states)
+        assert np.abs(answer[0] - (layers[0][0] @ now + layers[0][1])).max() < 1e-5
+    alone = policy.answer(x[None].astype(np.float32), policy.start())[0]
+    assert np.abs(alone - answer).max() > 0.01  # what was before matters
+
+
 def test_the_contract_is_one_json_value_at_full_precision(tmp_path: Path) -> None:
     robot = RobotSpec(mass=2.0 + 1e-15, link_pitch=0.1 + 0.2 / 7)
     made = contract_of(PolicyInterface(memory_time=1 / 3), ControlParams(), robot, about="x")
@@ -162,6 +182,20 @@ def test_a_recurrent_state_is_kept_and_forgotten_at_a_reset(tmp_path: Path) -> N
             said.append(control.maneuver.tolist())
     ahead, left = int(Maneuver.FORWARD), int(Maneuver.TURN_L)
     assert said == [[ahead] * 2] * 3 + [[left] * 2] + [[left, ahead]] * 2
+
+
+def test_nothing_begins_before_the_first_reading_that_can_be_used(tmp_path: Path) -> None:
+    """A dry run without readings is no past of a policy: its decisions are counted from then on."""
+    control, ticks = make_controller(str(counting(tmp_path / "p.onnx"))), PolicyInterface().ticks
+    control.reset(np.array([0]), 0.0)
+    said, blind = [], 5 * ticks + 3
+    for tick in range(blind + 7 * ticks):
+        control.step(frame(0.01 * tick, np.nan if tick < blind else 1800.0))
+        said.append(int(control.maneuver[0]))
+    assert set(said[:blind]) == {Maneuver.HOLD}
+    walked = [maneuver for maneuver in said if maneuver != Maneuver.HOLD]
+    assert walked[: 3 * ticks] == [Maneuver.FORWARD] * 3 * ticks
+    assert set(walked[3 * ticks :]) == {Maneuver.TURN_L}
 
 
 def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:

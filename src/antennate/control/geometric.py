@@ -114,6 +114,23 @@ class TwoGaits:
         return turned[:, :, None] + np.array([0.0, math.pi])
 
 
+def sizes_of(control: ControlParams, speed: float, turning: float) -> Sizes:
+    """The sizes of `geometric` as times, of a robot that walks [m/s] and turns [rad/s] so fast."""
+    own, search = control.geometric, control.search
+    return Sizes(
+        patience=search.patience,
+        reverse_time=own.reverse_distance / speed,
+        reverse_most=own.reverse_most / speed,
+        turn_time=own.turn_angle / turning,
+        growth=search.growth,
+        free_time=search.free_time,
+        proof_time=search.proof_time,
+        lost_turn=own.lost_angle / turning,
+        lost_time=search.lost_time,
+        return_time=own.return_angle / turning,
+    )
+
+
 class GeometricRule(SearchRule):
     """The search of `closed`, its sizes in metres and degrees.
 
@@ -124,20 +141,8 @@ class GeometricRule(SearchRule):
     """
 
     def __init__(self, control: ControlParams, gait: TwoGaits, batch: int) -> None:
-        own, search, self._moves = control.geometric, control.search, gait
-        sizes = Sizes(
-            patience=search.patience,
-            reverse_time=own.reverse_distance / gait.speed,
-            reverse_most=own.reverse_most / gait.speed,
-            turn_time=own.turn_angle / gait.turning,
-            growth=search.growth,
-            free_time=search.free_time,
-            proof_time=search.proof_time,
-            lost_turn=own.lost_angle / gait.turning,
-            lost_time=search.lost_time,
-            return_time=own.return_angle / gait.turning,
-        )
-        super().__init__(control, batch, sizes)
+        self._moves = gait
+        super().__init__(control, batch, sizes_of(control, gait.speed, gait.turning))
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
         """As of a `Rule`."""

@@ -143,6 +143,7 @@ class PolicyController:
         self._answers: Floats = np.zeros((batch, len(actions(interface, robot))))
         self._states = [policy.start() for _ in range(batch)]
         self._count: Ints = np.zeros(batch, np.int64)
+        self._begun: Bools = np.zeros(batch, dtype=bool)
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
@@ -158,19 +159,23 @@ class PolicyController:
         self._observer.reset(rows)
         self._actor.reset(rows, phase)
         self._contacts.reset(rows)
-        self._count[rows] = 0
+        self._count[rows], self._begun[rows] = 0, False
         for row in np.arange(len(self._count))[rows].tolist():
             self._states[row] = self._policy.start()
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One control period: the command for this frame, both with B rows."""
+        """One control period: the command for this frame, both with B rows.
+
+        A row holds, and nothing of its policy begins, until its first reading that can be used.
+        """
         self._observer.feel(frame)
         self.level, _ = level_and_fraction(self._curves, self._observer.mean)
         self.contact = self._contacts.step(self.level)
-        due = self._count % self._ticks == 0
+        self._begun |= ~self._observer.unknown
+        due = self._begun & (self._count % self._ticks == 0)
         if due.any():
             self._decide(due)
-        self._count += 1
+        self._count += self._begun
         command = self._actor.step(self._observer.unknown)
         self._observer.told(command)
         self.maneuver = self._actor.maneuver.astype(np.int64)

@@ -1,4 +1,4 @@
-"""Policy files: a network of dense layers as ONNX, and the contract of any ONNX model."""
+"""Policy files: a network of dense layers, with or without a memory, and the contract of any."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from antennate.control.policy.contract import KEY, Contract
+from antennate.control.policy.contract import KEY, Contract, State
 from antennate.control.policy.controller import ACTION, OBSERVATION
 from antennate.errors import MissingPackageError
 from antennate.messages import extra
@@ -26,8 +26,13 @@ def write_policy(
     scale: Weights,
     clip: float,
     choices: Weights | None = None,
+    memory: Sequence[Weights] | None = None,
 ) -> Path:
     """Write a network of dense layers with tanh between them, its normaliser in the graph.
+
+    A memory in front of the layers is a gated recurrent unit (Cho et al. 2014, arXiv:1406.1078),
+    with its parameters as PyTorch has them: h' = (1 - z) tanh(W_n x + b_n + r (U_n h + c_n)) + z h
+    with the gates r, z = sigmoid(W x + b + U h + c).
 
     Args:
         path: The file.
@@ -38,6 +43,8 @@ def write_policy(
         clip: Largest normalised number either way.
         choices: Answers to choose from, shape (outputs, k): the one with the largest score is
             given, the first of equal ones. Without them the scores are the answer.
+        memory: W, U, b and c, of shapes (3 h, n), (3 h, h), (3 h,) and (3 h,), each with the rows
+            of r, z and n in this order; the first layer is given h' then.
 
     Returns:
         The path.
@@ -51,8 +58,16 @@ def write_policy(
     nodes = [
         helper.make_node("Sub", [OBSERVATION, "mean"], ["centred"]),
         helper.make_node("Div", ["centred", "scale"], ["scaled"]),
-        helper.make_node("Clip", ["scaled", "low", "high"], ["x0"]),
+        helper.make_node("Clip", ["scaled", "low", "high"], ["x0" if memory is None else "seen"]),
     ]
+    inputs: dict[str, tuple[int, ...]] = {OBSERVATION: (1, len(mean))}
+    outputs: dict[str, tuple[int, ...]] = {ACTION: (1, len(layers[-1][1]))}
+    if memory is not None:
+        state = State(input="memory", output="memory_next", shape=(1, 1, memory[1].shape[1]))
+        contract = contract.model_copy(update={"states": (state,)})
+        inputs[state.input] = outputs[state.output] = state.shape
+        constants |= _memory(memory)
+        nodes += _remembering(helper, state)
     for i, (weight, bias) in enumerate(layers):
         constants |= {f"w{i}": weight, f"b{i}": bias}
         last = i == len(layers) - 1
@@ -60,24 +75,49 @@ def write_policy(
         nodes.append(helper.make_node("Gemm", [f"x{i}", f"w{i}", f"b{i}"], [out], transB=1))
         if not last:
             nodes.append(helper.make_node("Tanh", [out], [f"x{i + 1}"]))
-    answers = len(layers[-1][1])
     if choices is not None:
         constants["choices"] = choices
         nodes += [
             helper.make_node("ArgMax", ["scores"], ["best"], axis=1, keepdims=0),
             helper.make_node("Gather", ["choices", "best"], [ACTION], axis=0),
         ]
-        answers = choices.shape[1]
-    shapes = (OBSERVATION, len(mean)), (ACTION, answers)
-    given, answer = (helper.make_tensor_value_info(n, kind, [1, size]) for n, size in shapes)
+        outputs[ACTION] = (1, choices.shape[1])
+    given, answers = (
+        [helper.make_tensor_value_info(name, kind, size) for name, size in ends.items()]
+        for ends in (inputs, outputs)
+    )
     tensors = [
         numpy_helper.from_array(np.asarray(value, np.float32), name)
         for name, value in constants.items()
     ]
-    graph = helper.make_graph(nodes, "policy", [given], [answer], tensors)
+    graph = helper.make_graph(nodes, "policy", given, answers, tensors)
     imports = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(graph, opset_imports=imports, ir_version=8)
     return _save(model, contract, Path(path))
+
+
+def _memory(memory: Sequence[Weights]) -> dict[str, Weights]:
+    """Its parameters in the order of ONNX, which has z before r, by the names of their inputs."""
+    weight, recurrent, bias, recurrent_bias = (_swapped(np.asarray(each)) for each in memory)
+    biases = np.concatenate([bias, recurrent_bias])[None]
+    return {"W": weight[None], "U": recurrent[None], "b and c": biases}
+
+
+def _swapped(rows: Weights) -> Weights:
+    reset, update, new = np.split(rows, 3)
+    return np.concatenate([update, reset, new])
+
+
+def _remembering(helper: Any, state: State) -> list[Any]:
+    """From "seen", shape (1, n), and the memory to "x0", shape (1, h), and the memory after it."""
+    hidden, given = state.shape[-1], ["steps", "W", "U", "b and c", "", state.input]
+    shape = helper.make_node("Constant", [], ["flat"], value_ints=[1, hidden])
+    one = helper.make_node("Constant", [], ["one more"], value_ints=[0])
+    steps = helper.make_node("Unsqueeze", ["seen", "one more"], ["steps"])
+    unit = helper.make_node(
+        "GRU", given, ["", state.output], hidden_size=hidden, linear_before_reset=1
+    )
+    return [shape, one, steps, unit, helper.make_node("Reshape", [state.output, "flat"], ["x0"])]
 
 
 def add_contract(path: Path | str, contract: Contract) -> Path:
