@@ -44,7 +44,8 @@ def write_policy(
         choices: Answers to choose from, shape (outputs, k): the one with the largest score is
             given, the first of equal ones. Without them the scores are the answer.
         memory: W, U, b and c, of shapes (3 h, n), (3 h, h), (3 h,) and (3 h,), each with the rows
-            of r, z and n in this order; the first layer is given h' then.
+            of r, z and n in this order; the first layer is given h' then, and the contract names
+            the state `memory`.
 
     Returns:
         The path.
@@ -104,6 +105,7 @@ def _memory(memory: Sequence[Weights]) -> dict[str, Weights]:
 
 
 def _swapped(rows: Weights) -> Weights:
+    """Rows of r, z and n in the order z, r and n."""
     reset, update, new = np.split(rows, 3)
     return np.concatenate([update, reset, new])
 
@@ -112,12 +114,12 @@ def _remembering(helper: Any, state: State) -> list[Any]:
     """From "seen", shape (1, n), and the memory to "x0", shape (1, h), and the memory after it."""
     hidden, given = state.shape[-1], ["steps", "W", "U", "b and c", "", state.input]
     shape = helper.make_node("Constant", [], ["flat"], value_ints=[1, hidden])
-    one = helper.make_node("Constant", [], ["one more"], value_ints=[0])
-    steps = helper.make_node("Unsqueeze", ["seen", "one more"], ["steps"])
+    axis = helper.make_node("Constant", [], ["axis"], value_ints=[0])
+    steps = helper.make_node("Unsqueeze", ["seen", "axis"], ["steps"])
     unit = helper.make_node(
         "GRU", given, ["", state.output], hidden_size=hidden, linear_before_reset=1
     )
-    return [shape, one, steps, unit, helper.make_node("Reshape", [state.output, "flat"], ["x0"])]
+    return [shape, axis, steps, unit, helper.make_node("Reshape", [state.output, "flat"], ["x0"])]
 
 
 def add_contract(path: Path | str, contract: Contract) -> Path:
