@@ -20,7 +20,8 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))
 """The browser, None if there is none."""
 _WORDS = (
     "--headless=new --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
-    "--enable-unsafe-swiftshader --disable-background-networking --no-first-run "
+    "--enable-unsafe-swiftshader --disable-gpu-rasterization --disable-accelerated-2d-canvas "
+    "--disable-background-networking --no-first-run "
     "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0"
 )
 _STARTING = 120.0

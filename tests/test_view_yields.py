@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from view_rig import ANTENNATE
+from view_rig import ANTENNATE, PATIENCE, Shown, shown
 
 from antennate.cli import pages
 from antennate.hardware.driving.report import MANY, Recent
@@ -62,6 +63,38 @@ def test_every_thread_of_a_view_beside_a_drive_gives_way(
     threads = [int(thread.name) for thread in Path(f"/proc/{child}/task").iterdir()]
     assert len(threads) > 1
     assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_IDLE}
+
+
+@pytest.mark.skipif(not LINUX, reason="a stopped process goes on, as it is done on Linux")
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_late_loop_gives_its_view_up_once_servos_have_torque(tmp_path: Path, armed: bool) -> None:
+    pytest.importorskip("viser")
+    with shown("twin", folder=tmp_path) as twin:
+        ports = json.loads(twin.answer())
+        words = ["drive", "--esp32", ports["esp32"], "--bus", ports["bus"], "--view"]
+        words += ["--view-port", "0", "--out", "run", "--no-touch-check"]
+        words += ["--arm", "--dry-run", "0"] if armed else ["--dry-run", "600"]
+        with shown(*words, folder=tmp_path) as driven:
+            told(driven, "maneuver=FORWARD" if armed else "missed_ticks=")
+            driven.process.send_signal(signal.SIGSTOP)
+            time.sleep(0.5)
+            driven.process.send_signal(signal.SIGCONT)
+            if armed:
+                driven.said("view: given up, as the loop missed ")
+            else:
+                time.sleep(2.0)
+            driven.process.send_signal(signal.SIGINT)
+            driven.process.wait(PATIENCE)
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["pace"]["missed_cycles"] > MANY
+    assert ("view: given up" in "".join(driven.lines)) is armed
+
+
+def told(driven: Shown, what: str) -> None:
+    """Return once it has said so."""
+    end = time.monotonic() + PATIENCE
+    while not any(what in line for line in driven.lines):
+        assert time.monotonic() < end, driven.lines
+        time.sleep(0.1)
 
 
 @contextmanager

@@ -219,7 +219,8 @@ def _carry_out(
     def keep(session: Session, t: float) -> None:
         nonlocal unlogged, page
         tick = Tick.of(session, t)
-        if page is not None and (missed := recent.step(t, tick.missed)) > MANY:
+        missed, out = recent.step(t, tick.missed), session.outputs
+        if page is not None and missed > MANY and out is not None and out.torque:
             page.give_up(f"the loop missed {missed} ticks within a second; the drive goes on")
             page = None
         try:

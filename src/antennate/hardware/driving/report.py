@@ -54,8 +54,8 @@ _FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
 
 
 MANY = 5
-"""Ticks missed within a second above which a live view is given up: half of what stops a robot, as
-servos wait 0.1 s (assumed)."""
+"""Ticks missed within a second above which a live view is given up once servos have torque: half of
+what stops a robot, as they wait 0.1 s (assumed)."""
 _SECOND = 1.0
 
 
