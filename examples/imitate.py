@@ -1,6 +1,6 @@
 """Teach a network to escape by touch, by imitation of `geometric`; write it as ONNX.
 
-    python examples/imitate.py --out my_policy                   # some 15 minutes on one core
+    python examples/imitate.py --out my_policy                   # some 35 minutes on one core
     antennate tunnel --scene uturn --controllers timed geometric my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
@@ -8,7 +8,7 @@ Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 The teacher is the search of `geometric`, its ways and angles by a faster gait. The student learns
 on its own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in
 turns with the teacher; the teacher says at each decision how to go on after what the student did;
-the student learns all that it was told.
+the student learns all that it was told, and what the teacher goes by.
 """
 
 from __future__ import annotations
@@ -56,8 +56,10 @@ ROUND = 50
 """Decisions of each robot between two trainings."""
 TEACHING = 0.45
 """Share of the time in which the teacher walks less and less, down to never."""
-UNITS, GROUP, RATE, EPOCHS = 64, 8, 2e-3, 2
+UNITS, GROUP, RATE, EPOCHS = 128, 8, 2e-3, 2
 """Units of the memory; robots of a batch; step size; trainings over all that was told a round."""
+MIRROR = np.array([-1, -1, 1, 1, 1, 1], np.float32)
+"""What the teacher goes by, once left and right are exchanged, shape (6,)."""
 
 
 class Teacher(Search):
@@ -102,6 +104,17 @@ class Teacher(Search):
         self._t = self._t + DECISION
         return self.maneuver.copy()
 
+    def state(self) -> np.ndarray:
+        """What it goes by, shape (B, 6): turn so far, side, tries, and three times, as shares."""
+        times, walks = self._params, self.maneuver == FORWARD
+        left = np.where(walks, 0.0, np.maximum(self._until - self._t, 0.0)) / times.return_time
+        walked = np.nan_to_num(self._t - self._begun) * walks / times.proof_time
+        free = np.clip((self._t - self._felt) / times.free_time, 0.0, 2.0) * walks
+        turned, side = self._turned / times.return_time, np.where(self._right, 1.0, -1.0)
+        tries = np.minimum(self.tries, 4) / 4
+        parts = turned, side, tries, left, np.clip(walked, 0.0, 1.5), free
+        return np.stack(parts, axis=1).astype(np.float32)
+
     def _adopt(self, rows: np.ndarray, done: np.ndarray) -> None:
         """Go on in some rows as if what was done had been wanted."""
         times, passed = self._params, PATIENCE * DECISION
@@ -144,27 +157,25 @@ class Class:
         return untouched(self.observation) if self.blind else self.observation
 
     def walk(self, network: Network, share: float, rng: np.random.Generator):
-        """Walk a round; observations (ROUND, B, n), advice and first decisions (ROUND, B).
+        """Walk a round: observations (ROUND, B, n), advice, first decisions, and why (ROUND, B, 6).
 
         Args:
             network: The student.
             share: Chance that the teacher walks a segment.
             rng: Says in which.
         """
-        given, told, first = [], [], []
+        lessons = []
         for i in range(ROUND):
             if i % SEGMENT == 0:
                 self.taught = rng.random(ROWS) < share
             flex = self.observation[:, [0, HISTORY]].astype(float)
             advice, seen = self.teacher.advise(flex, self.done), self.seen()
-            given.append(seen.copy())
-            told.append(advice)
-            first.append(self.new.copy())
+            lessons.append((seen.copy(), advice, self.new.copy(), self.teacher.state()))
             chosen, self.memory = network.choose(seen, self.memory, self.new)
             self.done = np.where(self.taught, advice, chosen)
             self.slip(rng)
             self.step()
-        return np.stack(given), np.stack(told), np.stack(first)
+        return [np.stack(parts) for parts in zip(*lessons, strict=True)]
 
     def slip(self, rng: np.random.Generator) -> None:
         """Let some robots do something else than was chosen, for a while."""
@@ -199,22 +210,26 @@ def blindfold(network: Network) -> None:
     network.memory.weight_ih[:, past : past + 4] = 0.0
 
 
-def mirrored(observation: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Observations and advice with left and right exchanged; the gait phase is half a turn off."""
+def mirrored(observation, told, first, why):
+    """Lessons with left and right exchanged; the gait phase is half a turn off."""
     past, means, phase = np.split(observation, [CHANNELS * HISTORY, CHANNELS * (HISTORY + 1)], -1)
     order, sign = [1, 0, 3, 2, 4, 5, 6], np.array([1, 1, 1, 1, 1, -1, 1], np.float32)
     shape = (*past.shape[:-1], CHANNELS, HISTORY)
     turned = (past.reshape(shape)[..., order, :] * sign[:, None]).reshape(past.shape)
     other = np.concatenate([turned, means[..., order] * sign, -phase], -1)
-    return other, np.array([FORWARD, TURN_R, TURN_L, REVERSE])[told]
+    return other, np.array([FORWARD, TURN_R, TURN_L, REVERSE])[told], first, why * MIRROR
 
 
 class Network(nn.Module):
-    """Scores of the four choices; it normalises an observation by itself, and has a memory."""
+    """Scores of the four choices; it normalises an observation by itself, and has a memory.
+
+    While it learns it also says what the teacher goes by, so that its memory holds that.
+    """
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
         self.memory, self.scores = nn.GRUCell(inputs, UNITS), nn.Linear(UNITS, len(CHOICES))
+        self.why = nn.Linear(UNITS, len(MIRROR))
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("scale", torch.ones(inputs))
 
@@ -249,16 +264,16 @@ class Lessons:
         self._optimiser = torch.optim.AdamW(network.parameters(), RATE, weight_decay=1e-3)
         self._rounds: list[list[torch.Tensor]] = []
 
-    def add(self, walks: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-        """Take a round of observations, advice and first decisions, as they are and mirrored."""
-        both = [(*pair, first) for x, y, first in walks for pair in ((x, y), mirrored(x, y))]
+    def add(self, walks: list[list[np.ndarray]]) -> None:
+        """Take a round of lessons, as they are and mirrored."""
+        both = [each for walk in walks for each in (walk, mirrored(*walk))]
         joined = (np.concatenate(parts, axis=1) for parts in zip(*both, strict=True))
         self._rounds.append([torch.from_numpy(part) for part in joined])
 
     def train(self, epochs: int = EPOCHS, rate: float = RATE) -> float:
         """Some epochs over all; the share of advice that the student repeats, of the last one."""
         network, right, count = self._network, 0, 0
-        seen = torch.cat([given.flatten(0, 1) for given, _, _ in self._rounds])
+        seen = torch.cat([given.flatten(0, 1) for given, *_ in self._rounds])
         network.mean.copy_(seen.mean(0))
         network.scale.copy_(seen.std(0).clamp(min=0.02))
         self._optimiser.param_groups[0]["lr"] = rate
@@ -266,21 +281,21 @@ class Lessons:
             right = count = 0
             for rows in torch.randperm(self._rounds[0][1].shape[1]).split(GROUP):
                 memory = torch.zeros(len(rows), UNITS)
-                for given, told, first in self._rounds:
-                    memory, good = self._learn(
-                        given[:, rows], told[:, rows], first[:, rows], memory
-                    )
-                    right, count = right + good, count + told[:, rows].numel()
+                for lessons in self._rounds:
+                    memory, good = self._learn(*(part[:, rows] for part in lessons), memory)
+                    right, count = right + good, count + ROUND * len(rows)
         return right / count
 
-    def _learn(self, given, told, first, memory):
+    def _learn(self, given, told, first, why, memory):
         """Learn one round of some robots; the memory after it, and how often it was right."""
-        scores = []
+        scores, said = [], []
         for i in range(len(told)):
             score, memory = self._network(given[i], memory, first[i])
             scores.append(score)
+            said.append(self._network.why(memory))
         scores = torch.stack(scores)
         loss = nn.functional.cross_entropy(scores.flatten(0, 1), told.flatten())
+        loss = loss + nn.functional.mse_loss(torch.stack(said), why)
         self._optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._network.parameters(), 1.0)
@@ -321,7 +336,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument("--scene", nargs="+", default=["uturn", "room"], choices=[*SCENES])
     parser.add_argument("--readings", default="own", choices=["own", "none"])
-    parser.add_argument("--decisions", type=int, default=30_000)
+    parser.add_argument("--decisions", type=int, default=60_000)
     parser.add_argument("--seed", type=int, default=1)
     print(teach(parser.parse_args()))
 

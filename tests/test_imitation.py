@@ -50,6 +50,11 @@ def test_readings_that_repeat_are_told_to_back_off_and_to_turn_from_what_stays_b
     walked, backed = (told.count(maneuver) for maneuver in (imitate.FORWARD, imitate.REVERSE))
     assert abs(walked * imitate.DECISION - 3.0) < 0.5
     assert abs(backed * imitate.DECISION - 1.3) < 0.25
+    turned, right, tries, left, walked, free = teacher.state()[0]
+    assert (np.sign(turned), right) == ((1.0, 1.0) if side == "TURN_R" else (-1.0, -1.0))
+    assert (tries, walked, free) == (0.25, 0.0, 0.0)  # the first of four; it does not walk
+    begun = imitate.DECISION / (math.radians(60.0) / 0.67)  # of a turn, after one decision
+    assert abs(left / abs(turned) - (1.0 - begun)) < 0.02
 
 
 def test_a_robot_that_feels_nothing_is_told_to_walk(imitate: Any) -> None:
@@ -90,10 +95,13 @@ def test_a_mirrored_observation_is_that_of_the_mirrored_robot(imitate: Any) -> N
         observers[1].feel(AntennaFrame(t, counts[:, ::-1].copy()))
         own = observers[0].look(Gait(phase, offset))
         other = observers[1].look(Gait(phase + np.pi, -offset))
-    seen, told = imitate.mirrored(own, np.array([imitate.TURN_L]))
+    state, first = np.array([[0.5, 1.0, 0.25, 0.1, 0.0, 0.0]]), np.array([True])
+    seen, told, begins, why = imitate.mirrored(own, np.array([imitate.TURN_L]), first, state)
     assert np.abs(seen - other).max() < 1e-6
     assert np.abs(seen - own).max() > 0.1
     assert told.tolist() == [imitate.TURN_R]
+    assert begins.tolist() == [True]
+    assert why.tolist() == [[-0.5, -1.0, 0.25, 0.1, 0.0, 0.0]]
 
 
 def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) -> None:

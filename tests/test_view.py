@@ -282,7 +282,7 @@ def driven_shown(tab: Tab, keep: Keep, driven: Shown) -> None:
 
 
 def test_X23_a_drive_and_its_twin_are_shown(tab: Tab, keep: Keep, tmp_path: Path) -> None:
-    """It does not walk meanwhile: a browser beside a walk in real time is too much for two cores."""
+    """It does not walk: a browser beside a walk in real time is too much for two cores."""
     twin = ("twin", "--view", "--view-port", "0", "--duration", "600", "--touch", "left@8s")
     with shown(*twin, folder=tmp_path) as served:
         paths = json.loads(served.answer())

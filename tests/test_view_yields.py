@@ -85,7 +85,8 @@ def test_a_late_loop_gives_its_view_up_once_servos_have_torque(tmp_path: Path, a
                 time.sleep(2.0)
             driven.process.send_signal(signal.SIGINT)
             driven.process.wait(PATIENCE)
-    assert json.loads((tmp_path / "run" / "result.json").read_text())["pace"]["missed_cycles"] > MANY
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["pace"]["missed_cycles"] > MANY
     assert ("view: given up" in "".join(driven.lines)) is armed
 
 
