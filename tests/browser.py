@@ -100,6 +100,13 @@ class Tab:
             time.sleep(0.1)
         return value
 
+    def until_is(self, script: str, wanted: Any) -> None:
+        """Return once an expression has this value; else its last one is told."""
+        end = time.monotonic() + _STARTING
+        while (value := self.run(script)) != wanted:
+            assert time.monotonic() < end, (script, value, wanted)
+            time.sleep(0.1)
+
     def click(self, tag: str, text: str) -> None:
         """Click the first element of that kind with that text, if there is one."""
         self.run(

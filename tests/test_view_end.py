@@ -12,7 +12,7 @@ from view_rig import PATIENCE, child_of, shown
 
 SCALES = """JSON.stringify(Object.values(window.__viserTestpoints?.uplots ?? {}).map(
     each => [...['min', 'max'].map(end => Math.round(1e3 * each.chart.scales.x[end]) / 1e3),
-             each.chart.axes[0]._values.join()]))"""
+             each.chart.axes[0]._values?.join()]))"""
 """The ends and the numbers [s] of the axis of time of each chart, in JavaScript."""
 SECOND = "/open, trial 1[^]*time\\s+[2-9][0-9.]* s/.test(document.body.innerText)"
 """Whether the second trial has lasted for some seconds, in JavaScript."""
@@ -51,7 +51,7 @@ def test_a_page_of_two_trials_shows_ten_seconds_of_each_and_stays_when_they_have
         tab.open(view.link)
         tab.until(SECOND)
         wanted = json.dumps([[0, 1, "-10,-5,0"]] * 4, separators=(",", ":"))
-        tab.until(f"{SCALES} === {json.dumps(wanted)}")
+        tab.until_is(SCALES, wanted)
         assert view.process.wait(PATIENCE) == 0
         tab.until("document.body.innerText.includes('The run has ended')")
         tab.until("document.body.innerText.includes('Results: run')")
