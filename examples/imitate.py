@@ -14,7 +14,6 @@ the student learns all that it was told, and what the teacher goes by.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -111,8 +110,7 @@ class Teacher(Search):
         walked = np.nan_to_num(self._t - self._begun) * walks / times.proof_time
         free = np.clip((self._t - self._felt) / times.free_time, 0.0, 2.0) * walks
         turned, side = self._turned / times.return_time, np.where(self._right, 1.0, -1.0)
-        tries = np.minimum(self.tries, 4) / 4
-        parts = turned, side, tries, left, np.clip(walked, 0.0, 1.5), free
+        parts = turned, side, np.minimum(self.tries, 4) / 4, left, np.clip(walked, 0.0, 1.5), free
         return np.stack(parts, axis=1).astype(np.float32)
 
     def _adopt(self, rows: np.ndarray, done: np.ndarray) -> None:
@@ -146,30 +144,23 @@ class Class:
         self.blind = readings == "none"
         config = self.envs.unwrapped.config
         self.teacher = Teacher(config.control, config.robot, ROWS)
-        self.done, self.new = np.zeros(ROWS, np.int64), np.ones(ROWS, bool)
+        self.done, (self.new, self.taught) = np.zeros(ROWS, np.int64), np.ones((2, ROWS), bool)
         self.memory = torch.zeros(ROWS, UNITS)
-        self.taught = np.ones(ROWS, bool)
         self.slips, self.other = np.zeros((2, ROWS), np.int64)
         self.observation, _ = self.envs.reset(seed=seed)
 
-    def seen(self) -> np.ndarray:
-        """What the student is given, shape (B, n): nothing of its antennae if it is blind."""
-        return untouched(self.observation) if self.blind else self.observation
-
     def walk(self, network: Network, share: float, rng: np.random.Generator):
-        """Walk a round: observations (ROUND, B, n), advice, first decisions, and why (ROUND, B, 6).
+        """Walk a round, a share of it with the teacher; the lessons of the student.
 
-        Args:
-            network: The student.
-            share: Chance that the teacher walks a segment.
-            rng: Says in which.
+        Observations (ROUND, B, n), advice, first decisions, what the teacher went by (ROUND, B, 6).
         """
         lessons = []
         for i in range(ROUND):
             if i % SEGMENT == 0:
                 self.taught = rng.random(ROWS) < share
             flex = self.observation[:, [0, HISTORY]].astype(float)
-            advice, seen = self.teacher.advise(flex, self.done), self.seen()
+            advice = self.teacher.advise(flex, self.done)
+            seen = untouched(self.observation) if self.blind else self.observation
             lessons.append((seen.copy(), advice, self.new.copy(), self.teacher.state()))
             chosen, self.memory = network.choose(seen, self.memory, self.new)
             self.done = np.where(self.taught, advice, chosen)
@@ -187,8 +178,7 @@ class Class:
 
     def step(self) -> None:
         """Carry out what was chosen."""
-        actions = CHOICES[self.done].astype(np.float32)
-        self.observation, _, ended, cut, _ = self.envs.step(actions)
+        self.observation, _, ended, cut, _ = self.envs.step(CHOICES[self.done].astype(np.float32))
         self.new = ended | cut
         if self.new.any():
             self.teacher.begin(self.new)
@@ -221,10 +211,7 @@ def mirrored(observation, told, first, why):
 
 
 class Network(nn.Module):
-    """Scores of the four choices; it normalises an observation by itself, and has a memory.
-
-    While it learns it also says what the teacher goes by, so that its memory holds that.
-    """
+    """Scores of the four choices, by its memory; it also learns to say what the teacher goes by."""
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
@@ -249,11 +236,10 @@ class Network(nn.Module):
         """Write it as a policy."""
         contract = contract_of(config.interface, config.control, config.robot, about=about)
         unit, last = self.memory, self.scores
-        own = (unit.weight_ih, unit.weight_hh, unit.bias_ih, unit.bias_hh)
-        memory = [part.detach().numpy() for part in own]
-        layers = [(last.weight.detach().numpy(), last.bias.detach().numpy())]
+        parts = unit.weight_ih, unit.weight_hh, unit.bias_ih, unit.bias_hh, last.weight, last.bias
+        *memory, weight, bias = (part.detach().numpy() for part in parts)
         normal = self.mean.numpy(), self.scale.numpy(), 5.0
-        return write_policy(path, contract, layers, *normal, CHOICES, memory)
+        return write_policy(path, contract, [(weight, bias)], *normal, CHOICES, memory)
 
 
 class Lessons:
@@ -327,7 +313,6 @@ def teach(options: argparse.Namespace) -> Path:
         f"{options.seed}, {decisions} decisions"
     )
     options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "options.json").write_text(json.dumps(vars(options), default=str), "utf-8")
     return network.save(options.out / "policy.onnx", classes[0].envs.unwrapped.config, about)
 
 
