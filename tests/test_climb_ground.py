@@ -169,6 +169,7 @@ def test_a_ratio_of_speeds_is_that_of_paired_trials_and_has_its_interval() -> No
     )
 
 
+@pytest.mark.slow
 def test_a_robot_that_feels_nothing_crosses_what_is_small_and_falls_into_what_is_wide() -> None:
     config, by_ground = cells_of(grounds=("gap:0.05", "gap:0.5", "step_down:0.05", "flat"))
     ended: list[ClimbRow] = []

@@ -186,6 +186,7 @@ def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(
     assert "No episode of Raises is valid: controller: step raised ZeroDivisionError: no" in out
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_for_any_number_of_workers() -> None:
     config = CompeteConfig(controllers=("follow", "centre"), scenes=(SHORT, "uturn+time_limit=0.5"))
     one, three = (run(config, workers).rows for workers in (1, 3))

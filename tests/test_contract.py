@@ -293,6 +293,7 @@ class Wandering:
 @pytest.mark.parametrize(
     ("logs", "ticks"), [(7, 1000), pytest.param(10, 100_000, marks=pytest.mark.slow)]
 )
+@pytest.mark.slow
 def test_G7_logs_of_wandering_readings_are_replayed_to_the_bit(
     tmp_path: Path, logs: int, ticks: int
 ) -> None:

@@ -127,7 +127,13 @@ def test_a_robot_walks_again_once_the_window_has_passed_a_gap(name: str) -> None
     assert np.flatnonzero(holding).tolist() == list(range(20, 30))  # T_avg is ten samples
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in ("climb", "lifted") else ())
+        for name in BUILT_IN
+    ],
+)
 def test_a_row_says_the_same_alone_and_in_a_batch_of_seven(name: str) -> None:
     counts = streams(LONG, 7)
     together = run(name, counts)

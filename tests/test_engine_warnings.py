@@ -60,7 +60,7 @@ def test_a_model_of_ones_own_keeps_its_warnings(tmp_path: Path) -> None:
     assert WARNING in (tmp_path / LOG).read_text()
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_commands_and_their_workers_leave_no_log_of_the_engine(
     tmp_path: Path, workers: str
 ) -> None:

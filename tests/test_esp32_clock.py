@@ -72,6 +72,7 @@ def test_E4_sequence_numbers_wrap() -> None:
 
 
 @pytest.mark.parametrize(("bits", "wraps"), [(30, 80), (32, 20)])
+@pytest.mark.slow
 def test_E4_a_day_with_99_of_100_samples_lost(bits: int, wraps: int) -> None:
     """24 h cross 80 wraps of 2**30 us and 20 of 2**32 us without an error."""
     clock = ready(bits)

@@ -35,6 +35,7 @@ def test_a_cart_stops_at_a_wall_that_its_antennae_feel(tmp_path: Path) -> None:
     assert force > 0.001
 
 
+@pytest.mark.slow
 def test_trials_become_a_data_frame(tmp_path: Path) -> None:
     out = ran("data_frame", tmp_path)
     assert re.search(r"open +\d+\.\d+ +\d\.\d+", out)

@@ -102,10 +102,11 @@ def simulated(robot: RobotSpec, scene: str, seed: int, gait: GaitParams) -> tupl
 @pytest.mark.parametrize(
     ("name", "scene", "seed", "gait"),
     [
-        ("scuttle", "flat", 0, "serpenoid"),
         ("scuttle", "tunnel", 3, "swift"),
-        ("scuttle", "corridors", 3, "serpenoid"),
-        ("scuttle", "wall", 0, "serpenoid"),
+        *(
+            pytest.param("scuttle", scene, seed, "serpenoid", marks=pytest.mark.slow)
+            for scene, seed in (("flat", 0), ("corridors", 3), ("wall", 0))
+        ),
         ("hexapod", "flat", 0, "b11bl0"),
         ("scuttle3d", "stairs", 2, "serpenoid"),
         ("own", "tunnel", 5, "serpenoid"),
@@ -133,7 +134,13 @@ def test_the_file_moves_as_our_robot_does_to_the_bit(
     assert "largest difference 0.0 m" in told
 
 
-@pytest.mark.parametrize("scene", SHIPPED)
+KEPT = ("tunnel", "uturn", "stairs", "rubble")
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [*KEPT, *(pytest.param(name, marks=pytest.mark.slow) for name in SHIPPED if name not in KEPT)],
+)
 def test_no_number_of_a_shipped_scene_is_rounded(scene: str) -> None:
     result = export_mjcf(RobotSpec(), scene, seed=13).result
     assert result["model_difference"] == {}

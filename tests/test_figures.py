@@ -206,7 +206,9 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     assert named == [*USUAL] * 4  # in lines of two, above each panel
 
 
-@pytest.mark.parametrize("trials", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "trials", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3)), 4]
+)
 @pytest.mark.parametrize("names", [("open",), tuple(BUILT_IN)])
 def test_no_words_of_trajectories_lie_on_others_or_are_cut(trials, names):
     """Titles, names, ticks, labels and legend, also where one scene is larger than others."""

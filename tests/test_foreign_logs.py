@@ -222,8 +222,14 @@ RISING, FALLING, ONE = 1, -1, 0
 @pytest.mark.parametrize(
     ("step", "size", "count", "pad", "said"),
     [
-        (FALLING, 1_000_000, 1900, False, "expected messages in the order of their times"),
-        (RISING, 1_000_000, 1900, False, "expected an undamaged log, found damaged places"),
+        pytest.param(
+            *(FALLING, 1_000_000, 1900, False, "expected messages in the order of their times"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *(RISING, 1_000_000, 1900, False, "expected an undamaged log, found damaged places"),
+            marks=pytest.mark.slow,
+        ),
         (RISING, 66_000_000, 2, False, "chunk of more than 8388608 bytes"),
         (RISING, 1_000_000, 300, True, "damaged places: 300;"),
         (RISING, 66_000_000, 3, True, "chunk of more than 8388608 bytes"),

@@ -38,6 +38,7 @@ def result(tmp_path_factory):
     return json.loads((out / "result.json").read_text())
 
 
+@pytest.mark.slow
 def test_the_engine_agrees_with_the_model(result):
     """Speeds within the aim, twists of the map within 0.02 m/s and 0.3 1/m."""
     entry = result["agreement"]
@@ -49,6 +50,7 @@ def test_the_engine_agrees_with_the_model(result):
     assert abs(lead["model_less_engine_deg"]) < experiment.LEAD_DEG
 
 
+@pytest.mark.slow
 def test_named_gaits_are_faster(result):
     rows = {row["name"]: row for row in result["named"]}
     assert rows["swift"]["speed_m_s"] > experiment.FASTER * rows["gait"]["speed_m_s"]
@@ -67,6 +69,7 @@ def test_random_gaits_are_uniform_and_those_of_their_seed():
     np.testing.assert_allclose(waves.mean(1), (low + high) / 2, atol=0.12)
 
 
+@pytest.mark.slow
 def test_curvature_of_the_torus_is_what_the_lead_gains():
     """Stokes' theorem: loops of whole cycles, walked as paths, against the curvature inside."""
     robot, wave = RobotSpec(), Wave(0.2, 1.0, 0.0, 0.0)
@@ -85,7 +88,8 @@ def test_peaks_are_those_of_a_parabola():
     np.testing.assert_allclose(height, [3.0, 0.0], atol=1e-9)
 
 
-@pytest.mark.parametrize("goal", ["speed", pytest.param("cost", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("goal", ["speed", "cost"])
 def test_an_optimum_is_better_than_what_was_given(goal):
     robot, gait = RobotSpec(), GaitParams()
     best = optimise(robot, gait, goal)

@@ -172,6 +172,7 @@ def test_an_unknown_radius_changes_the_step_of_rolling_legs_by_its_circumference
     assert result["measured_body_lengths_per_cycle"] == 0.4
 
 
+@pytest.mark.slow
 def test_the_comparison_with_the_robot_is_one_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -104,6 +104,7 @@ def test_without_a_key_there_is_no_torque_and_after_its_release_first_no_motion(
     assert not any(servo.torque for servo in made.robot.servos)
 
 
+@pytest.mark.slow
 def test_a_key_let_go_again_and_again_is_no_fault() -> None:
     made = rig(TwinConfig())
     presses = iter([True, True, *[False] * 40] * 30)

@@ -145,7 +145,7 @@ def test_an_interrupted_shard_is_no_bad_input_and_goes_on(capsys, tmp_path, monk
     assert json.loads((tmp_path / "part" / "shard.json").read_text())["trials"] == 2
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_disk_that_is_full_before_a_trial_has_ended_keeps_the_logs(tmp_path, workers):
     """Several trials run in lockstep. A chunk that was taken in part holds more whole ticks."""
     words = ["tunnel", "--controllers", "open", "--scene", "flat", "--time-limit", "5"]

@@ -114,6 +114,7 @@ def test_friction_and_stiff_servos_leave_the_step():
     assert 3 * first.work[0] == pytest.approx(second.work[0], rel=1e-2)
 
 
+@pytest.mark.slow
 def test_phase_law_on_stiff_servos():
     """First harmonic of speed over the lead of a small wave, within 1 deg of the law."""
     lead = np.arange(24) * math.pi / 12

@@ -95,7 +95,7 @@ def test_fewer_trials_are_refused_and_nothing_changes(capsys: pytest.CaptureFixt
     assert before == {path: path.read_bytes() for path in before}
 
 
-@pytest.mark.parametrize("cut", [0, 1, 30])
+@pytest.mark.parametrize("cut", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 30))])
 def test_a_run_that_was_killed_as_it_took_more_goes_on(cut: int) -> None:
     """At the line that says so: whole, or torn; with the result of before still there."""
     assert study("run", 2) == 0

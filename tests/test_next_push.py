@@ -164,6 +164,7 @@ def test_of_real_sweeps_that_were_left_out_most_readings_lie_within(pushes: int)
     assert np.mean(shares) > 0.95
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_curve_is_another_thing() -> None:
     """Over 30 pushes it is 31 ** 0.5 times narrower than that of a push: it holds 28 % of them."""
     rng, hits = np.random.default_rng(2), 0

@@ -231,7 +231,7 @@ def Talks(control, robot, batch):
 """
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_what_a_controller_prints_does_not_stand_beside_the_json(
     workers: str, tmp_path: Path
 ) -> None:

@@ -128,6 +128,7 @@ def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
 # the example
 
 
+@pytest.mark.slow
 def test_the_example_keeps_the_protocol() -> None:
     check_controller(EXAMPLE)
 

@@ -280,7 +280,12 @@ PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
 
 
-@pytest.mark.parametrize("name", TINY)
+LONGEST = ("geometry", "climb", "dataset")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONGEST else ()) for name in TINY]
+)
 def test_every_parameter_of_an_experiment_is_read_or_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

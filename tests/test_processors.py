@@ -34,6 +34,7 @@ def named() -> str:
     return json.loads(Path("run/versions.json").read_text())["processor"]
 
 
+@pytest.mark.slow
 def test_a_run_killed_beside_its_result_names_all_processors_with_trials(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -86,6 +86,7 @@ def logged(path: Path) -> Floats:
         return np.array([tick.frame().counts[0] for tick in log])
 
 
+@pytest.mark.slow
 def test_yoked_trials_get_the_readings_of_the_next_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -135,6 +136,7 @@ def test_rows_do_not_depend_on_the_batch() -> None:
     assert tables[0] == tables[1]
 
 
+@pytest.mark.slow
 def test_with_more_trials_only_the_yoked_trial_that_was_last_runs_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

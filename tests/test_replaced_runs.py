@@ -189,6 +189,7 @@ def test_killed_before_its_first_trial_the_old_run_is_beside_it() -> None:
     assert len(RunDirectory.open("run").rows()) == 3
 
 
+@pytest.mark.slow
 def test_killed_twice_before_its_first_trial_the_old_run_is_still_there() -> None:
     before = contents("run")
     for _ in range(2):

@@ -142,7 +142,9 @@ def test_a_silent_servo_of_the_new_joints_ends_in_a_fault_that_names_it(name: st
     assert report.on == [servo]  # it cannot confirm that its torque is off
 
 
-@pytest.mark.parametrize("name", ["pitch1", "antenna_l_elevation"])
+@pytest.mark.parametrize(
+    "name", ["pitch1", pytest.param("antenna_l_elevation", marks=pytest.mark.slow)]
+)
 def test_a_joint_that_does_not_follow_is_named(name: str) -> None:
     servo = ROBOT.ids[ROBOT.joint_names.index(name)]
     report = faulty(f"servo:{servo}=goal_pwm:0", duration=6.0)

@@ -282,6 +282,7 @@ def test_positions_that_are_finer_than_ticks_are_taken(tmp_path: Path) -> None:
     assert antennate.run("servo", recording=[str(path)]).summary["models"][-1]["error_deg"] < 10.0
 
 
+@pytest.mark.slow
 def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path) -> None:
     """Nor does it leave them out: the model as given stands beside it."""
     file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 2.0))

@@ -176,6 +176,7 @@ def setting(frequency=2.0, sensor=SENSOR):
     return SweepConfig(sweep=SweepParams(frequency=frequency), shape=SHAPE, antenna=antenna)
 
 
+@pytest.mark.slow
 def test_flex_and_base_angle_tell_a_distance_and_flex_alone_needs_a_known_sweep():
     trials = [
         estimates.run_trial(setting(0.5, FORGETFUL), condition, split, number, side)

@@ -279,7 +279,9 @@ def test_plain_and_corrected_integrals_are_those_of_their_curvatures() -> None:
     assert np.abs(estimate - exact).max() < 0.05 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("links", [3, 4, 5, 6, 7, 8, 9, 10])
+@pytest.mark.parametrize(
+    "links", [3, 4, 5, 6, *(pytest.param(n, marks=pytest.mark.slow) for n in (7, 8, 9)), 10]
+)
 def test_small_strokes_of_least_energy_are_the_ellipse_of_the_largest_eigenvalue(
     links: int,
 ) -> None:
@@ -377,6 +379,7 @@ def gain(bound: float) -> float:
     return efficiency(chain, oval) / centred(ARM)
 
 
+@pytest.mark.slow
 def test_large_strokes_gain_for_slender_links_alone() -> None:
     """Raz and Avron (arXiv 0706.3906) found 1.53 times where links may nearly fold, else none.
 

@@ -165,7 +165,7 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "trial", "robot", "limit", "end"),
     [
-        ("closed", 1, ROBOT, 100.0, "success"),
+        pytest.param("closed", 1, ROBOT, 100.0, "success", marks=pytest.mark.slow),
         ("paper", 0, MIRRORED, 10.0, "timeout"),
         ("timed", 0, ROBOT, 8.0, "timeout"),
     ],

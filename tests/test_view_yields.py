@@ -54,12 +54,16 @@ def test_a_view_is_given_up_at_once_and_one_line_says_why(
     assert said == ["view: given up, as the loop missed 9 ticks within a second; the drive goes on"]
 
 
+def children() -> set[str]:
+    """Numbers of the processes that this thread has begun."""
+    return set(Path(f"/proc/self/task/{os.getpid()}/children").read_text().split())
+
+
 @pytest.mark.skipif(not LINUX, reason="only Linux has SCHED_IDLE")
-def test_every_thread_of_a_view_beside_a_drive_gives_way(
-    page: tuple[ViewProcess, list[str]],
-) -> None:
-    del page
-    (child,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+def test_every_thread_of_a_view_beside_a_drive_gives_way(request: pytest.FixtureRequest) -> None:
+    others = children()  # those of tests before it, as of a pool of workers
+    request.getfixturevalue("page")
+    (child,) = children() - others
     threads = [int(thread.name) for thread in Path(f"/proc/{child}/task").iterdir()]
     assert len(threads) > 1
     assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_IDLE}

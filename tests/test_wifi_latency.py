@@ -71,7 +71,7 @@ class PowerSaving:
         raise AssertionError
 
 
-@pytest.mark.parametrize("beacons", [0, pytest.param(1, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("beacons", [*(pytest.param(n, marks=pytest.mark.slow) for n in (0, 1)), 3])
 def test_L11_no_decision_on_a_sample_that_power_saving_made_old(beacons: int) -> None:
     """While it walks the radio begins to wake every 1 to 3 beacons of 102.4 ms."""
     twin = rig(TwinConfig())

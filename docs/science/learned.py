@@ -1,6 +1,6 @@
-"""The table of learned policies in docs/envs.md: `python docs/science/learned.py`.
+"""The tables of learned policies in docs/envs.md: `python docs/science/learned.py`.
 
-It is made of rows of docs/science/learned.csv: trials of `antennate tunnel` that the page names.
+They are made of rows of docs/science/learned.csv: trials of `antennate tunnel` that the page names.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from antennate.studies.statistics import holm, mcnemar, signed_rank
 
 ROWS, SEED = Path(__file__).with_suffix(".csv"), "67957488"
 STUDENT = "taught"
+OTHERS = tuple(f"taught, seed {seed}" for seed in (22, 23, 24, 25))
 RIVALS = ("blind twin", "timed", "timed at 1 Hz", "geometric", "geometric at 1 Hz")
 RESAMPLES = 4000
 
@@ -32,25 +33,43 @@ def read() -> dict[str, np.ndarray]:
 
 
 def main() -> None:
-    """Print the row of the student, and a row for each rival with Holm's correction."""
+    """Print the student and its rivals, then students of other training seeds, then their mean."""
     trials = read()
     own, cells, p = trials[STUDENT], [], []
-    print(f"| {shown(STUDENT, own)} | | | |")
+    print(f"{shown(STUDENT, own)} | | | |")
     for name in RIVALS:
         other = trials[name]
-        change = own[:, 1] - other[:, 1]
-        sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
-        low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
         crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
-        cells.append(f"| {shown(name, other)} | {change.mean():+.1f} ({low:+.1f} to {high:+.1f}) ")
-        p.append((signed_rank(change), crossed.mcnemar_p))
+        cells.append(f"{shown(name, other)} | {less(own, other)} ")
+        p.append((signed_rank(own[:, 1] - other[:, 1]), crossed.mcnemar_p))
     for row, times, successes in zip(cells, *map(holm, zip(*p, strict=True)), strict=True):
         print(f"{row}| {times:.2g} | {successes:.2g} |")
+    print()
+    students = [trials[name] for name in OTHERS]
+    compared([(shown(*pair), pair[1], trials["timed"]) for pair in zip(OTHERS, students)])
+    print()
+    five = np.mean([own, *students], axis=0)
+    compared([(f"| {name} ", five, trials[name]) for name in RIVALS[1:]])
+
+
+def compared(pairs: list[tuple[str, np.ndarray, np.ndarray]]) -> None:
+    """Print rows that begin so: a policy's times less those of a rival, and p with Holm's."""
+    p = holm([signed_rank(own[:, 1] - other[:, 1]) for _, own, other in pairs])
+    for (cell, own, other), times in zip(pairs, p, strict=True):
+        print(f"{cell}| {less(own, other)} | {times:.2g} |")
+
+
+def less(own: np.ndarray, other: np.ndarray) -> str:
+    """The mean of the differences of time [s] and its 95 % interval, by resampling draws."""
+    change = own[:, 1] - other[:, 1]
+    sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
+    low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
+    return f"{change.mean():+.1f} ({low:+.1f} to {high:+.1f})"
 
 
 def shown(name: str, trials: np.ndarray) -> str:
-    """The cells of a controller: its name, draws crossed, and mean time."""
-    return f"{name} | {int(trials[:, 0].sum())} | {trials[:, 1].mean():.1f}"
+    """The first cells of a controller: its name, draws crossed, and mean time."""
+    return f"| {name} | {int(trials[:, 0].sum())} | {trials[:, 1].mean():.1f} "
 
 
 if __name__ == "__main__":
