@@ -79,7 +79,9 @@ def test_S12_chatter_turns_the_robot_once_per_hold_at_most(frequency: float) -> 
     assert len(changes) <= 2 * bound
 
 
-@pytest.mark.parametrize("right", ["free", "like left", "against left"])
+@pytest.mark.parametrize(
+    "right", ["free", pytest.param("like left", marks=pytest.mark.slow), "against left"]
+)
 @pytest.mark.parametrize(("name", "most"), [("closed", 11), ("open", 0), ("paper", 19)])
 def test_S12_chatter_changes_the_action_as_often_as_the_page_says(
     name: str, most: int, right: str

@@ -89,6 +89,7 @@ def test_zigzag_turns_by_as_much_to_both_sides() -> None:
     assert found[:6] == [part for turn in turns for part in ((FORWARD, 1.0), turn)]
 
 
+@pytest.mark.slow
 def test_random_chooses_by_its_seed_and_phase_alone() -> None:
     found = maneuvers("random", 60.0, 1.25)
     assert found == maneuvers("random", 60.0, 1.25)

@@ -231,6 +231,7 @@ def test_a_silent_board_ages() -> None:
     assert clock.age(0.991 + 0.1) == pytest.approx(0.1, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_L7_lost_doubled_and_swapped_datagrams() -> None:
     """10 % lost, 5 % swapped, 5 % doubled: each used once at most, never older after newer."""
     rng = np.random.default_rng(7)

@@ -160,7 +160,9 @@ def test_no_figure_asks_for_smaller_letters():
             assert float(size) >= least, path
 
 
-@pytest.mark.parametrize("draw", [one_trajectory, summary, study])
+@pytest.mark.parametrize(
+    "draw", [one_trajectory, pytest.param(summary, marks=pytest.mark.slow), study]
+)
 def test_the_same_data_give_the_same_bytes(draw):
     first, second = style.render(draw()), style.render(draw())
     assert first == second

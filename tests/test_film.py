@@ -237,6 +237,7 @@ def test_without_a_driver_the_package_is_named(
     assert "apt-get install libegl1 libgl1-mesa-dri" in told
 
 
+@pytest.mark.slow
 def test_a_way_to_draw_that_does_not_exist_matters_where_something_is_drawn_alone(
     tmp_path: Path,
 ) -> None:

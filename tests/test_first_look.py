@@ -95,6 +95,7 @@ def test_a_notebook_is_executed_small_and_says_nothing_of_the_machine(
 
 
 @pytest.mark.parametrize("name", ["geometry", pytest.param("first_look", marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_its_cells_give_what_it_shows(name: str, tmp_path: Path) -> None:
     """In a process of their own; numbers of walks may differ, those of springs may not."""
     sources = ["".join(cell["source"]) for cell in kept(name)]

@@ -92,6 +92,7 @@ def test_walks_come_out_the_same_twice():
     assert one.weight == pytest.approx(RobotSpec().mass * 9.81, rel=0.01)
 
 
+@pytest.mark.slow
 def test_study_keeps_its_promises():
     steps = []
     outcome = study.run(SHORT, on_step=lambda done, total: steps.append((done, total)))

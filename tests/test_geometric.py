@@ -82,6 +82,7 @@ def test_it_walks_by_the_gait_that_is_named(forward, crest):
     assert math.degrees(abs(yaw[100:]).max()) == pytest.approx(crest, abs=0.1)
 
 
+@pytest.mark.slow
 def test_it_keeps_the_protocol():
     check_controller("geometric")
 

@@ -138,7 +138,7 @@ def faulty(fault: str, robot: RobotSpec = ROBOT) -> tuple[Report, Session, list[
     ("fault", "words", "soon"),
     [
         ("imu=silent", "no answer", 0.02),
-        ("imu=stuck", "always the same readings", 0.12),
+        pytest.param("imu=stuck", "always the same readings", 0.12, marks=pytest.mark.slow),
         ("imu=railed", "readings at the end of the range", 0.02),
     ],
 )

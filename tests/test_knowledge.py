@@ -265,9 +265,8 @@ def test_numbers_that_a_page_changes_leave_a_controller_its_knowledge() -> None:
     assert Retunable(lambda values: make_controller("open", values), ControlParams()).knows == ()
 
 
-@pytest.mark.parametrize(
-    "knows", [("side", "jam"), pytest.param(("map", "free"), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("knows", [("side", "jam"), ("map", "free")])
+@pytest.mark.slow
 def test_rows_do_not_depend_on_batch_and_workers(knows: tuple[Any, ...]) -> None:
     config = TunnelConfig(**SHORT, controllers=("closed-1",), knows=knows)
     alone: list[Any] = []

@@ -67,6 +67,7 @@ def test_a_tunnel_takes_more_trials_and_is_the_same_as_at_once() -> None:
         assert main([*TUNNEL, "--trials", "1", "--out", "run", "--overwrite", "--no-figures"]) == 0
 
 
+@pytest.mark.slow
 def test_a_study_runs_those_alone_that_it_has_not() -> None:
     assert study("run", 2) == 0
     assert len(noted()) == 6

@@ -100,6 +100,7 @@ def test_without_torque_it_swings_as_a_pendulum_whose_friction_takes_its_share()
     ("number", "name"),
     [(1200, "xl330_m288"), pytest.param(1080, "xc430_w240", marks=pytest.mark.slow)],
 )
+@pytest.mark.slow
 def test_the_twins_servo_is_identified_from_its_recording(
     number: int, name: str, tmp_path: Path
 ) -> None:

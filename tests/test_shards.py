@@ -166,7 +166,7 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
     assert not Path("merged").exists()
 
 
-@pytest.mark.parametrize("count", [5, 6])
+@pytest.mark.parametrize("count", [5, pytest.param(6, marks=pytest.mark.slow)])
 def test_a_shard_without_trials_is_merged_as_any_other(count: int) -> None:
     """Of more parts than four trials; the order of the shards is anybody's."""
     words = ["study", "plan.toml", "--workers", "1", "--no-figures", "--out"]

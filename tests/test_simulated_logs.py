@@ -240,6 +240,7 @@ def drawable() -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_a_twin_and_its_log_are_filmed(tmp_path: Path) -> None:
     """A second of the film for a second of the walk; the log shows the same at 10 Hz."""
     ticks = 28

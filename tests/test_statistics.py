@@ -41,7 +41,10 @@ def test_the_quantile_of_student_is_that_of_scipy_bit_for_bit(count: int) -> Non
     assert student95(count - 1) == t.ppf(0.975, count - 1)
 
 
-@pytest.mark.parametrize("words", [["tunnel"], ["study", "plan.toml", "--trust-code"]])
+@pytest.mark.parametrize(
+    "words",
+    [pytest.param(["tunnel"], marks=pytest.mark.slow), ["study", "plan.toml", "--trust-code"]],
+)
 def test_a_run_of_one_condition_starts_without_the_statistics_of_scipy(
     tmp_path: Path, words: list[str]
 ) -> None:

@@ -118,7 +118,7 @@ def test_left_and_right_are_alike() -> None:
     np.testing.assert_allclose(right, -left, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["follow", "centre"])
+@pytest.mark.parametrize("name", ["follow", pytest.param("centre", marks=pytest.mark.slow)])
 def test_it_keeps_the_protocol(name: str) -> None:
     check_controller(name)
 

@@ -142,6 +142,7 @@ def test_odd_letters_and_long_text_are_kept_and_read_again() -> None:
     assert [len(row["said"]) for row in antennate.RunDirectory.open("run").rows()] == [150_000] * 6
 
 
+@pytest.mark.slow
 def test_W4_a_trial_that_never_ends_is_given_up() -> None:
     plan(mode="hang")
     text = (
@@ -439,6 +440,7 @@ def test_W1_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
     assert 0 <= found["again"] <= 2 * kills
 
 
+@pytest.mark.slow
 def test_W5_a_study_that_is_told_to_end_keeps_what_is_done(tmp_path: Path) -> None:
     """SIGTERM, as a cluster sends it."""
     plan(sleep=0.1)

@@ -217,7 +217,7 @@ def burst(monkeypatch):
     monkeypatch.setattr(Bench, "step", step)
 
 
-@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("seed", [0, pytest.param(7, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("side", estimates.SIDES)
 def test_the_sweep_and_the_distance_of_a_wall_are_drawn_apart(burst, seed, side):
     config = SMALL.model_copy(update={"seed": seed})

@@ -166,7 +166,7 @@ def test_no_pose_of_a_gait_is_beyond_the_limits(name: str) -> None:
     ("name", "trial", "robot", "limit", "end"),
     [
         pytest.param("closed", 1, ROBOT, 100.0, "success", marks=pytest.mark.slow),
-        ("paper", 0, MIRRORED, 10.0, "timeout"),
+        pytest.param("paper", 0, MIRRORED, 10.0, "timeout", marks=pytest.mark.slow),
         ("timed", 0, ROBOT, 8.0, "timeout"),
     ],
 )
