@@ -15,6 +15,7 @@ from typing import Any
 
 from generated import finish
 
+from antennate.errors import ConfigError
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.config import CompeteConfig
 from antennate.experiments.compete.episodes import Episode, all_drawn
@@ -66,8 +67,17 @@ def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
 
 
 def joined(paths: Sequence[str]) -> str:
-    """The table of several runs, controller by controller and scene by scene."""
+    """The table of several runs, controller by controller and scene by scene.
+
+    Raises:
+        ConfigError: They are of several versions or engines, or have a draw twice.
+    """
     rows = [row for path in paths for row in read_rows(Path(path))]
+    for name in ("version", "engine"):
+        if len(kinds := {getattr(row, name) for row in rows}) > 1:
+            raise ConfigError(f"expected tables of one {name}, found {', '.join(sorted(kinds))}")
+    if len({(row.controller, row.scene, row.seed, row.trial) for row in rows}) < len(rows):
+        raise ConfigError("expected each draw once a controller, found one in two tables")
     names, scenes = (
         list(dict.fromkeys(getattr(r, n) for r in rows)) for n in ("controller", "scene")
     )
@@ -77,8 +87,15 @@ def joined(paths: Sequence[str]) -> str:
 
 def main() -> None:
     """Write the page and the figures, or compare the page."""
-    if paths := [word for word in sys.argv[1:] if not word.startswith("-")]:
-        ROWS.write_text(joined(paths), encoding="utf-8")
+    paths = [word for word in sys.argv[1:] if not word.startswith("-")]
+    if paths and "--check" in sys.argv[1:]:
+        sys.exit("expected --check or tables to join, found both")
+    if paths:
+        try:
+            table = joined(paths)
+        except ConfigError as error:
+            sys.exit(str(error))
+        ROWS.write_text(table, encoding="utf-8")
     rows = read_rows(ROWS)
     result = result_of(rows)
     page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")

@@ -31,6 +31,8 @@ from antennate.control.policy.writer import write_policy
 SCENES = {scene: name for name, scene in antennate.envs.ids().items()}
 INTERFACE = {"action": "maneuver", "ticks": 50, "history": 16}
 """A decision every 0.5 s; what was felt in the last 8 s."""
+FELT = ("flex_", "level_", "counts_")
+"""How the names of numbers begin that antennae tell."""
 ROWS = 8
 """Robots of a worker."""
 DECISIONS = 32
@@ -163,9 +165,12 @@ def update(network: Network, optimiser, rollouts: list[dict[str, np.ndarray]]) -
             optimiser.step()
 
 
-def save(folder: Path, network: Network, contract: Contract) -> None:
-    """Weights and contract, of which `export` makes the policy."""
-    state = {name: value.numpy() for name, value in network.state_dict().items()}
+def save(folder: Path, network: Network, contract: Contract, readings: str = "felt") -> None:
+    """Weights and contract, of which `export` makes the policy; taught by none, it feels none."""
+    state = {name: value.numpy().copy() for name, value in network.state_dict().items()}
+    if readings == "none":
+        felt = [number.name.startswith(FELT) for number in contract.observations]
+        state["actor.0.weight"][:, felt] = 0.0
     np.savez(folder / "weights.npz", **state)
     (folder / "contract.json").write_text(contract.model_dump_json(indent=2), encoding="utf-8")
 
@@ -224,14 +229,14 @@ def train(options: argparse.Namespace) -> None:
             file.flush()
             if minutes - saved > 1.0:
                 saved = minutes
-                save(folder, network, contract)
+                save(folder, network, contract, options.readings)
                 print(
                     f"{minutes:.1f} min: {decisions} decisions, of the last {len(recent)} "
                     f"episodes {100 * success:.0f} % out, {times:.1f} s on average"
                 )
     for pipe in pipes:
         pipe.send(None)
-    save(folder, network, contract)
+    save(folder, network, contract, options.readings)
     (folder / "options.json").write_text(json.dumps(vars(options), default=str), "utf-8")
 
 
@@ -254,6 +259,11 @@ def main() -> None:
         "--export", action="store_true", help="write the ONNX file of saved weights"
     )
     options = parser.parse_args()
+    if len(options.scene) > options.workers:
+        parser.error(
+            f"expected a worker for each of {len(options.scene)} scenes, found "
+            f"--workers {options.workers}"
+        )
     if not options.export:
         train(options)
     try:

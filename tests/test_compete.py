@@ -19,6 +19,7 @@ import pytest
 import antennate
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import ConfigError
+from antennate.experiments.compete import experiment
 from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
@@ -30,12 +31,16 @@ from antennate.experiments.compete.config import (
 from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
 from antennate.experiments.compete.experiment import run
 from antennate.experiments.compete.scenes import label, tunnel_config
+from antennate.experiments.compete.standings import standings
 
 SHORT = "flat+time_limit=0.3"
 ENTRIES = '''
-import builtins, time
+import builtins, os, subprocess, sys, time
 import numpy as np
 from antennate.control.controllers import open_loop
+from antennate.control.registry import make_controller
+def by_map(control, robot, batch):
+    return make_controller("map", control, robot, batch)
 
 class Entry:
     """`open` with a fault."""
@@ -69,6 +74,31 @@ class Busy(Entry):
 class Asleep(Entry):
     def fault(self, command):
         time.sleep(30.0)
+class Swallows(Entry):
+    def fault(self, command):
+        try:
+            time.sleep(0.5)
+        except Exception:
+            time.sleep(0.1)
+class Begins(Entry):
+    """It lets another program work for it."""
+    def fault(self, command):
+        subprocess.run([sys.executable, "-S", "-c", "sum(range(20_000_000))"], check=True)
+class SlowReset(Entry):
+    def reset(self, rows, phase=0.0):
+        super().reset(rows, phase)
+        end = time.process_time() + 1.2
+        while time.process_time() < end:
+            pass
+class Dies(Entry):
+    def step(self, frame):
+        os._exit(0)
+class Hangs(Entry):
+    def __init__(self, control, robot, batch):
+        time.sleep(600)
+def shifty(control, robot, batch):
+    """It tells a lone robot that it needs nothing."""
+    return open_loop(control, robot, batch) if batch == 1 else by_map(control, robot, batch)
 class Shape(Entry):
     def step(self, frame):
         command = self.inner.step(frame)
@@ -114,12 +144,15 @@ def episodes(name: str, count: int = 1, scene: str = SHORT, limit: float = 0.05)
         ("Raises", "step raised ZeroDivisionError: no"),
         ("Busy", "a decision took longer than 50 ms"),
         ("Asleep", "a decision took longer than 10 ms"),
+        ("Swallows", "a decision took longer than 10 ms"),
+        ("Begins", "a decision took longer than 50 ms"),
+        ("SlowReset", "a decision took longer than 50 ms"),
     ],
 )
 def test_what_fails_in_a_trial_is_invalid_with_its_reason(
     name: str, why: str, entries: Callable[[str], str]
 ) -> None:
-    (row,) = episodes(entries(name), limit=0.01 if name == "Asleep" else 0.05)
+    (row,) = episodes(entries(name), limit=0.01 if name in ("Asleep", "Swallows") else 0.05)
     assert row.outcome == "invalid"
     assert why in row.reason
 
@@ -145,6 +178,14 @@ def test_who_can_use_knowledge_but_needs_none_is_given_none(
     entries: Callable[[str], str],
 ) -> None:
     assert episodes(entries("Curious"))[0].reason == ""
+
+
+def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
+    entries: Callable[[str], str],
+) -> None:
+    rows = episodes(entries("shifty"), 2)
+    assert {row.given for row in rows} == {"jam map"}
+    assert standings(rows, 0.01)["controllers"][rows[0].controller]["rank"] is None
 
 
 # a run
@@ -296,6 +337,25 @@ def test_bad_input_is_one_line_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(("name", "why"), [("Dies", "worker"), ("Hangs", "no result within 4 s")])
+def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
+    name: str,
+    why: str,
+    tmp_path: Path,
+    entries: Callable[[str], str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It is no end of the command that looks like a success."""
+    monkeypatch.setattr(experiment, "PATIENCE", 4.0 if name == "Hangs" else 60.0)
+    words = ["compete", "--scenes", SHORT, "--trials", "1", "--out", "run", "--controllers"]
+    assert main([*words, "open", entries(name)]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"--controllers: '{entries(name)}': " in line
+    assert why in line
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -415,6 +475,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
             "line 2: expected no seed of 700000",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,-1,success,9.0\n",
+            "line 2: trial: expected at least 0, found -1",
         ),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",

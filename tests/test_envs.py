@@ -448,6 +448,44 @@ def test_a_vector_of_no_robots_is_refused():
         envs.AntennaVectorEnv(num_envs=0, scene="flat")
 
 
+def test_a_first_seed_is_that_of_rows_that_are_not_reset_with_it_too():
+    vector = gym.make_vec("antennate/Flat-v1", num_envs=3)
+    vector.reset(seed=77, options={"reset_mask": np.array([True, False, False])})
+    *_, info = vector.step(vector.action_space.sample())
+    assert info["seed"].tolist() == [77] * 3
+    assert info["episode_number"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"seed": 1.5}, "seed: expected a whole number, or 2 of them, found 1.5"),
+        ({"seed": "ab"}, "seed: expected a whole number, or 2 of them, found 'ab'"),
+        ({"seed": np.array(4)}, "seed: expected a whole number, or 2 of them, found "),
+        ({"seed": [1, 2, 3]}, "seed: expected 2 of them, found 3"),
+        ({"seed": [1, -2]}, "seed: expected a whole number of at least 0, found -2"),
+        ({"options": {"episode_number": [1, 2, 3]}}, "episode_number: expected 2 of them, found 3"),
+        ({"options": {"episode_number": 0.5}}, "episode_number: expected a whole number of at"),
+    ],
+)
+def test_what_is_no_seed_or_episode_is_refused(words, said):
+    vector = envs.AntennaVectorEnv(num_envs=2, scene="flat")
+    with pytest.raises(ConfigError, match=said):
+        vector.reset(**words)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"num_envs": 2.5}, "num_envs: expected a whole number of at least 0, found 2.5"),
+        ({"action": "gait", "interface": None}, "interface: expected values by name, found None"),
+    ],
+)
+def test_a_vector_of_no_whole_number_of_robots_or_no_interface_is_refused(words, said):
+    with pytest.raises(ConfigError, match=said):
+        envs.AntennaVectorEnv(scene="flat", **words)
+
+
 def test_rows_without_a_seed_of_their_own_get_one_by_chance():
     vector = gym.make_vec("antennate/Flat-v1", num_envs=3)
     _, info = vector.reset(seed=[1, None, 2])

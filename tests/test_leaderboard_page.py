@@ -63,6 +63,28 @@ def test_tables_of_several_runs_are_joined(page: Path, tmp_path: Path) -> None:
     assert file.read_text().count("closed") == 2
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("0.1.0", "0.0.9"), "expected tables of one version, found 0.0.9, 0.1.0"),
+        (("", ""), "expected each draw once a controller, found one in two tables"),
+    ],
+)
+def test_tables_that_do_not_stand_together_leave_the_board_as_it_is(
+    change: tuple[str, str], said: str, page: Path, tmp_path: Path
+) -> None:
+    file = page.with_suffix(".csv")
+    whole, old = file.read_bytes(), page.read_bytes()
+    text = whole.decode().replace(",0.1.0,", f",{change[1]},") if change[0] else whole.decode()
+    (tmp_path / "b.csv").write_text(text.replace(",5,0,", ",9,0,") if change[0] else text)
+    done = run(page.parent, str(file), str(tmp_path / "b.csv"))
+    assert (done.returncode, done.stderr) == (1, said + "\n")
+    assert (file.read_bytes(), page.read_bytes()) == (whole, old)
+    done = run(page.parent, "--check", str(file))
+    assert done.returncode == 1
+    assert "found both" in done.stderr
+
+
 def test_a_seed_that_was_not_drawn_is_not_told_as_hidden(page: Path) -> None:
     file = page.with_suffix(".csv")
     file.write_text(file.read_text().replace("True", "False", 1))

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.figure import drawn
 from antennate.experiments.compete.page import markdown, ordered, readme, sentence, tables
 from antennate.experiments.compete.standings import profiles, standings
-from antennate.studies.statistics import holm, wilson95
+from antennate.studies.statistics import holm, sign_flips, wilson95, wilson95_by_draw
 
 LIMIT = 100.0
 
 
 def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episode]:
-    """Rows of one controller, in two scenes by turns; None is a failure."""
+    """Rows of one controller in draws of their own, in two scenes by turns; None is a failure."""
     return [
         Episode(
-            *(name, ("uturn", "corner")[k % 2], 1, k // 2),
+            *(name, ("uturn", "corner")[k % 2], 1, k),
             outcome="timeout" if time is None else "success",
             time_s=LIMIT if time is None else time,
             progress_m=2.0,
@@ -78,6 +80,51 @@ def test_ranks_and_their_intervals_follow_from_the_tests_of_every_two() -> None:
     assert cells["b"]["wilson95"] == wilson95(20, 40)
     assert cells["b"]["restricted_mean_share"] == pytest.approx((20 * 0.2 + 20) / 40)
     assert result["scenes"]["uturn"]["a"]["episodes"] == 20
+
+
+def test_scenes_of_one_draw_count_once_in_tests_and_intervals() -> None:
+    """The same ends in three conditions of a scene are no more than those of one."""
+    times = {"a": [10.0] * 15 + [None] * 5, "b": [None] * 9 + [12.0] * 8 + [None] * 3}
+    alone = judged(*([replace(r, scene="uturn") for r in rows_of(n, times[n])] for n in "ab"))
+    scenes = ("uturn", "uturn+variation.reading_noise=3", "uturn+readings=delayed:0.02")
+    thrice = judged(
+        *([replace(r, scene=s) for s in scenes for r in rows_of(n, times[n])] for n in "ab")
+    )
+    one, pair = alone["paired"]["a-b"], thrice["paired"]["a-b"]
+    assert (pair["only_first"], pair["only_second"]) == (27, 6)
+    assert (pair["episodes"], pair["draws"], one["draws"]) == (60, 20, 20)
+    assert pair["mcnemar_p"] == pytest.approx(binomtest(9, 11).pvalue)
+    for key in ("mcnemar_p", "wilcoxon_p", "share_difference", "share_difference_95"):
+        assert pair[key] == pytest.approx(one[key]), key
+    cell = thrice["controllers"]["a"]
+    assert cell["wilson95"] == pytest.approx(wilson95(15, 20))
+    assert thrice["scenes"]["uturn"]["a"]["wilson95"] == wilson95(15, 20)
+    for key in ("restricted_mean_share", "restricted_mean_share_95"):
+        assert cell[key] == pytest.approx(alone["controllers"]["a"][key])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flips_of_signs_are_those_of_every_choice(seed: int) -> None:
+    sums = np.random.default_rng(seed).integers(-4, 5, 11)
+    totals = [abs(sums @ signs) for signs in product((-1, 1), repeat=len(sums))]
+    assert sign_flips(sums) == pytest.approx(np.mean(np.array(totals) >= abs(sums.sum())))
+
+
+def test_draws_that_end_alike_tell_as_much_as_one_trial_each() -> None:
+    """And draws whose trials have nothing to do with one another as much as all of them."""
+    alike, apart = np.tile([0, 4], 10), np.tile([1, 3], 10)
+    assert wilson95_by_draw(alike, np.full(20, 4)) == pytest.approx(wilson95(10, 20))
+    assert wilson95_by_draw(apart, np.full(20, 4))[0] > wilson95(10, 20)[0]
+    assert wilson95_by_draw(np.full(5, 8), np.full(5, 8)) == wilson95(5, 5)
+    assert wilson95_by_draw(np.array([6]), np.array([8])) == wilson95(0.75, 1)
+    rng = np.random.default_rng(1)
+    held = 0
+    for _ in range(400):  # a draw's four trials end alike in half of the draws
+        own, same = rng.random((2, 40)) < 0.5
+        others = np.where(same, 4 * own, own + rng.binomial(3, 0.5, 40))
+        low, high = wilson95_by_draw(others, np.full(40, 4))
+        held += low <= 0.5 <= high
+    assert held >= 0.92 * 400
 
 
 def test_who_is_given_more_stands_outside_the_ranking() -> None:

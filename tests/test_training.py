@@ -59,6 +59,39 @@ def test_the_exported_network_answers_as_torch_does(tmp_path: Path) -> None:
     assert np.abs(answers - wanted).max() < 1e-5
 
 
+def test_a_policy_that_was_taught_without_readings_feels_none(tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("onnxruntime")
+    train_ppo = example("train_ppo")
+    from antennate.control.policy.contract import contract_of
+    from antennate.control.policy.controller import Policy
+
+    config = envs.AntennaEnv("flat", interface=train_ppo.INTERFACE).config
+    contract = contract_of(config.interface, config.control, config.robot)
+    names = [number.name for number in contract.observations]
+    torch.manual_seed(1)
+    train_ppo.save(tmp_path, train_ppo.Network(len(names), 4), contract, "none")
+    policy = Policy(train_ppo.export(tmp_path))
+    x = np.zeros((1, len(names)), np.float32)
+    touched, phase = x.copy(), x.copy()
+    touched[0, [name.startswith("flex_") for name in names]] = 1.0
+    phase[0, [name.startswith("pace") for name in names]] = 1.0
+    plain = policy.answer(x, {})[0]
+    assert (policy.answer(touched, {})[0] == plain).all()
+    assert (policy.answer(phase, {})[0] != plain).any()
+
+
+def test_more_scenes_than_workers_are_refused() -> None:
+    words = ["--out", "no", "--scene", "flat", "wall", "--workers", "1"]
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE), *words], check=False, capture_output=True, text=True
+    )
+    if "No module named 'torch'" in done.stderr:
+        pytest.skip("no PyTorch here")
+    assert done.returncode == 2
+    assert "expected a worker for each of 2 scenes, found --workers 1" in done.stderr
+
+
 def test_stable_baselines_trains() -> None:
     sb3 = pytest.importorskip("stable_baselines3")
     env = gym.make("antennate/Flat-v1", action="gait", time_limit=5.0)

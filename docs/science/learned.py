@@ -46,7 +46,9 @@ def main() -> None:
         print(f"{row}| {times:.2g} | {successes:.2g} |")
     print()
     students = [trials[name] for name in OTHERS]
-    compared([(shown(*pair), pair[1], trials["timed"]) for pair in zip(OTHERS, students)])
+    compared(
+        [(shown(*pair), pair[1], trials["timed"]) for pair in zip(OTHERS, students, strict=True)]
+    )
     print()
     five = np.mean([own, *students], axis=0)
     compared([(f"| {name} ", five, trials[name]) for name in RIVALS[1:]])

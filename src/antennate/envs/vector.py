@@ -37,6 +37,8 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
         action, interface = values.pop("action"), values.get("interface", {})
         if isinstance(interface, PolicyInterface):
             interface = interface.model_dump()
+        if not isinstance(interface, Mapping):
+            raise ConfigError(f"interface: expected values by name, found {shown(interface)}")
         values["interface"] = {**interface, "action": action}
     return from_values(EnvConfig, {"scene": scene, **values})
 
@@ -83,7 +85,7 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> None:
         require_no_pictures(render_mode)
         self.config = config_of(scene, values)
-        if num_envs < 1:
+        if whole("num_envs", num_envs) < 1:
             raise ConfigError(f"num_envs: expected at least 1, found {num_envs}")
         self.num_envs, self.render_mode = num_envs, render_mode
         self.autoreset_mode = _mode(autoreset_mode)
@@ -153,24 +155,39 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
                 self._episodes.seed(row, chance, row, self.num_envs)
 
     def _seed(self, seed: Any, episode: Any, rows: Bools) -> None:
-        """Say which episodes some rows begin."""
+        """Say which episodes some rows begin; a first seed is that of the others, too."""
         count = self.num_envs
         self._seed_by_chance(seed)
         if isinstance(seed, int | np.integer):
             self._np_random, self._np_random_seed = _generator(int(seed)), int(seed)
-            for row in np.flatnonzero(rows).tolist():
+            for row in np.flatnonzero(rows | (not self._seeded)).tolist():
                 self._episodes.seed(row, int(seed), row, count)
         elif seed is not None:
-            if len(seed) != count:
-                raise ConfigError(f"seed: expected {count} seeds, found {len(seed)}")
+            seeds = _each("seed", seed, count)
             for row in np.flatnonzero(rows).tolist():
-                if seed[row] is not None:
-                    self._episodes.seed(row, whole("seed", seed[row]), 0, 1)
+                if seeds[row] is not None:
+                    self._episodes.seed(row, whole("seed", seeds[row]), 0, 1)
         if episode is not None:
-            numbers = np.broadcast_to(np.asarray(episode), (count,))
+            numbers = [episode] * count if np.ndim(episode) == 0 else episode
+            numbers = _each("episode_number", numbers, count)
             for row in np.flatnonzero(rows).tolist():
                 self._episodes.choose(row, whole("episode_number", numbers[row]))
         self._seeded = True
+
+
+def _each(name: str, values: Any, count: int) -> list[Any]:
+    """A value for each row.
+
+    Raises:
+        ConfigError: There is another number of them, or it is no list.
+    """
+    if np.ndim(values) != 1:
+        raise ConfigError(
+            f"{name}: expected a whole number, or {count} of them, found {shown(values)}"
+        )
+    if len(values) != count:
+        raise ConfigError(f"{name}: expected {count} of them, found {len(values)}")
+    return list(values)
 
 
 def _generator(seed: int) -> np.random.Generator:

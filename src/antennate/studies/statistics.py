@@ -17,7 +17,7 @@ _EXACT = 50
 """Most pairs whose signed ranks are tested exactly; beyond, the normal approximation is close."""
 
 
-def wilson95(successes: int, trials: int) -> tuple[float, float]:
+def wilson95(successes: float, trials: float) -> tuple[float, float]:
     """Wilson 95 % interval of a success rate; (0, 1) without trials.
 
     Every run needs it, and scipy.stats takes a second to import; the numbers are the same, bit for
@@ -164,6 +164,43 @@ def mcnemar(ok: Bools) -> Discordance:
     discordant = only_first + only_second
     p = float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
     return Discordance(only_first, only_second, p)
+
+
+def sign_flips(sums: Ints) -> float:
+    """Exact two-sided p that two conditions succeed alike, by draws with several trials each.
+
+    Sums are successes of the first less those of the second, whole numbers of shape (n,). Had the
+    conditions changed places in a draw, its sum would have the other sign: p is the share of all
+    2^n choices of signs whose total is as far from 0 as the one found, or farther. With one trial
+    a draw this is McNemar's exact test. Trials of one draw may depend on one another.
+    """
+    sizes = np.abs(sums)[sums != 0]
+    most = int(sizes.sum())
+    chance = np.zeros(2 * most + 1)
+    chance[most] = 1.0  # of each total, from -most on
+    for size in sizes:
+        chance = (np.roll(chance, size) + np.roll(chance, -size)) / 2.0
+    far = abs(np.arange(-most, most + 1)) >= abs(int(sums.sum()))
+    return min(1.0, float(chance[far].sum()))
+
+
+def wilson95_by_draw(successes: Ints, trials: Ints) -> tuple[float, float]:
+    """Wilson 95 % interval of a success rate over draws with several trials each, shape (n,).
+
+    It is that of so many independent trials as tell as much (Rao and Scott 1992, Biometrics 48,
+    577-585): fewer where the trials of a draw end alike, though as many as draws at least. Where
+    nothing shows how alike, as all succeed or there is one draw, each draw counts once.
+    """
+    count, draws = int(trials.sum()), len(trials)
+    if count == 0:
+        return wilson95(0, 0)
+    rate = float(successes.sum()) / count
+    spread = float(((successes - rate * trials) ** 2).sum()) / count**2
+    effective = float(draws)
+    if draws > 1 and spread > 0.0:
+        alone = rate * (1.0 - rate) / (spread * draws / (draws - 1.0))
+        effective = min(max(alone, effective), float(count))
+    return wilson95(rate * effective, effective)
 
 
 def holm(p: Sequence[float]) -> list[float]:

@@ -66,11 +66,14 @@ def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
 
 
 def _require_numbers(row: Episode) -> None:
-    """Check that numbers are finite and the limit is above 0 s.
+    """Check that numbers are finite, the limit is above 0 s, and none that counts is below 0.
 
     Raises:
         ValueError: One is not.
     """
+    for name in ("seed", "trial"):
+        if getattr(row, name) < 0:
+            raise ValueError(f"{name}: expected at least 0, found {getattr(row, name)}")
     for name in ("time_s", "limit_s", "progress_m"):
         if not isfinite(value := getattr(row, name)) or (name == "limit_s" and value <= 0):
             least = " above 0" if name == "limit_s" else ""

@@ -1,8 +1,9 @@
 """One episode: a controller in one draw of a scene, with a time limit for each decision.
 
-A decision has to be there before the readings are stale. Its time is that of the processor, so that
-a machine with other work to do judges alike; who waits or sleeps in a decision is stopped by the
-clock, after `WAITING` times as long, and so is the first decision, in which libraries are loaded.
+A decision has to be there before the readings are stale. Its time is that of the processor, with
+that of processes that it began and that have ended, so that a machine with other work to do judges
+alike; who waits or sleeps in a decision is stopped by the clock, after `WAITING` times as long. The
+first decision, in which libraries are loaded, and a reset may take so long on the processor, too.
 Episodes run in lockstep, and a step of all that stays within the limit of one is within it for
 each. After one that does not, each episode runs alone, and is INVALID where its own decision takes
 too long.
@@ -10,15 +11,18 @@ too long.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import resource
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from antennate import __version__
+from antennate.control.knowledge import Kind, needs_of
 from antennate.control.loop import Wrapped
 from antennate.control.readings import condition
 from antennate.control.registry import make_controller
@@ -31,7 +35,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
-from antennate.types import AntennaFrame, Controller, JointCommand
+from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
 
 WAITING = 20.0
 """How many times as long a decision may take on the clock as on the processor; the first one may
@@ -81,7 +85,7 @@ class Episode:
 class Draw:
     """What an episode is run from: its key and what decides beside it.
 
-    `decision_limit` is in s; `given` and `drawn` are those of its row.
+    `decision_limit` is in s; `drawn` is that of its row.
     """
 
     controller: str
@@ -89,7 +93,6 @@ class Draw:
     seed: int
     trial: int
     decision_limit: float
-    given: str = ""
     drawn: bool = False
 
 
@@ -101,34 +104,58 @@ class Timed(Wrapped):
         limit: Processor time of a step [s].
 
     Raises:
-        ControllerError: In a step that took longer.
+        ControllerError: In a step or reset that took longer.
     """
 
     def __init__(self, made: Controller, limit: float) -> None:
         super().__init__(made)
         self._limit, self._begun = limit, False
+        self._needs = super().needs
         self._alarm = threading.current_thread() is threading.main_thread()
         if self._alarm:
             signal.signal(signal.SIGALRM, self._give_up)
 
+    @property
+    def needs(self) -> tuple[Kind, ...]:
+        """What it needed when it was made: that it is given, whatever it says later."""
+        return self._needs
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """As of a `Controller`."""
+        with self._within(WAITING * self._limit):
+            self._made.reset(rows, phase)
+
     def step(self, frame: AntennaFrame) -> JointCommand:
         """As of a `Controller`."""
-        if self._alarm:
-            signal.setitimer(signal.ITIMER_REAL, WAITING * self._limit)
-        begin = time.process_time()
-        try:
+        with self._within(self._limit * (1.0 if self._begun else WAITING)):
             command = self._made.step(frame)
-            used = time.process_time() - begin
-        finally:
-            if self._alarm:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if used > self._limit * (1.0 if self._begun else WAITING):
-            self._give_up()
         self._begun = True
         return command
 
+    @contextlib.contextmanager
+    def _within(self, limit: float) -> Iterator[None]:
+        """Refuse what takes longer on the processor [s], or waits for too long."""
+        most = WAITING * self._limit
+        if self._alarm:
+            signal.setitimer(signal.ITIMER_REAL, most)
+        begin, clock = _processor_time(), time.monotonic()
+        try:
+            yield
+            used, waited = _processor_time() - begin, time.monotonic() - clock
+        finally:
+            if self._alarm:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if used > limit or waited > most:
+            self._give_up()
+
     def _give_up(self, *_: object) -> None:
         raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
+
+
+def _processor_time() -> float:
+    """Processor time of this process and of those that it began and that have ended [s]."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + ended.ru_utime + ended.ru_stime
 
 
 def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None]) -> None:
@@ -145,28 +172,34 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
         config = tunnel_config(scene, controller, seed)
         first = draws[next(iter(places.values()))][0]
         name = condition(controller, config.readings[0])
-        make = functools.partial(_timed, first.decision_limit)
+        needs: list[str] = []
+        make = functools.partial(_timed, first.decision_limit, needs)
 
-        def take(item: tuple[TrialResult, Any], places: Any = places) -> None:
+        def take(
+            item: tuple[TrialResult, Any], places: Any = places, needs: list[str] = needs
+        ) -> None:
             place = places[item[0].trial]
-            emit(place, _row_of(draws[place][0], item[0]))
+            emit(place, _row_of(draws[place][0], item[0], " ".join(needs)))
 
         run_trials(config, name, list(places), take, make=make)
 
 
 def _timed(
-    limit: float, name: str, control: ControlParams, robot: RobotSpec, batch: int
+    limit: float, needs: list[str], name: str, control: ControlParams, robot: RobotSpec, batch: int
 ) -> Controller:
-    return Timed(make_controller(name, control, robot, batch), limit)
+    """The controller behind its limit; what it needs, and so is given, is put into `needs`."""
+    made = Timed(make_controller(name, control, robot, batch), limit)
+    needs[:] = needs_of(made)
+    return made
 
 
-def _row_of(draw: Draw, row: TrialResult) -> Episode:
+def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
     return Episode(
         *(draw.controller, draw.scene, draw.seed, draw.trial, row.outcome, row.time_s),
         limit_s=row.limit_s,
         progress_m=row.progress_m,
         overturned=row.overturned,
-        given=draw.given,
+        given=given,
         drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),
@@ -178,7 +211,6 @@ def lost(draw: Draw, reason: str) -> Episode:
     """The row of an episode whose process died, or did not end."""
     return Episode(
         *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", TIME_LIMIT),
-        given=draw.given,
         drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),

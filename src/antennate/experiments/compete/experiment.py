@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -13,12 +13,13 @@ import numpy as np
 from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
-from antennate.errors import ConfigError, ControllerError
+from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import (
     Draw,
     Episode,
+    Timed,
     all_drawn,
     lost,
     run_episodes,
@@ -31,9 +32,12 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import Workers, chunk_of, gather, workers_from
+from antennate.studies.pool import Workers, chunk_of, core_count, gather, workers_from
 from antennate.studies.work import Failure
-from antennate.types import AntennaFrame
+from antennate.types import AntennaFrame, Controller
+
+PATIENCE = 120.0
+"""Time in which a controller has to be made and to decide once, before anything is run [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ def draws(config: CompeteConfig) -> list[Draw]:
     """All that is to be run, controller by controller.
 
     Raises:
-        ConfigError: The table to check cannot be read, or a controller cannot be made.
+        ConfigError: The table to check cannot be read.
     """
     if config.check is None:
         keys = [
@@ -81,56 +85,71 @@ def draws(config: CompeteConfig) -> list[Draw]:
         keys = [(row.controller, row.scene, row.seed, row.trial) for row in rows]
         order = list(dict.fromkeys(key[0] for key in keys))
         keys.sort(key=lambda key: order.index(key[0]))
-    given = {name: "" for name, *_ in keys}
-    for name in given:
-        given[name] = " ".join(needs_of(_made(name, tunnel_config(keys[0][1], name, 0))))
     drawn = config.hidden and config.seed not in DEVELOPMENT
-    return [Draw(*key, config.decision_limit, given[key[0]], drawn) for key in keys]
-
-
-def _made(name: str, config: TunnelConfig) -> Any:
-    try:
-        return make_controller(name, config.control, config.robot)
-    except ConfigError as error:
-        raise ConfigError(f"--controllers: {error}") from error
+    return [Draw(*key, config.decision_limit, drawn) for key in keys]
 
 
 def check(config: CompeteConfig) -> None:
     """Find a bad scene or controller before anything is run; each controller decides once.
 
+    That is done in a process for each: what it does there ends or delays nobody else.
+
     Raises:
         ConfigError: There is no such scene or controller, it was made for another robot or rate,
-            or what it answers has another form.
+            what it answers has another form, or its process died or did not end.
         SceneError: A scene cannot be built, or the robot does not fit at its start.
     """
     cells = dict.fromkeys((draw.controller, draw.scene, draw.seed) for draw in draws(config))
     require_different_scenes(dict.fromkeys(scene for _, scene, _ in cells), next(iter(cells))[0])
-    started, decided = set[str](), set[tuple[str, str]]()
+    started, asked = set[str](), dict[str, list[tuple[str, int]]]()
     for name, scene, seed in cells:
-        settings = tunnel_config(scene, name, seed)
         if scene not in started:
-            check_start(settings)
+            check_start(tunnel_config(scene, name, seed))
             started.add(scene)
-        made = _made(name, settings)
-        if needs := needs_of(made):
-            instance = draw_scene(settings, scene_of(settings), 0)
-            require_route(settings.scene, instance, needs)
-        robot = (name, settings.robot.model_dump_json())
-        if robot not in decided and not needs:
-            _decide(name, made, settings)
-            decided.add(robot)
+        asked.setdefault(name, []).append((scene, seed))
+    names = list(asked)
+
+    def given_up(place: int, failure: Failure) -> str:
+        return f"{names[place]!r}: {failure.reason}"
+
+    troubles = gather(
+        _trouble_of,
+        [(name, cells, config.decision_limit) for name, cells in asked.items()],
+        Workers(min(len(names), core_count()), timeout=PATIENCE, apart=True),
+        no_step,
+        lost=given_up,
+    )
+    for trouble in filter(None, troubles):
+        raise ConfigError(f"--controllers: {trouble}")
 
 
-def _decide(name: str, made: Any, config: TunnelConfig) -> None:
+def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> str:
+    """Why a controller cannot take part in these scenes with these seeds; empty if it can."""
+    decided = set[str]()
+    try:
+        for scene, seed in cells:
+            settings = tunnel_config(scene, name, seed)
+            made = make_controller(name, settings.control, settings.robot)
+            if needs := needs_of(made):
+                instance = draw_scene(settings, scene_of(settings), 0)
+                require_route(settings.scene, instance, needs)
+            elif (robot := settings.robot.model_dump_json()) not in decided:
+                decided.add(robot)
+                _decide(Timed(made, limit), settings)
+    except ControllerError as error:
+        return f"{name!r}: {error}"
+    except (ConfigError, SceneError) as error:
+        return str(error)
+    return ""
+
+
+def _decide(made: Controller, config: TunnelConfig) -> None:
     """Let a controller decide on one reading, that of straight antennae."""
     checked = CheckedController(made, config.robot, 1)
     counts = np.full((1, 2), config.control.conditioning.counts_high)
     joints = np.zeros((1, len(config.robot.joint_names)))
-    try:
-        checked.reset(np.array([0]))
-        checked.step(AntennaFrame(np.zeros(1), counts, joints))
-    except ControllerError as error:
-        raise ConfigError(f"--controllers: {name!r}: {error}") from error
+    checked.reset(np.array([0]))
+    checked.step(AntennaFrame(np.zeros(1), counts, joints))
 
 
 def run(
