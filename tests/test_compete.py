@@ -9,7 +9,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import pytest
 
 import antennate
 from antennate.cli import BAD_INPUT, main
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.compete import experiment
 from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
@@ -32,6 +32,7 @@ from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
 from antennate.experiments.compete.experiment import run
 from antennate.experiments.compete.scenes import label, tunnel_config
 from antennate.experiments.compete.standings import standings
+from antennate.studies.formats import to_csv
 
 SHORT = "flat+time_limit=0.3"
 ENTRIES = '''
@@ -92,7 +93,7 @@ class SlowReset(Entry):
             pass
 class Dies(Entry):
     def step(self, frame):
-        os._exit(0)
+        os.kill(os.getpid(), 9)
 class Hangs(Entry):
     def __init__(self, control, robot, batch):
         time.sleep(600)
@@ -393,6 +394,22 @@ def test_a_policy_competes(tmp_path: Path) -> None:
 
 
 # seeds
+
+
+def test_a_check_does_not_go_on_with_another_file_of_a_controller(
+    tmp_path: Path, entries: Callable[[str], str]
+) -> None:
+    """Nothing but the table names that file."""
+    (tmp_path / "a.csv").write_text(to_csv(map(asdict, episodes(entries("Looks"), 2))))
+
+    def stop(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        antennate.run("compete", check="a.csv", out="again", on_step=stop)
+    (tmp_path / "entries.py").write_text(ENTRIES + "\n# another\n")
+    with pytest.raises(BadInputError, match="the file entries.py changed"):
+        antennate.run("compete", check="a.csv", out="again", resume=True)
 
 
 def test_a_hidden_seed_is_neither_public_nor_reserved() -> None:

@@ -37,16 +37,29 @@ def test_the_example_trains_and_its_policy_walks(tmp_path: Path) -> None:
     assert rows[0].outcome != "invalid"
 
 
-def test_the_exported_network_answers_as_torch_does(tmp_path: Path) -> None:
-    """Round trip with a normaliser of drawn numbers: at most 1e-5 apart."""
-    torch = pytest.importorskip("torch")
+@pytest.fixture
+def train_ppo() -> Any:
+    """The example, where its packages are."""
+    pytest.importorskip("torch")
     pytest.importorskip("onnxruntime")
-    train_ppo = example("train_ppo")
+    return example("train_ppo")
+
+
+def contract_with(interface: dict[str, Any]) -> Any:
+    """The contract of a policy of the default robot."""
     from antennate.control.policy.contract import contract_of
+
+    config = envs.AntennaEnv("flat", interface=interface).config
+    return contract_of(config.interface, config.control, config.robot)
+
+
+def test_the_exported_network_answers_as_torch_does(train_ppo: Any, tmp_path: Path) -> None:
+    """Round trip with a normaliser of drawn numbers: at most 1e-5 apart."""
+    import torch
+
     from antennate.control.policy.controller import Policy
 
-    config = envs.AntennaEnv("flat", interface=train_ppo.INTERFACE).config
-    contract = contract_of(config.interface, config.control, config.robot)
+    contract = contract_with(train_ppo.INTERFACE)
     size = len(contract.observations)
     network = train_ppo.Network(size, 4)
     network.learn_scale(torch.randn(500, size) * 3.0 + 1.0)
@@ -59,17 +72,13 @@ def test_the_exported_network_answers_as_torch_does(tmp_path: Path) -> None:
     assert np.abs(answers - wanted).max() < 1e-5
 
 
-def test_a_policy_that_was_taught_without_readings_feels_none(tmp_path: Path) -> None:
-    torch = pytest.importorskip("torch")
-    pytest.importorskip("onnxruntime")
-    train_ppo = example("train_ppo")
-    from antennate.control.policy.contract import contract_of
+def test_a_policy_that_was_taught_without_readings_feels_none(
+    train_ppo: Any, tmp_path: Path
+) -> None:
     from antennate.control.policy.controller import Policy
 
-    config = envs.AntennaEnv("flat", interface=train_ppo.INTERFACE).config
-    contract = contract_of(config.interface, config.control, config.robot)
+    contract = contract_with(train_ppo.INTERFACE)
     names = [number.name for number in contract.observations]
-    torch.manual_seed(1)
     train_ppo.save(tmp_path, train_ppo.Network(len(names), 4), contract, "none")
     policy = Policy(train_ppo.export(tmp_path))
     x = np.zeros((1, len(names)), np.float32)

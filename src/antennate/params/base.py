@@ -74,6 +74,10 @@ class Params(Strict):
         """Further ones that nothing reads because of other values, and why. They are flags."""
         return {}
 
+    def names_in_files(self) -> Iterable[str]:
+        """What a file names that this names, where a run depends on it as on a value of this."""
+        return ()
+
     @model_validator(mode="after")
     def _refuse_unread(self, info: ValidationInfo) -> Self:
         if self.shared:

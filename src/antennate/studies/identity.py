@@ -28,7 +28,7 @@ def identity(command: str, config: Params) -> dict[str, Any]:
     """What decides the numbers of a run, as JSON can hold it."""
     values = json.loads(config.model_dump_json())
     shared = environment(command, config)
-    more, module = _code_added(values), type(config).__module__
+    more, module = _code_added(_names(config)), type(config).__module__
     if not module.startswith("antennate."):  # of another package
         more |= _module(module)
     return {
@@ -41,7 +41,7 @@ def identity(command: str, config: Params) -> dict[str, Any]:
 
 def packages_used(command: str, config: Params) -> tuple[str, ...]:
     """Optional packages that its numbers depend on: of chain solver, policies, GPU, search."""
-    words, values = command.split(), [*texts(config.model_dump(mode="json"))]
+    words, values = command.split(), _names(config)
     return (
         *(("numba",) if "chain" in values else ()),
         *(("onnxruntime",) if any(text.endswith(".onnx") for text in values) else ()),
@@ -53,8 +53,13 @@ def packages_used(command: str, config: Params) -> tuple[str, ...]:
 def environment(command: str = "", config: Params | None = None) -> dict[str, Any]:
     """The part of it that driver and workers must share; without a command, of this package."""
     packages = () if config is None else packages_used(command, config)
-    named = {} if config is None else code_named(json.loads(config.model_dump_json()))
+    named = {} if config is None else code_named(_names(config))
     return {"versions": dict(versions(packages)), "code": code() | named}
+
+
+def _names(config: Params) -> list[str]:
+    """All texts of a configuration, and those of a file that it names."""
+    return [*texts(config.model_dump(mode="json")), *config.names_in_files()]
 
 
 def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:

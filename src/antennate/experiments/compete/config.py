@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
 from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.params.base import Params, number, read_file, require_different
 from antennate.sim.scenes.registry import SHIPPED, check_name
+from antennate.studies.formats import from_csv
 from antennate.studies.run_files import CONFIG
 
 DEVELOPMENT = range(600_000, 600_100)
@@ -82,6 +84,14 @@ class CompeteConfig(Params):
         """What the file says, where there is one."""
         names = ("controllers", "scenes", "trials", "seed", "hidden") if self.check else ()
         return dict.fromkeys(names, "the file of check says it")
+
+    def names_in_files(self) -> Iterable[str]:
+        """Controllers and scenes of the table that is checked."""
+        with contextlib.suppress(OSError, ValueError, BadInputError):  # told where it is read
+            lines = from_csv(Path(self.check).read_text(encoding="utf-8")) if self.check else []
+            columns = ("controller", "scene")
+            return dict.fromkeys(str(line.get(name)) for line in lines for name in columns)
+        return ()
 
     @field_validator("seed")
     @classmethod
