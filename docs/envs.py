@@ -78,7 +78,7 @@ inertial sensor is not observed.
   `overturned`, `fell` and `invalid` (the physics or the scene failed; `info["reason"]` says how).
   Truncated is `timeout`, at the scene's limit, `time_limit` or `max_episode_steps`.
 - Ends are looked for at the beginning of a control tick, as in a trial: what happens in the last
-  tick of a decision ends the episode at the first one of the next, which then moves nothing.
+  tick of a decision is noticed at the first tick of the next; the robot does not move in that one.
 - **Autoreset** of a vector: `autoreset_mode="NEXT_STEP"` (the default), `"SAME_STEP"` (with
   `final_obs` and `final_info`) or `"DISABLED"` (with `reset(options={{"reset_mask": rows}})`).
 - **`info`** holds what only the simulation knows: `head` (x, y [m], heading [rad]), `progress` and
@@ -231,8 +231,8 @@ uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
 - Input `observation`, shape (1, n); output `action`, shape (1, k). Of maneuvers it is their
   scores, of which the largest is done.
 - The normaliser is in the graph. Recurrent states are inputs and outputs that the contract names;
-  they are zeros at a start. Nothing of a policy begins before the first reading that can be used: a
-  dry run is no part of its past.
+  they are zeros at a start. A policy starts at the first reading that can be used; until then the
+  robot holds, and nothing enters its history.
 - A policy made for another robot, rate, gait, observation or action is refused before the first
   trial, with what was expected and what was found. Ids, directions and zeros of servos may differ.
 - An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind

@@ -408,7 +408,7 @@ def test_a_check_does_not_go_on_with_another_file_of_a_controller(
     with pytest.raises(KeyboardInterrupt):
         antennate.run("compete", check="a.csv", out="again", on_step=stop)
     (tmp_path / "entries.py").write_text(ENTRIES + "\n# another\n")
-    with pytest.raises(BadInputError, match="the file entries.py changed"):
+    with pytest.raises(BadInputError, match=r"the file entries\.py changed"):
         antennate.run("compete", check="a.csv", out="again", resume=True)
 
 
