@@ -157,9 +157,10 @@ last two seconds, and a memory, a gated recurrent unit of 128. It learns on its 
 `geometric` would do at 1 Hz, also after slips, in which it does something else for 1 to 4 s.
 Meanwhile it also learns to say what the teacher goes by: the turn so far, its side, how many tries,
 three times. Five times a second it chooses forward, left, right or backwards, at 1 Hz. **It lives
-by touch: of 100 U-turns it crosses 76, its twin, taught alike without readings, 11. It beats
-`timed`, which crosses 72 and is 17.5 s slower; whether it beats `timed` at its own 1 Hz, 69 and 7.4
-s slower, is not shown. `geometric` crosses 82 and is as fast.**
+by touch: of 100 U-turns it crosses 76; its twin, taught alike without readings, crosses 11. It
+beats `timed`, which crosses 72 and takes 17.5 s longer. It is not shown to beat `timed` at its own
+1 Hz, which crosses 69 and takes 7.4 s longer. `geometric` crosses 82 and is as fast. Students of
+four more training seeds cross 70 to 83.**
 
 The criterion stood before the run: `uturn`, 100 draws of seed 67957488, which was drawn by chance
 after the student had been taught. A failure counts as 100 s. A policy beats a rival where its mean
@@ -178,7 +179,7 @@ beside.
 
 ```bash
 uv sync --extra gym --extra onnx && uv pip install torch
-uv run --no-sync python examples/imitate.py --out taught --seed 21
+uv run --no-sync python examples/imitate.py --out taught --seed 21  # and 22 to 25
 uv run --no-sync python examples/imitate.py --out blind --seed 21 --readings none
 uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
     --controllers taught/policy.onnx blind/policy.onnx timed geometric
@@ -187,7 +188,7 @@ uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
     --control.escape.reverse-time 1.32 --control.escape.turn-time 1.32
 uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
     --controllers geometric --control.gait.frequency 1
-uv run python docs/science/learned.py  # the table, of the rows in learned.csv
+uv run python docs/science/learned.py  # all tables, of the rows in learned.csv
 ```
 
 - **By the criterion it beats its blind twin and `timed`**, whose gait has 0.6 Hz, but not
@@ -197,11 +198,33 @@ uv run python docs/science/learned.py  # the table, of the rows in learned.csv
   82, 0.9 s slower, and 82 at the 1 Hz of the teacher, 7.5 s faster: 17 of its 18 failures there
   leave, too. So the student is six draws short of its teacher, and the teacher needs to know its
   way back.
-- **It is one training seed**: what others of the same program reach is not known. On 48 draws of
-  the public seeds 600050 and 600051 it crossed 42 in 38 s. A student of 64 units, half the
-  decisions, and without what the teacher goes by, crossed 18 of the first 24, this one 22, the
-  teacher 22. Which of the three did it was not tried. Another, taught by 42,000 decisions of which
-  those that change counted four times, crossed 17.
+- **Five training seeds** of the same program, on the same draws. Four were taught after those draws
+  were known, but nothing of the program was changed since. The criterion for these tables, too,
+  stood before they ran. The entry stays the first, whatever the others reach: to choose the best
+  here would be to tune on these draws.
+
+  | | crossed of 100 | time [s] | less that of `timed` [s] | Wilcoxon, Holm of 4 |
+  |---|---|---|---|---|
+  | seed 22 | 79 | 48.0 | -16.3 (-24.9 to -7.5) | 0.0011 |
+  | seed 23 | 70 | 50.7 | -13.5 (-22.1 to -4.7) | 0.0027 |
+  | seed 24 | 75 | 48.0 | -16.3 (-24.9 to -8.0) | 0.0011 |
+  | seed 25 | 83 | 44.4 | -19.9 (-27.9 to -11.4) | 3.3e-05 |
+
+  All are faster than `timed`; that of seed 23 crosses two fewer, and so does not beat it by the
+  criterion. The mean time of the five in each draw, less that of a rival:
+
+  | rival | difference [s] | Wilcoxon, Holm of 4 |
+  |---|---|---|
+  | timed | -16.7 (-23.4 to -9.9) | 0.00017 |
+  | timed at 1 Hz | -6.6 (-13.8 to +1.1) | 0.23 |
+  | geometric | -0.2 (-6.6 to +6.0) | 0.75 |
+  | geometric at 1 Hz | +8.2 (+0.3 to +15.8) | 0.063 |
+
+  Of the 117 failures of all five, 98 leave by the entrance.
+- **Before it was tested**, on 48 draws of the public seeds 600050 and 600051, the first crossed 42
+  in 38 s. A student of 64 units, half the decisions, and without what the teacher goes by, crossed
+  18 of the first 24, this one 22, the teacher 22. Which of the three did it was not tried. Another,
+  taught by 42,000 decisions of which those that change counted four times, crossed 17.
 - **Former students** were tested on other draws. That of 64 units: 71 of 100 in 50.3 s, its blind
   twin 13 in 93.0 s, `timed` 74 in 63.1 s, `geometric` 86 in 44.2 s (seed 1063932532). Two without a
   memory: taught by `closed` 75 in 47.4 s, by a teacher that knows the route 67 in 54.2 s, where

@@ -36,11 +36,11 @@ def main() -> None:
     """Print the student and its rivals, then students of other training seeds, then their mean."""
     trials = read()
     own, cells, p = trials[STUDENT], [], []
-    print(f"{shown(STUDENT, own)} | | | |")
+    print(f"{shown(STUDENT, own)}| | | |")
     for name in RIVALS:
         other = trials[name]
         crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
-        cells.append(f"{shown(name, other)} | {less(own, other)} ")
+        cells.append(f"{shown(name, other)}| {less(own, other)} ")
         p.append((signed_rank(own[:, 1] - other[:, 1]), crossed.mcnemar_p))
     for row, times, successes in zip(cells, *map(holm, zip(*p, strict=True)), strict=True):
         print(f"{row}| {times:.2g} | {successes:.2g} |")
