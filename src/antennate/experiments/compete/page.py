@@ -80,8 +80,9 @@ def _pair_table(pairs: Mapping[str, Mapping[str, Any]], short: Mapping[str, str]
         names = " and ".join(short[name] for name in pair["names"])
         lines.append((names + (" (tie)" if pair["tie"] else ""), cells))
     note = (
-        "McNemar's test is exact, Wilcoxon's takes Pratt's ranks; Holm's correction over all\n"
-        "pairs. A tie is a difference that two kinds of processor make, too."
+        "A draw counts once, also over several scenes. McNemar's test is exact, Wilcoxon's takes\n"
+        "Pratt's ranks; Holm's correction over all pairs. A tie is a difference that two kinds of\n"
+        "processor make, too."
     )
     return Table("Pairs, draw by draw", heads, lines, note)
 
