@@ -48,6 +48,7 @@ def test_B19_ctrl_c_at_any_time_ends_it_in_order(tmp_path: Path, moment: float) 
     if drive.returncode == INTERRUPTED:  # before the robot was looked at
         assert "interrupted" in text
         return
+    assert (out / "result.json").exists(), (drive.returncode, text)
     result = json.loads((out / "result.json").read_text())
     assert result["ended"] == "a signal"
     assert result["torque_off"] in (None, True)
