@@ -463,8 +463,11 @@ def test_a_first_seed_is_that_of_rows_that_are_not_reset_with_it_too():
         ({"seed": "ab"}, "seed: expected a whole number, or 2 of them, found 'ab'"),
         ({"seed": np.array(4)}, "seed: expected a whole number, or 2 of them, found "),
         ({"seed": [1, 2, 3]}, "seed: expected 2 of them, found 3"),
+        ({"seed": [1, [2]]}, "seed: expected a whole number of at least 0, found "),
+        ({"seed": {1, 2}}, "seed: expected a whole number, or 2 of them, found "),
         ({"seed": [1, -2]}, "seed: expected a whole number of at least 0, found -2"),
         ({"options": {"episode_number": [1, 2, 3]}}, "episode_number: expected 2 of them, found 3"),
+        ({"options": {"episode_number": [0, [1]]}}, "episode_number: expected a whole number of"),
         ({"options": {"episode_number": 0.5}}, "episode_number: expected a whole number of at"),
     ],
 )

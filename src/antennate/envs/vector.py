@@ -168,7 +168,7 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
                 if seeds[row] is not None:
                     self._episodes.seed(row, whole("seed", seeds[row]), 0, 1)
         if episode is not None:
-            numbers = [episode] * count if np.ndim(episode) == 0 else episode
+            numbers = episode if _is_list(episode) else [episode] * count
             numbers = _each("episode_number", numbers, count)
             for row in np.flatnonzero(rows).tolist():
                 self._episodes.choose(row, whole("episode_number", numbers[row]))
@@ -181,13 +181,18 @@ def _each(name: str, values: Any, count: int) -> list[Any]:
     Raises:
         ConfigError: There is another number of them, or it is no list.
     """
-    if np.ndim(values) != 1:
+    if not _is_list(values):
         raise ConfigError(
             f"{name}: expected a whole number, or {count} of them, found {shown(values)}"
         )
     if len(values) != count:
         raise ConfigError(f"{name}: expected {count} of them, found {len(values)}")
     return list(values)
+
+
+def _is_list(values: Any) -> bool:
+    array = isinstance(values, np.ndarray) and values.ndim > 0
+    return array or (isinstance(values, Sequence) and not isinstance(values, str))
 
 
 def _generator(seed: int) -> np.random.Generator:

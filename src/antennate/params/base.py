@@ -234,11 +234,11 @@ def _own_docstrings(kind: type) -> dict[str, str]:
 def _body(kind: type) -> list[ast.stmt]:
     """The statements of a class; none where it was made without a file."""
     try:
-        found = _classes(kind.__module__).get(kind.__qualname__)
-        found = found or ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+        node = _classes(kind.__module__).get(kind.__qualname__)
+        tree = node or ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     except (OSError, TypeError):
         return []
-    return found.body if isinstance(found, ast.ClassDef) else []
+    return tree.body if isinstance(tree, ast.ClassDef) else []
 
 
 @functools.cache
