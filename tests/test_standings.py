@@ -14,7 +14,13 @@ from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.figure import drawn
 from antennate.experiments.compete.page import markdown, ordered, readme, sentence, tables
 from antennate.experiments.compete.standings import profiles, standings
-from antennate.studies.statistics import holm, sign_flips, wilson95, wilson95_by_draw
+from antennate.studies.statistics import (
+    holm,
+    mean95_by_draw,
+    sign_flips,
+    wilson95,
+    wilson95_by_draw,
+)
 
 LIMIT = 100.0
 
@@ -125,6 +131,27 @@ def test_draws_that_end_alike_tell_as_much_as_one_trial_each() -> None:
         low, high = wilson95_by_draw(others, np.full(40, 4))
         held += low <= 0.5 <= high
     assert held >= 0.92 * 400
+
+
+def test_the_mean_of_draws_of_several_values_has_the_interval_of_draws() -> None:
+    values = np.array([3.0, 5.0, 4.0, 8.0, 6.0, 7.0, 9.0])
+    alone = np.arange(7) * 2
+    for times in (1, 4):  # what a draw brings alike tells as much as once
+        mean, ends = mean95_by_draw(np.tile(values, times), np.tile(alone, times), 0.0)
+        assert mean == pytest.approx(6.0)
+        assert ends == pytest.approx((4.002105, 7.997895))  # 6 ± 2.446912 √(28 / 6 / 7)
+    assert mean95_by_draw(values, np.array([0, 0, 0, 1, 1, 2, 2]), 0.0) == (6.0, None)
+    rng = np.random.default_rng(2)
+    held = 0
+    for _ in range(400):  # a draw brings one to four values, which share half of their variance
+        counts = rng.integers(1, 5, 40)
+        draw = np.repeat(np.arange(40), counts)
+        _, ends = mean95_by_draw(
+            10.0 + rng.normal(size=40)[draw] + rng.normal(size=len(draw)), draw, 0.0
+        )
+        assert ends is not None
+        held += ends[0] <= 10.0 <= ends[1]
+    assert 0.92 * 400 <= held <= 0.98 * 400
 
 
 def test_who_is_given_more_stands_outside_the_ranking() -> None:

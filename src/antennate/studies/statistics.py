@@ -62,6 +62,24 @@ def mean95(
     return mean, (max(least, low), min(most, high))
 
 
+def mean95_by_draw(values: Floats, draw: Ints, least: float) -> tuple[float, Ends | None]:
+    """Mean of values of which some belong to one draw, and its 95 % interval over draws.
+
+    It is that of a ratio of two sums, of what the draws bring over how many they bring (Cochran
+    1977, Sampling Techniques, section 6.4), by Student's t.
+
+    Args:
+        values: The values, shape (n,).
+        draw: Number of the draw of each, shape (n,).
+        least: As for `mean95`.
+    """
+    counts = np.bincount(draw)
+    counts = counts[counts > 0]
+    mean, _ = mean95(values)
+    excess = np.bincount(draw, weights=values - mean)[np.unique(draw)]
+    return mean, mean95(mean + excess * len(counts) / max(len(values), 1), least)[1]
+
+
 def difference95(first: Floats, second: Floats, limit: float) -> tuple[float, Ends | None]:
     """Mean difference of restricted times trial by trial and its 95 % interval, see `joined`.
 

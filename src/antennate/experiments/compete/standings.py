@@ -126,7 +126,7 @@ def _controller(rows: Rows) -> dict[str, Any]:
     times = _by_draw(draw, np.array(restricted(rows)))
     share, share_ends = statistics.mean95(times, 0.0, 1.0, restricted=True)
     speeds = [row.progress_m / row.time_s for row in rows if row.outcome == "success"]
-    speed, ends = statistics.mean95(np.array(speeds), 0.0)
+    speed, ends = statistics.mean95_by_draw(np.array(speeds), draw[won], 0.0)
     given = next((row.given for row in rows if row.given), "")
     return {
         "given": given,
