@@ -78,8 +78,8 @@ def act(name: str, control: ControlParams, robot: RobotSpec) -> None:
 def press(controller: Controller, control: ControlParams) -> None:
     """Press a controller, with these numbers, for longer than any of its times."""
     controller.reset(np.zeros(1, dtype=np.int64))
-    for tick in range(round(60.0 / control.period)):
-        pressed = 1.0 < tick * control.period < 35.0
+    for tick in range(round(40.0 / control.period)):
+        pressed = 1.0 < tick * control.period < 30.0
         counts = np.array([[1400.0 if pressed else 1870.0, 1410.0 if pressed else 1870.0]])
         controller.step(at_rest(tick * control.period, counts))
 

@@ -15,7 +15,7 @@ MANY = 10
 
 def student95(freedom: int) -> float:
     """Half width of a 95 % interval in standard errors, by Student's t of so many degrees."""
-    from scipy.special import stdtrit  # scipy.stats takes a second longer
+    from scipy.special import stdtrit  # scipy.stats takes half a second longer
 
     return float(stdtrit(freedom, 0.975))
 

@@ -231,20 +231,12 @@ def false_climbs(rows: Sequence[ClimbRow]) -> dict[str, Any]:
     number, time, way = (
         sum(getattr(row, name) for row in rows) for name in ("climbs", "time_s", "walked_m")
     )
-    low, high = poisson95(number)
+    low, high = statistics.poisson95(number)
     rates: dict[str, Any] = {"false_climbs": number, "time_s": time, "way_m": way}
     for name, amount in (("per_1000_s", time / 1000.0), ("per_m", way)):
         rates[name] = number / amount if amount else None
         rates[f"{name}_95"] = (low / amount, high / amount) if amount else None
     return rates
-
-
-def poisson95(number: int) -> tuple[float, float]:
-    """Exact 95 % interval of the mean of a Poisson count: Garwood (1936), Biometrika 28, 437."""
-    from scipy import stats  # takes long; only where it is needed
-
-    low = 0.0 if number == 0 else 0.5 * float(stats.chi2.ppf(0.025, 2 * number))
-    return low, 0.5 * float(stats.chi2.ppf(0.975, 2 * number + 2))
 
 
 def step_tables(result: Mapping[str, Any]) -> list[Table]:

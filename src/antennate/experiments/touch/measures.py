@@ -197,13 +197,10 @@ def _within(
 
 
 def _rate(name: str, count: int, metres: float) -> dict[str, Any]:
-    """Counts per metre with their exact interval (Garwood 1936, Biometrika 28, 437-442)."""
-    from scipy.special import gammaincinv  # scipy.stats takes a second longer
-
+    """Counts per metre with their exact interval."""
     if metres == 0.0:
         return {name: None, f"{name}_95": None}
-    low = float(gammaincinv(count, 0.025)) if count else 0.0
-    high = float(gammaincinv(count + 1, 0.975))
+    low, high = statistics.poisson95(count)
     return {name: count / metres, f"{name}_95": (low / metres, high / metres)}
 
 
