@@ -24,7 +24,7 @@ on the twin and behind the supervisor of the real robot.
 
 ```bash
 uv sync --extra gym --extra onnx
-uv pip install torch
+uv pip install torch  # 6 GB with the libraries for GPUs; pytorch.org says how to leave them out
 uv run --no-sync python examples/imitate.py --out my_policy
 uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --scene uturn
 ```
@@ -40,7 +40,13 @@ uv run --extra onnx antennate tunnel --scene uturn \\
     --controllers timed entries/apprentice/policy.onnx
 ```
 
-`examples/train_ppo.py` learns from the reward instead, by PPO: `--workers 8` uses eight cores.
+`examples/train_ppo.py` learns from the reward instead, by PPO, in 20 minutes on one core;
+`--minutes 1` is to see it run, and `--workers 8` uses eight cores:
+
+```bash
+uv run --no-sync python examples/train_ppo.py --out other_policy
+```
+
 Either is one file on PyTorch, to be read and changed.
 
 ## Use one
@@ -271,6 +277,29 @@ from antennate.control.policy.writer import add_contract
 config = env.unwrapped.config
 contract = contract_of(config.interface, config.control, config.robot, about="my PPO, seed 3")
 add_contract("mine.onnx", contract)
+```
+
+Of a model of Stable-Baselines3 (PPO or A2C with `MlpPolicy`) this writes such a file, with the
+scores of the maneuvers, or the means of continuous actions:
+
+```python
+import torch
+
+
+class Actor(torch.nn.Module):
+    def __init__(self, policy):
+        super().__init__()
+        self.policy = policy
+
+    def forward(self, observation):
+        return self.policy.action_net(self.policy.mlp_extractor.forward_actor(observation))
+
+
+given = torch.zeros(1, *env.observation_space.shape)
+actor = Actor(model.policy.cpu())
+torch.onnx.export(
+    actor, given, "mine.onnx", input_names=["observation"], output_names=["action"]
+)
 ```
 
 ## What is measured

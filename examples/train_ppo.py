@@ -165,7 +165,7 @@ def update(network: Network, optimiser, rollouts: list[dict[str, np.ndarray]]) -
             optimiser.step()
 
 
-def save(folder: Path, network: Network, contract: Contract, readings: str = "felt") -> None:
+def save(folder: Path, network: Network, contract: Contract, readings: str = "own") -> None:
     """Weights and contract, of which `export` makes the policy; taught by none, it feels none."""
     state = {name: value.numpy().copy() for name, value in network.state_dict().items()}
     if readings == "none":
@@ -188,7 +188,7 @@ def train(options: argparse.Namespace) -> None:
     torch.manual_seed(options.seed)
     folder: Path = options.out
     folder.mkdir(parents=True, exist_ok=True)
-    readings = {"felt": "own", "none": "none"}[options.readings]
+    readings = options.readings
     probe = make_envs(options.scene[0], readings, 1).unwrapped
     contract = contract_of(probe.config.interface, probe.config.control, probe.config.robot)
     network = Network(probe.single_observation_space.shape[0], probe.single_action_space.n)
@@ -229,14 +229,14 @@ def train(options: argparse.Namespace) -> None:
             file.flush()
             if minutes - saved > 1.0:
                 saved = minutes
-                save(folder, network, contract, options.readings)
+                save(folder, network, contract, readings)
                 print(
                     f"{minutes:.1f} min: {decisions} decisions, of the last {len(recent)} "
                     f"episodes {100 * success:.0f} % out, {times:.1f} s on average"
                 )
     for pipe in pipes:
         pipe.send(None)
-    save(folder, network, contract, options.readings)
+    save(folder, network, contract, readings)
     (folder / "options.json").write_text(json.dumps(vars(options), default=str), "utf-8")
 
 
@@ -250,7 +250,9 @@ def main() -> None:
         choices=[*SCENES],
         help="scenes, one for each worker in turn",
     )
-    parser.add_argument("--readings", default="felt", choices=["felt", "none"])
+    parser.add_argument(
+        "--readings", default="own", choices=["own", "none"], help="what it feels while it learns"
+    )
     parser.add_argument("--workers", type=int, default=1, help="processes that step robots")
     parser.add_argument("--minutes", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=1)
@@ -264,6 +266,10 @@ def main() -> None:
             f"expected a worker for each of {len(options.scene)} scenes, found "
             f"--workers {options.workers}"
         )
+    needed = [options.begin] if options.begin else [options.out] if options.export else []
+    for folder in needed:
+        if not (folder / "weights.npz").is_file():
+            parser.error(f"expected saved weights, found no {folder / 'weights.npz'}")
     if not options.export:
         train(options)
     try:

@@ -18,7 +18,7 @@ import pytest
 
 import antennate
 from antennate.cli import BAD_INPUT, main
-from antennate.errors import BadInputError, ConfigError
+from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.compete import experiment
 from antennate.experiments.compete.checking import compared, read_rows, refused
 from antennate.experiments.compete.config import (
@@ -33,6 +33,7 @@ from antennate.experiments.compete.experiment import run
 from antennate.experiments.compete.scenes import label, tunnel_config
 from antennate.experiments.compete.standings import standings
 from antennate.studies.formats import to_csv
+from antennate.studies.run_directory import RunDirectory
 
 SHORT = "flat+time_limit=0.3"
 ENTRIES = '''
@@ -109,6 +110,13 @@ class Curious(Entry):
     knows, needs = ("map",), ()
     def know(self, knowledge):
         raise RuntimeError("it was told")
+class Breaks(Entry):
+    """What it changes fails outside of its own decisions."""
+    def fault(self, command):
+        np.clip = None
+class Ends(Entry):
+    def fault(self, command):
+        os.kill(os.getpid(), 9)
 class Leaves(Entry):
     def fault(self, command):
         builtins.left_behind = True
@@ -357,6 +365,38 @@ def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
+def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
+    tmp_path: Path, entries: Callable[[str], str]
+) -> None:
+    names = [entries("Breaks"), entries("Ends"), "open"]
+    words = ["--controllers", *names, "--scenes", SHORT, "--trials", "2", "--no-figures"]
+    assert main(["compete", *words, "--workers", "1", "--out", "run"]) == 0
+    rows = read_rows(tmp_path / "run" / "trials.csv")
+    assert [row.outcome for row in rows] == 4 * ["invalid"] + 2 * ["timeout"]
+    assert {row.limit_s for row in rows} == {0.3}
+    assert {row.time_s for row in rows} == {0.3}
+    assert "NoneType" in rows[0].reason
+
+
+def test_figures_that_did_not_fit_are_drawn_by_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compete", "--controllers", "open", "--scenes", SHORT, "--trials", "1"]
+    words += ["--workers", "1", "--out", str(tmp_path / "run")]
+    with monkeypatch.context() as patch:
+
+        def full(*_: object) -> None:
+            raise OutputError("No space left on device")
+
+        patch.setattr(RunDirectory, "write_figures", full)
+        assert main(words) == BAD_INPUT
+    table = (tmp_path / "run" / "trials.csv").read_bytes()
+    assert main([*words, "--resume"]) == 0
+    assert (tmp_path / "run" / "figures" / "ranks.png").exists()
+    assert (tmp_path / "run" / "trials.csv").read_bytes() == table
+    assert not (tmp_path / "run" / "trials.store.jsonl").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -486,8 +526,20 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     ("text", "why"),
     [
         ("", "expected a table of trials, found no row"),
-        ("controller,scene\nopen,flat\n", "line 2: expected outcome, found none"),
-        ("controller,scene,outcome\nopen,flat,success\n", "line 2: "),
+        ("controller,scene\nopen,flat\n", "with the columns controller, .*, found none named seed"),
+        ("controller;scene\nopen;flat\n", "found none named controller"),
+        (
+            "controller,scene,seed,trial,outcome,time_s,engin\nopen,flat,1,0,timeout,1.0,3\n",
+            r"expected a known column, found 'engin' \(did you mean engine\?\)",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,sucess,1.0\n",
+            "line 2: outcome: expected one of success, .*, found 'sucess'",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,1.0\n",
+            "line 3: expected each draw once a controller, found that of line 2 again",
+        ),
         ("\0\n", "expected a table of trials"),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
@@ -512,6 +564,15 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
     with pytest.raises(ConfigError, match=why) as error:
         read_rows(tmp_path / "a.csv")
     assert "\n" not in str(error.value)
+
+
+def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: Path) -> None:
+    """Spreadsheets write such a mark."""
+    text = "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,timeout,1.0\n"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8-sig")
+    assert read_rows(tmp_path / "a.csv")[0].controller == "open"
+    with pytest.raises(ConfigError, match=r"found a folder; name its trials\.csv"):
+        read_rows(tmp_path)
 
 
 HERE = Episode("open", "flat", 1, 0, "success", 20.0, progress_m=2.0, engine="e", processor="p")

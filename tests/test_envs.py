@@ -469,6 +469,11 @@ def test_a_first_seed_is_that_of_rows_that_are_not_reset_with_it_too():
         ({"options": {"episode_number": [1, 2, 3]}}, "episode_number: expected 2 of them, found 3"),
         ({"options": {"episode_number": [0, [1]]}}, "episode_number: expected a whole number of"),
         ({"options": {"episode_number": 0.5}}, "episode_number: expected a whole number of at"),
+        (
+            {"options": {"mask": [True, True]}},
+            "expected reset_mask or episode_number, found 'mask'",
+        ),
+        ({"options": 5}, "options: expected values by name, found 5"),
     ],
 )
 def test_what_is_no_seed_or_episode_is_refused(words, said):
@@ -478,10 +483,27 @@ def test_what_is_no_seed_or_episode_is_refused(words, said):
 
 
 @pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"episode": 3}, "options: expected episode_number, found 'episode'"),
+        ("ab", "options: expected values by name, found 'ab'"),
+    ],
+)
+def test_an_unknown_option_of_a_reset_is_refused(options, said):
+    env = envs.AntennaEnv(scene="flat")
+    with pytest.raises(ConfigError, match=said):
+        env.reset(seed=1, options=options)
+
+
+@pytest.mark.parametrize(
     ("words", "said"),
     [
         ({"num_envs": 2.5}, "num_envs: expected a whole number of at least 0, found 2.5"),
         ({"action": "gait", "interface": None}, "interface: expected values by name, found None"),
+        (
+            {"action": "gait", "interface": {"action": "joints"}},
+            "action: expected one, found 'gait' and in interface 'joints'",
+        ),
     ],
 )
 def test_a_vector_of_no_whole_number_of_robots_or_no_interface_is_refused(words, said):

@@ -69,6 +69,30 @@ def test_a_controller_is_found_by_module_and_by_file(
     assert isinstance(make_controller("antennate.control.controllers:paper"), RuleController)
 
 
+@pytest.mark.parametrize("imported", ["brain", "beyond"])
+def test_two_files_that_import_other_modules_of_one_name_are_refused(
+    tmp_path: Path, imported: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Python would give the first module to both, and both would walk alike."""
+    for name, kind in (("one", "open_loop"), ("two", "paper")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{imported}.py").write_text(
+            f"from antennate.control.controllers import {kind} as Mine\n"
+        )
+        (tmp_path / name / "unused.py").write_text("")
+        (tmp_path / name / "ctl.py").write_text(
+            "from antennate.control.registry import make_controller\n"
+            f"def C(control, robot, batch):\n    from {imported} import Mine\n"
+            "    return Mine(control, robot, batch)\n"
+        )
+    names = [str(tmp_path / name / "ctl.py:C") for name in ("one", "two")]
+    words = ["--trials", "1", "--time-limit", "0.1", "--out", str(tmp_path / "run")]
+    assert main(["tunnel", "--controllers", *names, *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"found {imported} beside both; rename one" in line
+    sys.modules.pop(imported, None)
+
+
 def test_an_installed_package_can_bring_a_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import resource
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,10 +21,10 @@ from antennate.cli import main
 from antennate.control.policy.contract import Contract, contract_of, require_match
 from antennate.control.policy.controller import Policy
 from antennate.control.policy.interface import PolicyInterface, Quantity, actions, observations
-from antennate.control.policy.writer import write_policy
+from antennate.control.policy.writer import add_contract, write_policy
 from antennate.control.readers import UNREAD_BY_POLICIES
 from antennate.control.registry import make_controller
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.hardware.config import DriveConfig
@@ -323,6 +325,54 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
         assert main(["tunnel", *argv]) == 2
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert words in line
+
+
+def test_a_contract_is_put_into_sound_files_alone(tmp_path: Path) -> None:
+    path = constant(tmp_path / "good.onnx", FORWARD)
+    model = onnx.load(str(path))
+    real = onnx.TensorProto.FLOAT
+    model.graph.output.append(onnx.helper.make_tensor_value_info("value", real, [1, 4]))
+    (tmp_path / "two.onnx").write_bytes(model.SerializeToString())
+    (tmp_path / "text.onnx").write_text("no model")
+    for name, words in {
+        "two": "expected the outputs action, found action, value",
+        "text": "expected an ONNX model",
+        "none": "found no file|No such file",
+    }.items():
+        with pytest.raises(BadInputError, match=words):
+            add_contract(tmp_path / f"{name}.onnx", contract())
+    before = path.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:  # a disk that is full
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
+        with pytest.raises(OutputError):
+            add_contract(path, contract())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
+    assert path.read_bytes() == before
+
+
+def test_a_policy_of_other_numbers_is_refused_by_what_it_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = constant(tmp_path / "good.onnx", FORWARD)
+    model = onnx.load(str(path))
+    model.graph.input[0].type.tensor_type.elem_type = onnx.TensorProto.DOUBLE
+    cast = onnx.helper.make_node("Cast", ["observation"], ["real"], to=onnx.TensorProto.FLOAT)
+    for node in model.graph.node:
+        for i, name in enumerate(node.input):
+            if name == "observation":
+                node.input[i] = "real"
+    model.graph.node.insert(0, cast)
+    path.write_bytes(model.SerializeToString())
+    argv = ["--controllers", str(path), "--out", str(tmp_path / "run")]
+    assert main(["tunnel", *argv]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert f"{path}: expected a policy that takes observation of float32" in line
+    assert "found one that takes observation tensor(double)" in line
+    assert line.count("good.onnx") == 1
 
 
 def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

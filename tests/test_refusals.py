@@ -85,7 +85,7 @@ tunnel --video-view below --video :: --video-view :: expected one of above or si
 bench wall --video-view side --video :: expected a known flag
 log plot no.mcap --video-view side :: expected `film` beside it, found plot
 tunnel --video-trial 0 --video --no-video :: beside it, found none
-tunnel --slurm timeout_min=1 --engine dask :: beside it, found none
+tunnel --slurm timeout_min=1 --engine dask :: beside it, found --engine dask
 tunnel --slurm timeout_min=1 --engine=local :: beside it, found none
 calibrate --rate 50 :: rate
 calibrate --rate 50 --recording x --columns.time-unit ms :: expected none beside columns.time_unit
@@ -233,7 +233,7 @@ robot --export mjcf --scene tunnel --robot.width 0.5 :: at least robot.width, 0.
 robot --export mjcf --scene tunnel --seed -4 :: --seed: expected a number of at least 0, found -4
 robot --export mjcf --seed 4 :: --seed: expected --scene beside it, found none
 robot --export mjcf --gait trot :: --gait: expected serpenoid, :: found 'trot'
-robot --export urdf --scene tunnel :: --scene: expected --export mjcf beside it, found none
+robot --export urdf --scene tunnel :: --scene: expected --export mjcf beside it, found --export urdf
 robot --export urdf --robot hexpod :: --robot: expected scuttle, :: (did you mean hexapod?), found
 robot --scene tunnel :: --scene: expected --export mjcf beside it, found none
 robot one two :: expected flags only, found 'two'

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.util
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -137,7 +138,7 @@ class Registry(Generic[T]):
             return make(name)
         try:
             value = self._load(name)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, ConfigError):
             raise
         except BaseException as error:
             ours = isinstance(error, LookupError | FileNotFoundError) and str(error)[:3] == "no "
@@ -164,6 +165,42 @@ class Registry(Generic[T]):
         return getattr(module, attribute)
 
 
+_FILES: list[Path] = []
+"""Files that were imported as a user's code."""
+
+
+def _require_own_modules(path: Path) -> None:
+    """Refuse a file that would be given a module that lies beside another file.
+
+    Python knows a module by its name alone: of two with one name the first is imported for both.
+
+    Raises:
+        ConfigError: It imports such a module, or the other file does.
+    """
+    own, code = _modules_beside(path), _code_of(path)
+    for other in _FILES:
+        if other.parent == path.parent or not other.exists():
+            continue
+        for name in sorted(own & _modules_beside(other)):
+            imported = re.compile(rf"^\s*(?:from|import)\b.*\b{name}\b", re.MULTILINE)
+            if name in sys.modules or imported.search(code) or imported.search(_code_of(other)):
+                raise ConfigError(
+                    f"{path}: expected modules of other names than those beside {other}, found "
+                    f"{name} beside both; rename one, or run each by itself"
+                )
+
+
+def _modules_beside(path: Path) -> set[str]:
+    """Names of the modules and packages in the folder of a file."""
+    beside = [each for each in path.parent.iterdir() if each != path]
+    files = {each.stem for each in beside if each.suffix == ".py"}
+    return files | {each.name for each in beside if (each / "__init__.py").exists()}
+
+
+def _code_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
 def _module_of(path: Path) -> ModuleType:
     """Import a file once a process; its folder comes last in the search for modules."""
     path = path.resolve()
@@ -175,8 +212,10 @@ def _module_of(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ImportError(f"no Python file: {path}")
+    _require_own_modules(path)
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
+    _FILES.append(path)
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)

@@ -184,7 +184,9 @@ def carry_out(
         except KeyboardInterrupt:
             if shards is None and run.store is not None and run.store.holds_trials:
                 again = _go_on(experiment.name, argv, run.path)
-                sys.stderr.write(f"to go on: {again}\n")
+                sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
+            elif experiment.on_workers:
+                sys.stderr.write("nothing had ended, so nothing is kept\n")
             raise
         except (LogError, OutputError, WorkerError):
             if shards:

@@ -136,14 +136,18 @@ class Option:
         Raises:
             ConfigError: None of them is there.
         """
+        others = []
         for need in self.needs:
             flag, _, begin = need.partition(" ")
-            value = getattr(options, flag.removeprefix("--").replace("-", "_"))
+            name = flag.removeprefix("--").replace("-", "_")
+            value = getattr(options, name)
             if value and str(value).startswith(begin):
                 return
+            other = begin and value != fields_of(type(options))[name].default
+            others += [f"{flag} {value}"] if other else []
         if self.needs:
-            needed = " or ".join(self.needs)
-            raise ConfigError(f"{self.flag}: expected {needed} beside it, found none")
+            needed, found = " or ".join(self.needs), " and ".join(others) or "none"
+            raise ConfigError(f"{self.flag}: expected {needed} beside it, found {found}")
 
 
 def flag_of(path: Sequence[int | str]) -> str:

@@ -5,7 +5,17 @@ Importing this registers them; see docs/envs.md.
 
 from __future__ import annotations
 
-from gymnasium.envs import registration
+from antennate.errors import MissingPackageError
+
+try:
+    from gymnasium.envs import registration
+except ImportError:
+    from antennate.messages import extra
+
+    raise MissingPackageError(
+        "antennate.envs: expected the package gymnasium, found none; install it with "
+        f"{extra('gym')}"
+    ) from None
 
 from antennate.envs.config import EnvConfig, Randomisation
 from antennate.envs.single import AntennaEnv

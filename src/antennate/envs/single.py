@@ -12,7 +12,13 @@ from antennate.envs.episodes import Episodes
 from antennate.envs.reward import TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
 from antennate.envs.truth import OUTCOMES, Truth
-from antennate.envs.vector import LARGEST_SEED, config_of, require_no_pictures, whole
+from antennate.envs.vector import (
+    LARGEST_SEED,
+    config_of,
+    known_options,
+    require_no_pictures,
+    whole,
+)
 from antennate.sim.world import World
 
 
@@ -54,15 +60,16 @@ class AntennaEnv(Env[Any, Any]):
         """Begin an episode.
 
         Raises:
-            ConfigError: The seed or the episode cannot be used.
+            ConfigError: The seed, an option or the episode cannot be used.
         """
+        chosen = known_options(options, ("episode_number",))
         super().reset(seed=None if seed is None else whole("seed", seed))
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**32, LARGEST_SEED))
         if seed is not None:
             self._episodes.seed(0, int(seed), 0, 1)
         self._seeded = True
-        if (episode := (options or {}).get("episode_number")) is not None:
+        if (episode := chosen.get("episode_number")) is not None:
             self._episodes.choose(0, whole("episode_number", episode))
         observation, truth = self._episodes.begin(self._every)
         return observation[0], _info(truth)

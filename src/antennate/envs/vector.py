@@ -36,9 +36,14 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
     if "action" in values:
         action, interface = values.pop("action"), values.get("interface", {})
         if isinstance(interface, PolicyInterface):
-            interface = interface.model_dump()
+            interface = interface.model_dump(exclude_unset=True)
         if not isinstance(interface, Mapping):
             raise ConfigError(f"interface: expected values by name, found {shown(interface)}")
+        if interface.get("action", action) != action:
+            raise ConfigError(
+                f"action: expected one, found {shown(action)} and in interface "
+                f"{shown(interface['action'])}"
+            )
         values["interface"] = {**interface, "action": action}
     return from_values(EnvConfig, {"scene": scene, **values})
 
@@ -108,11 +113,11 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         """Begin episodes in all rows, or in those of `options["reset_mask"]`, shape (B,).
 
         Raises:
-            ConfigError: A seed, a mask or an episode cannot be used.
+            ConfigError: A seed, an option, a mask or an episode cannot be used.
         """
-        options = options or {}
-        rows = _mask(options.get("reset_mask"), self.num_envs)
-        self._seed(seed, options.get("episode_number"), rows)
+        chosen = known_options(options, ("reset_mask", "episode_number"))
+        rows = _mask(chosen.get("reset_mask"), self.num_envs)
+        self._seed(seed, chosen.get("episode_number"), rows)
         observation, truth = self._episodes.begin(rows)
         self._over &= ~rows
         self._observation = np.where(rows[:, None], observation, self._observation)
@@ -197,6 +202,23 @@ def _is_list(values: Any) -> bool:
 
 def _generator(seed: int) -> np.random.Generator:
     return np.random.default_rng(whole("seed", seed))
+
+
+def known_options(options: Mapping[str, Any] | None, names: Sequence[str]) -> Mapping[str, Any]:
+    """The options of a reset.
+
+    Raises:
+        ConfigError: They are not given by name, or one is not of these names.
+    """
+    if not isinstance(options, Mapping | None):
+        raise ConfigError(f"options: expected values by name, found {shown(options)}")
+    for name in options or {}:
+        if name not in names:
+            raise ConfigError(
+                f"options: expected {' or '.join(names)}, found {shown(name)}"
+                f"{nearest(str(name), names)}"
+            )
+    return options or {}
 
 
 def whole(name: str, value: Any) -> int:

@@ -78,6 +78,7 @@ class RunDirectory:
         self._partial = taken.partial
         self._kept = taken.partial is None
         self._described: dict[str, str] = {}
+        self._spent: Path | None = None
         self._listed = set(listed(taken.path) or ())
 
     @classmethod
@@ -247,8 +248,9 @@ class RunDirectory:
             self.write(COMMAND, with_end(text))
         self.keep()
         self._drop_partial()
-        if not result.get("interrupted"):
-            self._close_store(remove=not self.keeps_store)
+        if not result.get("interrupted") and self.store is not None:
+            self._spent = None if self.keeps_store else self.store.path
+            self._close_store()
 
     def keep(self) -> None:
         """Let it stay when the run ends."""
@@ -345,7 +347,9 @@ class RunDirectory:
     def __enter__(self) -> RunDirectory:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None and self._spent is not None:  # else what is missing can be written again
+            self._spent.unlink(missing_ok=True)
         stays = self._kept or (self.store is not None and self.store.holds_trials)
         self._close_store(remove=not stays)
         if stays:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,25 @@ LARGEST = 50_000_000
 """Most bytes of a policy file."""
 OBSERVATION, ACTION = "observation", "action"
 """Names of the input and the output of a policy."""
+
+
+def require_names(
+    place: str, contract: Contract, inputs: Sequence[str], outputs: Sequence[str]
+) -> None:
+    """Check what a network takes and answers.
+
+    Raises:
+        ConfigError: An input or output has another name, is missing, or is one too many.
+    """
+    states = contract.states
+    for kind, wanted, names in (
+        ("inputs", [OBSERVATION, *(s.input for s in states)], inputs),
+        ("outputs", [ACTION, *(s.output for s in states)], outputs),
+    ):
+        if sorted(names) != sorted(wanted):
+            raise ConfigError(
+                f"{place}: expected the {kind} {', '.join(wanted)}, found {', '.join(names)}"
+            )
 
 
 class Policy:
@@ -58,8 +77,10 @@ class Policy:
         try:
             self._session: Any = ort.InferenceSession(data, options, ["CPUExecutionProvider"])
         except Exception as error:
+            apart = "; weights that lie in another file are joined by add_contract"
             raise ConfigError(
                 f"{path}: expected an ONNX model, found {in_one_line(error)}"
+                f"{apart if 'model_path' in str(error) else ''}"
             ) from error
         text = self._session.get_modelmeta().custom_metadata_map.get(KEY)
         if text is None:
@@ -67,26 +88,24 @@ class Policy:
                 f"{path}: expected a policy with a contract in its metadata {KEY!r}, found none"
             )
         self.contract: Contract = read_contract(text, str(path))
-        self._require_names(path)
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        require_names(
+            str(path), self.contract, [node.name for node in inputs], [n.name for n in outputs]
+        )
         size = len(self.contract.observations)
-        answer, _ = self.answer(np.zeros((1, size), np.float32), self.start())
+        try:
+            answer, _ = self.answer(np.zeros((1, size), np.float32), self.start())
+        except ControllerError as error:
+            found = ", ".join(f"{node.name} {node.type} {node.shape}" for node in inputs)
+            raise ConfigError(
+                f"{path}: expected a policy that takes {OBSERVATION} of float32 and shape "
+                f"(1, {size}), found one that takes {found}: {error}"
+            ) from None
         if answer.shape != (1, len(self.contract.actions)):
             raise ConfigError(
                 f"{path}: expected {ACTION} of shape (1, {len(self.contract.actions)}), found "
                 f"{answer.shape}"
             )
-
-    def _require_names(self, path: Path) -> None:
-        states = self.contract.states
-        for kind, wanted, nodes in (
-            ("inputs", [OBSERVATION, *(s.input for s in states)], self._session.get_inputs()),
-            ("outputs", [ACTION, *(s.output for s in states)], self._session.get_outputs()),
-        ):
-            names = [node.name for node in nodes]
-            if sorted(names) != sorted(wanted):
-                raise ConfigError(
-                    f"{path}: expected the {kind} {', '.join(wanted)}, found {', '.join(names)}"
-                )
 
     def start(self) -> dict[str, Vector]:
         """The recurrent states of a robot that begins, by input."""

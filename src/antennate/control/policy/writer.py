@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from antennate.control.policy.contract import KEY, Contract, State
-from antennate.control.policy.controller import ACTION, OBSERVATION
-from antennate.errors import MissingPackageError
+from antennate.control.policy.controller import ACTION, LARGEST, OBSERVATION, require_names
+from antennate.errors import BadInputError, MissingPackageError, in_one_line
+from antennate.files import read_limited, write_whole
 from antennate.messages import extra
 
 OPSET = 17
@@ -125,12 +126,30 @@ def _remembering(helper: Any, state: State) -> list[Any]:
 def add_contract(path: Path | str, contract: Contract) -> Path:
     """Put a contract into an ONNX file that another exporter wrote; the path.
 
-    Its inputs must be `observation` and those of the contract's states, its first output `action`.
+    Its inputs must be `observation` and those of the contract's states, its outputs `action` and
+    those of the states. Weights that lie in files beside it are joined with it.
 
     Raises:
+        BadInputError: It cannot be read, is no ONNX model, or has other inputs or outputs.
         MissingPackageError: The package onnx is not installed.
+        OutputError: It cannot be written; the file is as it was.
     """
-    return _save(_onnx().load(str(path)), contract, Path(path))
+    onnx, path = _onnx(), Path(path)
+    read_limited(path, LARGEST)
+    try:
+        model = onnx.load(str(path))
+    except Exception as error:  # of protobuf, which the package onnx brings
+        raise BadInputError(
+            f"{path}: expected an ONNX model, found {in_one_line(error)}"
+        ) from error
+    weights = {tensor.name for tensor in model.graph.initializer}
+    require_names(
+        str(path),
+        contract,
+        [node.name for node in model.graph.input if node.name not in weights],
+        [node.name for node in model.graph.output],
+    )
+    return _save(model, contract, path)
 
 
 def _save(model: Any, contract: Contract, path: Path) -> Path:
@@ -141,7 +160,7 @@ def _save(model: Any, contract: Contract, path: Path) -> Path:
     prop.key, prop.value = KEY, contract.model_dump_json()
     onnx.checker.check_model(model)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(model.SerializeToString())
+    write_whole(path, model.SerializeToString(), overwrite=True)
     return path
 
 

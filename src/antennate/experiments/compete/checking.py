@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,8 @@ from pydantic import TypeAdapter, ValidationError
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.compete.config import require_free
 from antennate.experiments.compete.episodes import Episode, restricted
-from antennate.files import read_limited
+from antennate.files import decoded, read_limited
+from antennate.messages import nearest
 from antennate.params.faults import describe
 from antennate.studies.formats import from_csv
 
@@ -34,25 +35,56 @@ def read_rows(path: Path) -> list[Episode]:
     Raises:
         ConfigError: It cannot be read, is no such table, or holds a row twice.
     """
+    if path.is_dir():
+        raise ConfigError(
+            f"{path}: expected a table of trials, found a folder; name its trials.csv"
+        )
     data = read_limited(path, LARGEST, ConfigError)
     try:
-        lines = from_csv(data.decode())
-    except (UnicodeDecodeError, ValueError, BadInputError) as error:
+        lines = from_csv(decoded(path, data, ConfigError))
+    except ConfigError:
+        raise
+    except (ValueError, BadInputError) as error:
         raise ConfigError(f"{path}: expected a table of trials, found {error}") from None
-    rows = [_row(path, number, line) for number, line in enumerate(lines, start=2)]
-    if not rows:
-        raise ConfigError(f"{path}: expected a table of trials, found none")
-    keys = [(row.controller, row.scene, row.seed, row.trial) for row in rows]
-    if len(set(keys)) < len(keys):
-        raise ConfigError(f"{path}: expected each draw once a controller, found one twice")
+    _require_columns(path, list(lines[0]))
+    rows, places = [], dict[tuple[str, str, int, int], int]()
+    for number, line in enumerate(lines, start=2):
+        row = _row(path, number, line)
+        key = (row.controller, row.scene, row.seed, row.trial)
+        if (first := places.setdefault(key, number)) != number:
+            raise ConfigError(
+                f"{path}: line {number}: expected each draw once a controller, found that of line "
+                f"{first} again"
+            )
+        rows.append(row)
     return rows
+
+
+def _require_columns(path: Path, names: Sequence[str]) -> None:
+    """Check the head of a table.
+
+    Raises:
+        ConfigError: A column is missing, or is none of `antennate compete`.
+    """
+    known = [field.name for field in fields(Episode)]
+    needed = [field.name for field in fields(Episode) if field.default is MISSING]
+    for name in needed:
+        if name not in names:
+            raise ConfigError(
+                f"{path}: expected a table of `antennate compete`, with the columns "
+                f"{', '.join(needed)}, found none named {name}"
+            )
+    for name in names:
+        if name not in known:
+            raise ConfigError(
+                f"{path}: expected a known column, found {name!r}{nearest(name, known)}"
+            )
 
 
 def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
     texts = {name: "" if line.get(name) is None else str(line[name]) for name in _TEXTS}
-    known = {field.name for field in fields(Episode)}
-    values = {name: value for name, value in line.items() if name in known} | texts
-    if lacking := [name for name in ("controller", "scene", "outcome") if not texts[name]]:
+    values = {**line, **texts}
+    if lacking := [name for name in ("controller", "scene", "outcome") if not values[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
     try:
         row = _ROW.validate_python(values)

@@ -29,10 +29,11 @@ from antennate.control.registry import make_controller
 from antennate.errors import ControllerError
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.physics import TrialResult
+from antennate.experiments.tunnel.physics import Outcome, TrialResult
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import TIME_LIMIT
+from antennate.sim.trial import draw_scene, scene_of, time_limit_of
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
@@ -68,7 +69,7 @@ class Episode:
     scene: str
     seed: int
     trial: int
-    outcome: str
+    outcome: Outcome
     time_s: float
     limit_s: float = TIME_LIMIT
     progress_m: float = 0.0
@@ -208,9 +209,12 @@ def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
 
 
 def lost(draw: Draw, reason: str) -> Episode:
-    """The row of an episode whose process died, or did not end."""
+    """The row of an episode whose process died, failed, or did not end."""
+    config = tunnel_config(draw.scene, draw.controller, draw.seed)
+    limit = time_limit_of(draw_scene(config, scene_of(config), draw.trial), config.time_limit)
     return Episode(
-        *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", TIME_LIMIT),
+        *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", limit),
+        limit_s=limit,
         drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,9 @@ from antennate.experiments.compete.page import ordered
 from antennate.experiments.compete.scenes import label
 from antennate.experiments.compete.standings import Rows, profiles
 
+_DARK = 0.83
+"""Share of successes whose blue is so dark that white stands out more on it."""
+
 
 def figures(outcome: CompeteOutcome) -> dict[str, Figure]:
     """All three figures of a run."""
@@ -27,7 +30,8 @@ def drawn(result: Mapping[str, Any], rows: Rows) -> dict[str, Figure]:
     """All three figures of a result and its rows."""
     if not rows:
         return {}
-    return {"ranks": ranks(result), "scenes": scenes(result), "profiles": profile(rows)}
+    ranked = [name for name in ordered(result) if result["controllers"][name]["rank"] is not None]
+    return {"ranks": ranks(result), "scenes": scenes(result), "profiles": profile(rows, ranked)}
 
 
 @style.styled
@@ -79,7 +83,12 @@ def scenes(result: Mapping[str, Any]) -> Figure:
     panel.imshow(100.0 * shares, cmap="Blues", vmin=0, vmax=125, aspect="auto")
     for (i, j), share in np.ndenumerate(shares):
         if np.isfinite(share):
-            panel.text(j, i, f"{100.0 * share:.0f}", ha="center", va="center", fontsize=8)
+            ink = "white" if share > _DARK else style.INK
+            number = f"{100.0 * share:.3g}"
+            panel.text(j, i, number, ha="center", va="center", fontsize=8, color=ink)
+    ranked = sum(result["controllers"][name]["rank"] is not None for name in names)
+    if 0 < ranked < len(names):  # the others stand apart
+        panel.axvline(ranked - 0.5, color="white", linewidth=3)
     panel.set_xticks(range(len(names)), [short[name] for name in names], rotation=45, ha="right")
     panel.set_yticks(range(len(places)), [label(place) for place in places])
     panel.grid(visible=False)
@@ -88,9 +97,10 @@ def scenes(result: Mapping[str, Any]) -> Figure:
 
 
 @style.styled
-def profile(rows: Rows) -> Figure:
-    """Share of the draws crossed within a factor of the fastest, a line a controller."""
-    factors, shares = profiles(rows)
+def profile(rows: Rows, names: Sequence[str]) -> Figure:
+    """Share of the draws crossed within a factor of the fastest, a line for each of these names."""
+    factors, found = profiles(rows)
+    shares = {name: found[name] for name in names}
     colours, short = style.controller_colours(list(shares)), short_names(shares)
     figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()
@@ -108,7 +118,7 @@ def profile(rows: Rows) -> Figure:
     panel.set_xscale("log")
     panel.set_xticks([1, 2, 3, 5, 10], ["1", "2", "3", "5", "10"])
     panel.minorticks_off()
-    panel.set(xlim=(1, 10), ylim=(0, 100))
+    panel.set(xlim=(1, 10), ylim=(-2, 102))
     panel.set(xlabel="time over that of the fastest", ylabel="draws crossed [%]")
     if shares:
         figure.legend(loc="outside upper center", ncols=4, handlelength=2.6)

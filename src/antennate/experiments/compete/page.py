@@ -109,12 +109,28 @@ def _check_table(check: Mapping[str, Any]) -> Table:
     return Table("Rows that differ", heads, lines, note)
 
 
+def _differing(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows that differ from a table, as a list in Markdown."""
+    return "\n".join(
+        f"- `{row['controller']}` in `{row['scene']}`, seed {row['seed']}, trial {row['trial']}: "
+        f"{row['outcome']} after {row['time_s']:g} s and {row['progress_m']:g} m; here "
+        f"{row['outcome_here']} after {row['time_here_s']:g} s and {row['progress_here_m']:g} m"
+        for row in rows
+    )
+
+
 def sentence(result: Result) -> str:
     """Who stands first and how sure that is; or how many rows of a table repeat."""
     if (check := result["check"]) is not None:
+        broken = (
+            f" Expected no difference in {check['broken']} of them: on one version, engine and "
+            "processor every row repeats, and limits and what is given are the same everywhere."
+            if check["broken"]
+            else ""
+        )
         return (
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
-            f"{check['other_outcome']} of them in how they end; {check['broken']} should not."
+            f"{check['other_outcome']} of them in how they end.{broken}"
         )
     rows, names = result["controllers"], ordered(result)
     short = short_names(names)
@@ -141,8 +157,8 @@ def markdown(result: Result) -> str:
     names = ordered(result)
     short = short_names(names)
     lines = [
-        "| controller | rank (95 %) | successes | Wilson 95 % [%] | restricted mean time [% of "
-        "limit] (95 %) | speed [m/s] | on its back | INVALID |",
+        "| controller | rank (95 %) | successes | Wilson 95 % by draws [%] | restricted mean time "
+        "[% of limit] (95 %) | speed [m/s] | on its back | INVALID |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in names:
@@ -179,6 +195,8 @@ def readme(result: Result, rows: Sequence[Episode]) -> str:
         f"A decision may take {1e3 * result['decision_limit_s']:g} ms of processor time.",
         "Every row is in `trials.csv`; `antennate compete --check trials.csv` runs them again.",
     ]
+    if result["check"] is not None and (differ := result["check"]["differ"]):
+        parts += ["Rows that differ, as the table says and as they ended here:", _differing(differ)]
     if reasons:
         parts += ["INVALID, which counts as a failure:", "\n".join(reasons)]
     return "\n\n".join(parts) + "\n"
