@@ -297,9 +297,7 @@ class Actor(torch.nn.Module):
 
 given = torch.zeros(1, *env.observation_space.shape)
 actor = Actor(model.policy.cpu())
-torch.onnx.export(
-    actor, given, "mine.onnx", input_names=["observation"], output_names=["action"]
-)
+torch.onnx.export(actor, given, "mine.onnx", input_names=["observation"], output_names=["action"])
 ```
 
 ## What is measured
