@@ -540,6 +540,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
             "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,1.0\n",
             "line 3: expected each draw once a controller, found that of line 2 again",
         ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopne,flat,1,0,timeout,1.0\n",
+            r"line 2: expected one of open, .* \(did you mean open\?\)",
+        ),
         ("\0\n", "expected a table of trials"),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",

@@ -385,7 +385,7 @@ def test_actions_seeds_and_masks_are_looked_at() -> None:
     with pytest.raises(ResetNeeded):
         env.step(np.zeros(2, np.int64))
     env.reset(seed=1)
-    for action in (np.zeros(3, np.int64), np.array([0, 4]), np.array([0.5, 0.0])):
+    for action in (np.zeros(3, np.int64), np.array([0, 4]), np.array([0.5, 0.0]), [0, [1]]):
         with pytest.raises(ConfigError, match="action: expected"):
             env.step(action)
     for mask in ([True], [False, False], [1, 0]):

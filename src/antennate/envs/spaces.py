@@ -36,7 +36,10 @@ def answers_of(config: EnvConfig, given: Any, batch: int) -> Floats:
     Raises:
         ConfigError: The actions have another shape, or there is no such maneuver.
     """
-    given = np.asarray(given)
+    try:
+        given = np.asarray(given)
+    except ValueError:  # lists of several lengths
+        raise ConfigError(f"action: expected numbers of one shape, found {shown(given)}") from None
     if config.interface.action == "maneuver":
         if given.shape != (batch,) or given.dtype.kind not in "iu":
             raise _refused(f"whole numbers of shape ({batch},)", given)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from antennate.control.registry import CONTROLLERS
 from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.compete.config import require_free
 from antennate.experiments.compete.episodes import Episode, restricted
@@ -89,20 +90,24 @@ def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
     try:
         row = _ROW.validate_python(values)
         require_free(row.seed)
-        _require_numbers(row)
+        _require_sound(row)
     except ValidationError as error:
         raise ConfigError(f"{path}: line {number}: {describe(error, Episode)}") from None
-    except ValueError as error:
+    except (ValueError, ConfigError) as error:
         raise ConfigError(f"{path}: line {number}: {error}") from None
     return row
 
 
-def _require_numbers(row: Episode) -> None:
-    """Check that numbers are finite, the limit is above 0 s, and none that counts is below 0.
+def _require_sound(row: Episode) -> None:
+    """Check that there may be such a controller, and that numbers can be such.
+
+    They are finite, the limit is above 0 s, and none that counts is below 0.
 
     Raises:
-        ValueError: One is not.
+        ConfigError: There is no controller of that name.
+        ValueError: A number is not.
     """
+    CONTROLLERS.check(row.controller)
     for name in ("seed", "trial"):
         if getattr(row, name) < 0:
             raise ValueError(f"{name}: expected at least 0, found {getattr(row, name)}")
