@@ -296,8 +296,8 @@ class Actor(torch.nn.Module):
 
 
 given = torch.zeros(1, *env.observation_space.shape)
-actor = Actor(model.policy.cpu())
-torch.onnx.export(actor, given, "mine.onnx", input_names=["observation"], output_names=["action"])
+names = dict(input_names=["observation"], output_names=["action"])
+torch.onnx.export(Actor(model.policy.cpu()), given, "mine.onnx", **names)
 ```
 
 ## What is measured
