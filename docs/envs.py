@@ -279,8 +279,8 @@ contract = contract_of(config.interface, config.control, config.robot, about="my
 add_contract("mine.onnx", contract)
 ```
 
-Of a model of Stable-Baselines3 (PPO or A2C with `MlpPolicy`) this writes such a file, with the
-scores of the maneuvers, or the means of continuous actions:
+Of a `model` of Stable-Baselines3 (PPO or A2C with `MlpPolicy`) this writes such a file before that,
+with the scores of the maneuvers, or the means of continuous actions:
 
 ```python
 import torch

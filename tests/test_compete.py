@@ -114,6 +114,15 @@ class Breaks(Entry):
     """What it changes fails outside of its own decisions."""
     def fault(self, command):
         np.clip = None
+class Once(Entry):
+    """It fails outside of its decisions, but only after its first reset in a process."""
+    resets = 0
+    def reset(self, rows, phase=0.0):
+        super().reset(rows, phase)
+        Once.resets += 1
+    def fault(self, command):
+        if Once.resets > 1:
+            np.clip = None
 class Ends(Entry):
     def fault(self, command):
         os.kill(os.getpid(), 9)
@@ -376,6 +385,29 @@ def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
     assert {row.limit_s for row in rows} == {0.3}
     assert {row.time_s for row in rows} == {0.3}
     assert "NoneType" in rows[0].reason
+
+
+def test_what_a_broken_process_held_is_run_again_in_another(
+    tmp_path: Path, entries: Callable[[str], str]
+) -> None:
+    scenes = [SHORT, "flat+time_limit=0.2"]
+    words = ["--controllers", entries("Once"), "--scenes", *scenes, "--trials", "1"]
+    assert main(["compete", *words, "--no-figures", "--workers", "1", "--out", "run"]) == 0
+    rows = read_rows(tmp_path / "run" / "trials.csv")
+    assert [row.outcome for row in rows] == ["timeout", "timeout"]
+
+
+def test_entries_with_helpers_of_one_name_each_get_their_own(tmp_path: Path) -> None:
+    for place, kind in (("one", "open"), ("two", "timed"), ("three", "centre")):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "helper.py").write_text(f"NAME = {kind!r}\n")
+        (tmp_path / place / "ctl.py").write_text(
+            "from antennate.control.registry import make_controller\nimport helper\n"
+            "def C(*parts):\n    return make_controller(helper.NAME, *parts)\n"
+        )
+    names = [str(tmp_path / place / "ctl.py:C") for place in ("one", "two", "three")]
+    words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
+    assert main(["compete", *words, "--workers", "1", "--out", str(tmp_path / "run")]) == 0
 
 
 def test_figures_that_did_not_fit_are_drawn_by_resume(

@@ -69,28 +69,84 @@ def test_a_controller_is_found_by_module_and_by_file(
     assert isinstance(make_controller("antennate.control.controllers:paper"), RuleController)
 
 
-@pytest.mark.parametrize("imported", ["brain", "beyond"])
-def test_two_files_that_import_other_modules_of_one_name_are_refused(
-    tmp_path: Path, imported: str, capsys: pytest.CaptureFixture[str]
+CTL = """
+from antennate.control.registry import make_controller
+import {helper}
+def C(control, robot, batch):
+    import {late}
+    return make_controller({helper}.NAME, control, robot, batch)
+"""
+
+
+def two_folders(folder: Path, helper: str, late: str, **others: str) -> list[str]:
+    """Names of two controllers, each in a folder of its own with a helper that names another."""
+    for place, kind in (("one", "open"), ("two", "paper")):
+        files = {
+            "ctl": CTL.format(helper=helper, late=late),
+            helper: f"NAME = {kind!r}\n",
+            **others,
+        }
+        for name, text in files.items():
+            path = folder / place / f"{name}.py"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+    return [str(folder / place / "ctl.py:C") for place in ("one", "two")]
+
+
+@pytest.fixture
+def nothing_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What these tests import is none of others."""
+    before = set(sys.modules)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    for name in set(sys.modules) - before:
+        if name.startswith(("helper", "late", "antennate_user_code")):
+            del sys.modules[name]
+
+
+@pytest.mark.usefixtures("nothing_imported")
+@pytest.mark.parametrize(
+    ("helper", "late", "others", "clash"),
+    [
+        ("helper_a", "json", {}, "helper_a"),
+        ("helper_b", "late_b", {"late_b": ""}, "helper_b|late_b"),
+        ("helper_c", "json", {"helper_c/__init__": "NAME = 'open'"}, "helper_c"),
+    ],
+)
+def test_a_file_that_would_be_given_the_module_of_another_is_refused(
+    tmp_path: Path, helper: str, late: str, others: dict[str, str], clash: str
 ) -> None:
-    """Python would give the first module to both, and both would walk alike."""
-    for name, kind in (("one", "open_loop"), ("two", "paper")):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / f"{imported}.py").write_text(
-            f"from antennate.control.controllers import {kind} as Mine\n"
-        )
-        (tmp_path / name / "unused.py").write_text("")
-        (tmp_path / name / "ctl.py").write_text(
-            "from antennate.control.registry import make_controller\n"
-            f"def C(control, robot, batch):\n    from {imported} import Mine\n"
-            "    return Mine(control, robot, batch)\n"
-        )
-    names = [str(tmp_path / name / "ctl.py:C") for name in ("one", "two")]
-    words = ["--trials", "1", "--time-limit", "0.1", "--out", str(tmp_path / "run")]
-    assert main(["tunnel", "--controllers", *names, *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"found {imported} beside both; rename one" in line
-    sys.modules.pop(imported, None)
+    """Python gives the first module of a name to all: both would walk alike."""
+    one, two = two_folders(tmp_path, helper, late, **others)
+    make_controller(one)
+    with pytest.raises(ConfigError, match=rf"{two}', found no module ({clash}) of its own: .*one"):
+        make_controller(two)
+
+
+@pytest.mark.usefixtures("nothing_imported")
+def test_a_module_that_only_the_second_file_imports_late_is_looked_at(tmp_path: Path) -> None:
+    one, two = two_folders(tmp_path, "helper_d", "late_d", late_d="")
+    Path(one.partition(":")[0]).write_text(CTL.format(helper="json", late="json"))
+    (tmp_path / "two" / "ctl.py").write_text(
+        "def C(control, robot, batch):\n    import helper_d\n    return helper_d\n"
+    )
+    with pytest.raises(ConfigError, match="has no attribute 'NAME'"):
+        make_controller(one)  # its folder is searched from now on
+    with pytest.raises(ConfigError, match="found no module helper_d of its own"):
+        make_controller(two)
+
+
+@pytest.mark.usefixtures("nothing_imported")
+def test_files_beside_that_are_not_imported_or_are_the_same_do_not_matter(tmp_path: Path) -> None:
+    others = {"__main__": "", "control": "", "types": "", "draft (old": "", "late_e": ""}
+    one, two = two_folders(tmp_path, "helper_e", "json", **others)
+    shared = tmp_path / "shared.py"
+    shared.write_text("NAME = 'open'\n")
+    for place in ("one", "two"):
+        (tmp_path / place / "helper_e.py").unlink()
+        (tmp_path / place / "helper_e.py").symlink_to(shared)
+        (tmp_path / place / "closed").mkdir(mode=0)
+    assert type(make_controller(one)) is type(make_controller(two))
 
 
 def test_an_installed_package_can_bring_a_controller(

@@ -140,6 +140,9 @@ def test_the_mean_of_draws_of_several_values_has_the_interval_of_draws() -> None
         mean, ends = mean95_by_draw(np.tile(values, times), np.tile(alone, times), 0.0)
         assert mean == pytest.approx(6.0)
         assert ends == pytest.approx((4.002105, 7.997895))  # 6 ± 2.446912 √(28 / 6 / 7)
+    mean, ends = mean95_by_draw(np.full(14, 0.1), np.repeat(np.arange(7), 2), 0.0)
+    assert ends is not None
+    assert ends[0] <= mean <= ends[1]
     assert mean95_by_draw(values, np.array([0, 0, 0, 1, 1, 2, 2]), 0.0) == (6.0, None)
     rng = np.random.default_rng(2)
     held = 0

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import importlib
 import importlib.util
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -138,7 +139,7 @@ class Registry(Generic[T]):
             return make(name)
         try:
             value = self._load(name)
-        except (KeyboardInterrupt, ConfigError):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:
             ours = isinstance(error, LookupError | FileNotFoundError) and str(error)[:3] == "no "
@@ -165,40 +166,69 @@ class Registry(Generic[T]):
         return getattr(module, attribute)
 
 
-_FILES: list[Path] = []
-"""Files that were imported as a user's code."""
-
-
 def _require_own_modules(path: Path) -> None:
-    """Refuse a file that would be given a module that lies beside another file.
+    """Refuse a file that would be given another module than the one that lies beside it.
 
-    Python knows a module by its name alone: of two with one name the first is imported for both.
+    Python knows a module by its name alone, and gives to all the first that it finds. Modules of
+    the standard library are left out: they always come first.
 
     Raises:
-        ConfigError: It imports such a module, or the other file does.
+        LookupError: It, or a module beside it, imports such a module.
     """
-    own, code = _modules_beside(path), _code_of(path)
-    for other in _FILES:
-        if other.parent == path.parent or not other.exists():
-            continue
-        for name in sorted(own & _modules_beside(other)):
-            imported = re.compile(rf"^\s*(?:from|import)\b.*\b{name}\b", re.MULTILINE)
-            if name in sys.modules or imported.search(code) or imported.search(_code_of(other)):
-                raise ConfigError(
-                    f"{path}: expected modules of other names than those beside {other}, found "
-                    f"{name} beside both; rename one, or run each by itself"
+    files, seen = [path], set(sys.stdlib_module_names)
+    while files:
+        for name in _imported(files.pop()) - seen:
+            seen.add(name)
+            own = _beside(path.parent, name)
+            if own is None:
+                continue
+            files += [own] if own.suffix == ".py" else []
+            found = _found(name, path.parent)
+            if found is not None and not found.samefile(own):
+                raise LookupError(
+                    f"no module {name} of its own: Python gives it {found}, not {own}; rename one, "
+                    "or run each by itself"
                 )
 
 
-def _modules_beside(path: Path) -> set[str]:
-    """Names of the modules and packages in the folder of a file."""
-    beside = [each for each in path.parent.iterdir() if each != path]
-    files = {each.stem for each in beside if each.suffix == ".py"}
-    return files | {each.name for each in beside if (each / "__init__.py").exists()}
+def _imported(file: Path) -> set[str]:
+    """First parts of the names of modules that a file imports, those relative to it left out."""
+    try:
+        nodes = list(ast.walk(ast.parse(file.read_bytes())))
+    except (OSError, SyntaxError, ValueError):
+        return set()  # to import it says why
+    whole = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    parts = [n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module and not n.level]
+    return {name.partition(".")[0] for name in (*whole, *parts)}
 
 
-def _code_of(path: Path) -> str:
-    return path.read_text(encoding="utf-8", errors="replace")
+def _beside(folder: Path, name: str) -> Path | None:
+    """What a name means in a folder: the first file of a package, a module, or a bare folder."""
+    for path in (folder / name / "__init__.py", folder / f"{name}.py", folder / name):
+        if _is_there(path):
+            return path
+    return None
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file or folder, as far as it may be looked at."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def _found(name: str, folder: Path) -> Path | None:
+    """What Python gives for a name once the folder is searched last; None if that has no file."""
+    if name in sys.modules:
+        module = sys.modules[name]
+        file, places = getattr(module, "__file__", None), getattr(module, "__path__", ())
+    else:
+        spec = PathFinder.find_spec(name, [*sys.path, str(folder)])
+        file = None if spec is None or not spec.has_location else spec.origin
+        places = () if spec is None else spec.submodule_search_locations or ()
+    found = file or next(iter(places), None)
+    return Path(found) if found is not None and _is_there(Path(found)) else None
 
 
 def _module_of(path: Path) -> ModuleType:
@@ -215,7 +245,6 @@ def _module_of(path: Path) -> ModuleType:
     _require_own_modules(path)
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
-    _FILES.append(path)
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)

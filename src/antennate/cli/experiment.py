@@ -185,8 +185,6 @@ def carry_out(
             if shards is None and run.store is not None and run.store.holds_trials:
                 again = _go_on(experiment.name, argv, run.path)
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
-            elif experiment.on_workers:
-                sys.stderr.write("nothing had ended, so nothing is kept\n")
             raise
         except (LogError, OutputError, WorkerError):
             if shards:
@@ -332,6 +330,7 @@ def _end(
             with progress("% of the films") as step:
                 write_films(experiment, config, options.video_trial, run, step, options.video_view)
         except KeyboardInterrupt:
+            run.keep_trials()
             sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
             return INTERRUPTED
     return BAD_INPUT if experiment.failed(result) else OK

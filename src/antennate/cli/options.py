@@ -17,6 +17,7 @@ from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from antennate.errors import ConfigError
+from antennate.messages import shortened
 from antennate.params.base import meaning
 from antennate.params.faults import group_of
 
@@ -144,7 +145,7 @@ class Option:
             if value and str(value).startswith(begin):
                 return
             other = begin and value != fields_of(type(options))[name].default
-            others += [f"{flag} {value}"] if other else []
+            others += [f"{flag} {shortened(str(value))}"] if other else []
         if self.needs:
             needed, found = " or ".join(self.needs), " and ".join(others) or "none"
             raise ConfigError(f"{self.flag}: expected {needed} beside it, found {found}")

@@ -107,6 +107,8 @@ def parts_of(name: str) -> tuple[str, str]:
 def short_names(conditions: Iterable[str]) -> dict[str, str]:
     """A label for each condition: of MODULE:NAME or FOLDER/FILE.py:NAME only NAME, or FILE.onnx.
 
+    A file called policy.onnx is known by its folder.
+
     Where two share it, FILE.py:NAME, then with the folder, and all of it where they share that,
     too. Of a long one the middle is left out. Readings that are not its own, as of
     `closed@delayed:0.5`, stay behind it.
@@ -114,7 +116,12 @@ def short_names(conditions: Iterable[str]) -> dict[str, str]:
     parts = {name: parts_of(name) for name in conditions}
     paths = {name: each.split("/") for name, (each, _) in parts.items()}
     cuts = [
-        {name: path[-1].rpartition(":")[2] for name, path in paths.items()},
+        {
+            name: path[-2]
+            if path[1:] and path[-1] == "policy.onnx"
+            else path[-1].rpartition(":")[2]
+            for name, path in paths.items()
+        },
         {name: path[-1] for name, path in paths.items()},
         {name: "/".join(path[-2:]) for name, path in paths.items()},
     ]

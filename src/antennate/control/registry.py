@@ -8,7 +8,7 @@ from antennate import checks
 from antennate.control import blind, controllers, geometric, steering
 from antennate.control.climbing import controllers as climbing
 from antennate.control.readings import OWN, about_readings, parts_of
-from antennate.errors import ConfigError, ControllerError, MissingPackageError, raised
+from antennate.errors import ConfigError, MissingPackageError, raised
 from antennate.lookup import Registry
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
@@ -151,11 +151,11 @@ def make_controller(
         controller = factory(control, robot, batch)
     except KeyboardInterrupt:
         raise
-    except (MissingPackageError, ControllerError):
+    except MissingPackageError:
         raise
     except ConfigError as error:
-        told = str(error) if str(name) in str(error) else f"{name!r}: {error}"
-        raise ConfigError(told) from error
+        named = str(error).startswith(f"{name}: ")
+        raise ConfigError(str(error) if named else f"{name!r}: {error}") from error
     except BaseException as error:
         raise ConfigError(
             f"expected a controller that is made from (control, robot, batch), found {name!r}: "

@@ -9,7 +9,9 @@ from antennate.errors import MissingPackageError
 
 try:
     from gymnasium.envs import registration
-except ImportError:
+except ModuleNotFoundError as error:
+    if error.name != "gymnasium":
+        raise
     from antennate.messages import extra
 
     raise MissingPackageError(

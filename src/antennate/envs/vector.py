@@ -39,7 +39,7 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
             interface = interface.model_dump(exclude_unset=True)
         if not isinstance(interface, Mapping):
             raise ConfigError(f"interface: expected values by name, found {shown(interface)}")
-        if interface.get("action", action) != action:
+        if not np.array_equal(interface.get("action", action), action):
             raise ConfigError(
                 f"action: expected one, found {shown(action)} and in interface "
                 f"{shown(interface['action'])}"

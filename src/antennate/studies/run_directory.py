@@ -256,6 +256,10 @@ class RunDirectory:
         """Let it stay when the run ends."""
         self._kept = True
 
+    def keep_trials(self) -> None:
+        """Let the store of finished trials stay, so that what is missing can still be written."""
+        self._spent = None
+
     def keep_logs(self) -> None:
         """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
         self._kept = self._kept or any(path.parent.name == LOGS for path in files_of(self.path))
@@ -349,7 +353,8 @@ class RunDirectory:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None and self._spent is not None:  # else what is missing can be written again
-            self._spent.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self._spent.unlink()
         stays = self._kept or (self.store is not None and self.store.holds_trials)
         self._close_store(remove=not stays)
         if stays:

@@ -41,9 +41,8 @@ def require_names(
         ("outputs", [ACTION, *(s.output for s in states)], outputs),
     ):
         if sorted(names) != sorted(wanted):
-            raise ConfigError(
-                f"{place}: expected the {kind} {', '.join(wanted)}, found {', '.join(names)}"
-            )
+            found = ", ".join(names) or "none"
+            raise ConfigError(f"{place}: expected the {kind} {', '.join(wanted)}, found {found}")
 
 
 class Policy:
@@ -77,11 +76,10 @@ class Policy:
         try:
             self._session: Any = ort.InferenceSession(data, options, ["CPUExecutionProvider"])
         except Exception as error:
-            apart = "; weights that lie in another file are joined by add_contract"
-            raise ConfigError(
-                f"{path}: expected an ONNX model, found {in_one_line(error)}"
-                f"{apart if 'model_path' in str(error) else ''}"
-            ) from error
+            told = in_one_line(error)
+            apart = "external data" in told.lower() or "model_path" in told
+            hint = "; weights that lie in another file are joined by add_contract" if apart else ""
+            raise ConfigError(f"{path}: expected an ONNX model, found {told}{hint}") from error
         text = self._session.get_modelmeta().custom_metadata_map.get(KEY)
         if text is None:
             raise ConfigError(
@@ -96,10 +94,10 @@ class Policy:
         try:
             answer, _ = self.answer(np.zeros((1, size), np.float32), self.start())
         except ControllerError as error:
-            found = ", ".join(f"{node.name} {node.type} {node.shape}" for node in inputs)
+            takes = ", ".join(f"{node.name} as {node.type} {node.shape}" for node in inputs)
             raise ConfigError(
-                f"{path}: expected a policy that takes {OBSERVATION} of float32 and shape "
-                f"(1, {size}), found one that takes {found}: {error}"
+                f"{path}: expected an answer to {size} zeros, as float32 of shape (1, {size}), "
+                f"found {error}; it takes {takes}"
             ) from None
         if answer.shape != (1, len(self.contract.actions)):
             raise ConfigError(

@@ -158,7 +158,12 @@ def _save(model: Any, contract: Contract, path: Path) -> Path:
         model.metadata_props.remove(prop)
     prop = model.metadata_props.add()
     prop.key, prop.value = KEY, contract.model_dump_json()
-    onnx.checker.check_model(model)
+    try:
+        onnx.checker.check_model(model)
+    except onnx.checker.ValidationError as error:
+        raise BadInputError(
+            f"{path}: expected a sound ONNX model, found {in_one_line(error)}"
+        ) from error
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, model.SerializeToString(), overwrite=True)
     return path

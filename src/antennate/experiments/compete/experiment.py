@@ -118,6 +118,7 @@ def check(config: CompeteConfig) -> None:
         Workers(min(len(names), core_count()), timeout=PATIENCE, apart=True),
         no_step,
         lost=given_up,
+        fresh=True,
     )
     for trouble in filter(None, troubles):
         raise ConfigError(f"--controllers: {trouble}")
@@ -160,6 +161,8 @@ def run(
 ) -> CompeteOutcome:
     """Run all episodes; the processes of one controller end before those of the next begin.
 
+    One that fails, as its controller changed what others need, is run again in a fresh process.
+
     Raises:
         WorkerError: A worker process failed.
     """
@@ -182,6 +185,7 @@ def run(
             chunk=chunk_of(len(own), workers, BATCH),
             together=True,
             lost=given_up,
+            again=True,
         )
     return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
 

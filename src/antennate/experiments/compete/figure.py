@@ -84,7 +84,7 @@ def scenes(result: Mapping[str, Any]) -> Figure:
     for (i, j), share in np.ndenumerate(shares):
         if np.isfinite(share):
             ink = "white" if share > _DARK else style.INK
-            number = f"{100.0 * share:.3g}"
+            number = str(int(100.0 * share + 0.5))  # halves go up
             panel.text(j, i, number, ha="center", va="center", fontsize=8, color=ink)
     ranked = sum(result["controllers"][name]["rank"] is not None for name in names)
     if 0 < ranked < len(names):  # the others stand apart

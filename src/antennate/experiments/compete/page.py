@@ -21,6 +21,13 @@ _NOTE = (
 )
 
 
+_COMPARED = (
+    *(("outcome", "outcome_here"), ("time_s", "time_here_s"), ("progress_m", "progress_here_m")),
+    *(("limit_s", "limit_here_s"), ("overturned", "overturned_here"), ("given", "given_here")),
+)
+"""Columns of a table that is checked, and what they are here."""
+
+
 def ordered(result: Result) -> list[str]:
     """Controllers by rank, then by time; those outside the ranking last."""
     rows = result["controllers"]
@@ -110,11 +117,14 @@ def _check_table(check: Mapping[str, Any]) -> Table:
 
 
 def _differing(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows that differ from a table, as a list in Markdown."""
+    """Rows that differ from a table, and in what, as a list in Markdown."""
     return "\n".join(
         f"- `{row['controller']}` in `{row['scene']}`, seed {row['seed']}, trial {row['trial']}: "
-        f"{row['outcome']} after {row['time_s']:g} s and {row['progress_m']:g} m; here "
-        f"{row['outcome_here']} after {row['time_here_s']:g} s and {row['progress_here_m']:g} m"
+        + ", ".join(
+            f"{name} {row[name]}, here {row[here]}"
+            for name, here in _COMPARED
+            if row[name] != row[here]
+        )
         for row in rows
     )
 
