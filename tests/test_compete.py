@@ -378,10 +378,10 @@ def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
     names = [entries("Breaks"), entries("Ends"), "open"]
-    words = ["--controllers", *names, "--scenes", SHORT, "--trials", "2", "--no-figures"]
+    words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
     assert main(["compete", *words, "--workers", "1", "--out", "run"]) == 0
     rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == 4 * ["invalid"] + 2 * ["timeout"]
+    assert [row.outcome for row in rows] == ["invalid", "invalid", "timeout"]
     assert {row.limit_s for row in rows} == {0.3}
     assert {row.time_s for row in rows} == {0.3}
     assert "NoneType" in rows[0].reason
@@ -398,14 +398,14 @@ def test_what_a_broken_process_held_is_run_again_in_another(
 
 
 def test_entries_with_helpers_of_one_name_each_get_their_own(tmp_path: Path) -> None:
-    for place, kind in (("one", "open"), ("two", "timed"), ("three", "centre")):
+    for place, kind in (("one", "open"), ("two", "timed")):
         (tmp_path / place).mkdir()
         (tmp_path / place / "helper.py").write_text(f"NAME = {kind!r}\n")
         (tmp_path / place / "ctl.py").write_text(
             "from antennate.control.registry import make_controller\nimport helper\n"
             "def C(*parts):\n    return make_controller(helper.NAME, *parts)\n"
         )
-    names = [str(tmp_path / place / "ctl.py:C") for place in ("one", "two", "three")]
+    names = [str(tmp_path / place / "ctl.py:C") for place in ("one", "two")]
     words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
     assert main(["compete", *words, "--workers", "1", "--out", str(tmp_path / "run")]) == 0
 
