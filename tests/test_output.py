@@ -188,9 +188,7 @@ def test_readings_that_are_not_its_own_stay_with_the_short_name() -> None:
     assert list(short_names(names).values()) == wanted
 
 
-def test_a_policy_is_called_by_folder_or_file_and_a_long_name_is_cut_in_the_middle() -> (
-    None
-):
+def test_a_policy_is_called_by_folder_or_file_and_a_long_name_is_cut_in_the_middle() -> None:
     names = ["entries/first/policy.onnx", "entries/second/policy.onnx", "/far/away/other.onnx"]
     assert list(short_names(names).values()) == ["first", "second", "other.onnx"]
     alike = ["a/run/policy.onnx", "b/run/policy.onnx", "policy.onnx"]
