@@ -354,6 +354,23 @@ def test_a_contract_is_put_into_sound_files_alone(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
+def test_weights_in_another_file_are_joined_by_the_contract(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As newer exporters of PyTorch write them."""
+    path, _ = drawn(tmp_path / "whole.onnx", contract())
+    apart = tmp_path / "apart.onnx"
+    how = {"save_as_external_data": True, "location": "apart.data", "size_threshold": 0}
+    onnx.save_model(onnx.load(str(path)), str(apart), **how)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with pytest.raises(ConfigError, match="weights that lie in another file are joined by add_con"):
+        Policy(apart)
+    joined = Policy(add_contract(apart, contract()))
+    zeros = np.zeros((1, len(contract().observations)), np.float32)
+    assert joined.answer(zeros, {})[0] == pytest.approx(Policy(path).answer(zeros, {})[0])
+
+
 def test_a_policy_of_other_numbers_is_refused_by_what_it_takes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
