@@ -19,7 +19,7 @@ from antennate.errors import ConfigError
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.config import CompeteConfig
 from antennate.experiments.compete.episodes import Episode, all_drawn
-from antennate.experiments.compete.page import markdown, sentence
+from antennate.experiments.compete.page import apart, markdown, sentence
 from antennate.experiments.compete.standings import standings
 from antennate.studies.formats import to_csv
 
@@ -55,10 +55,11 @@ def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
     if least < WHOLE:
         parts.append(
             f"**Preliminary**: {draws} draw{'s' * (most > 1)} of each scene and controller, where "
-            f"a board has {WHOLE}. Ranks whose intervals overlap are not told apart."
+            f"a board has {WHOLE}."
         )
     parts += [
         sentence(result),
+        apart(result),
         markdown(result),
         f"{len(rows)} episodes of antennate {kinds['version']}, MuJoCo "
         f"{kinds['engine']}, {kinds['processor']}. Every row is in `docs/leaderboard.csv`.",

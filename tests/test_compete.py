@@ -397,13 +397,17 @@ def test_what_a_broken_process_held_is_run_again_in_another(
     assert [row.outcome for row in rows] == ["timeout", "timeout"]
 
 
-def test_entries_with_helpers_of_one_name_each_get_their_own(tmp_path: Path) -> None:
-    for place, kind in (("one", "open"), ("two", "timed")):
+def test_entries_with_helpers_of_one_name_each_get_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(experiment, "core_count", lambda: 1)  # both are looked at in turn
+    for place in ("one", "two"):
         (tmp_path / place).mkdir()
-        (tmp_path / place / "helper.py").write_text(f"NAME = {kind!r}\n")
+        (tmp_path / place / "helper.py").write_text(f"NAME = {place!r}\n")
         (tmp_path / place / "ctl.py").write_text(
             "from antennate.control.registry import make_controller\nimport helper\n"
-            "def C(*parts):\n    return make_controller(helper.NAME, *parts)\n"
+            f"assert helper.NAME == {place!r}\n"
+            "def C(*parts):\n    return make_controller('open', *parts)\n"
         )
     names = [str(tmp_path / place / "ctl.py:C") for place in ("one", "two")]
     words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]

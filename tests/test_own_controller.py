@@ -146,6 +146,7 @@ def test_files_beside_that_are_not_imported_or_are_the_same_do_not_matter(tmp_pa
         (tmp_path / place / "helper_e.py").unlink()
         (tmp_path / place / "helper_e.py").symlink_to(shared)
         (tmp_path / place / "closed").mkdir(mode=0)
+        (tmp_path / place / "antennate").mkdir()  # as a clone beside one's file is
     assert type(make_controller(one)) is type(make_controller(two))
 
 

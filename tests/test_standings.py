@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.figure import drawn
-from antennate.experiments.compete.page import markdown, ordered, readme, sentence, tables
+from antennate.experiments.compete.page import apart, markdown, ordered, readme, sentence, tables
 from antennate.experiments.compete.standings import profiles, standings
 from antennate.studies.statistics import (
     holm,
@@ -155,6 +155,14 @@ def test_the_mean_of_draws_of_several_values_has_the_interval_of_draws() -> None
         assert ends is not None
         held += ends[0] <= 10.0 <= ends[1]
     assert 0.92 * 400 <= held <= 0.98 * 400
+
+
+def test_who_is_told_apart_is_said() -> None:
+    """Nine draws that one alone crosses, and none the other: p = 2 / 2^9."""
+    better = rows_of("a", [10.0] * 9)
+    said = apart(judged(rows_of("b", [None] * 9), better, rows_of("c", [10.0] * 9)))
+    assert said.endswith("5 %: `a` before `b`; `c` before `b`.")
+    assert apart(judged(better, rows_of("b", [None] + [10.0] * 8))).endswith("nobody from nobody.")
 
 
 def test_who_is_given_more_stands_outside_the_ranking() -> None:

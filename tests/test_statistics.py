@@ -375,7 +375,7 @@ def test_many_pairs_are_tested_as_scipy_does_by_the_normal_approximation(zeros: 
     values = np.random.default_rng(3).normal(0.2, 1.0, 60).round(1)
     values[:zeros] = 0.0
     test = wilcoxon(values, zero_method="pratt", method="asymptotic", correction=False)
-    assert signed_rank(values.tolist()) == pytest.approx(np.asarray(test)[1], rel=1e-13)
+    assert signed_rank(values.tolist()) == np.asarray(test)[1]
 
 
 def test_many_pairs_are_tested_by_the_normal_approximation() -> None:

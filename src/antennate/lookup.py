@@ -183,11 +183,13 @@ def _require_own_modules(path: Path) -> None:
             if own is None:
                 continue
             files += [own] if own.suffix == ".py" else []
-            found = _found(name, path.parent)
-            if found is not None and not found.samefile(own):
+            origin = _origin_of(name, path.parent)
+            if origin is None or (own.is_dir() and not origin.is_dir()):
+                continue  # any module comes before a bare folder, as a clone of its project is
+            if not origin.samefile(own):
                 raise LookupError(
-                    f"no module {name} of its own: Python gives it {found}, not {own}; rename one, "
-                    "or run each by itself"
+                    f"no module {name} of its own: Python gives it {origin}, not {own}; rename "
+                    "one, or run each by itself"
                 )
 
 
@@ -218,7 +220,7 @@ def _is_there(path: Path) -> bool:
         return False
 
 
-def _found(name: str, folder: Path) -> Path | None:
+def _origin_of(name: str, folder: Path) -> Path | None:
     """What Python gives for a name once the folder is searched last; None if that has no file."""
     if name in sys.modules:
         module = sys.modules[name]
@@ -227,8 +229,8 @@ def _found(name: str, folder: Path) -> Path | None:
         spec = PathFinder.find_spec(name, [*sys.path, str(folder)])
         file = None if spec is None or not spec.has_location else spec.origin
         places = () if spec is None else spec.submodule_search_locations or ()
-    found = file or next(iter(places), None)
-    return Path(found) if found is not None and _is_there(Path(found)) else None
+    place = file or next(iter(places), None)
+    return Path(place) if place is not None and _is_there(Path(place)) else None
 
 
 def _module_of(path: Path) -> ModuleType:

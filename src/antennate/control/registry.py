@@ -149,9 +149,7 @@ def make_controller(
     batch = checks.whole("batch", batch, least=1)
     try:
         controller = factory(control, robot, batch)
-    except KeyboardInterrupt:
-        raise
-    except MissingPackageError:
+    except (KeyboardInterrupt, MissingPackageError):
         raise
     except ConfigError as error:
         named = str(error).startswith(f"{name}: ")

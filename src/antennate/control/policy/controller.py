@@ -41,8 +41,8 @@ def require_names(
         ("outputs", [ACTION, *(s.output for s in states)], outputs),
     ):
         if sorted(names) != sorted(wanted):
-            found = ", ".join(names) or "none"
-            raise ConfigError(f"{place}: expected the {kind} {', '.join(wanted)}, found {found}")
+            actual = ", ".join(names) or "none"
+            raise ConfigError(f"{place}: expected the {kind} {', '.join(wanted)}, found {actual}")
 
 
 class Policy:
@@ -76,10 +76,10 @@ class Policy:
         try:
             self._session: Any = ort.InferenceSession(data, options, ["CPUExecutionProvider"])
         except Exception as error:
-            told = in_one_line(error)
-            apart = "external data" in told.lower() or "model_path" in told
+            reason = in_one_line(error)
+            apart = "external data" in reason.lower() or "model_path" in reason
             hint = "; weights that lie in another file are joined by add_contract" if apart else ""
-            raise ConfigError(f"{path}: expected an ONNX model, found {told}{hint}") from error
+            raise ConfigError(f"{path}: expected an ONNX model, found {reason}{hint}") from error
         text = self._session.get_modelmeta().custom_metadata_map.get(KEY)
         if text is None:
             raise ConfigError(

@@ -99,8 +99,8 @@ def scenes(result: Mapping[str, Any]) -> Figure:
 @style.styled
 def profile(rows: Rows, names: Sequence[str]) -> Figure:
     """Share of the draws crossed within a factor of the fastest, a line for each of these names."""
-    factors, found = profiles(rows)
-    shares = {name: found[name] for name in names}
+    factors, by_name = profiles(rows)
+    shares = {name: by_name[name] for name in names}
     colours, short = style.controller_colours(list(shares)), short_names(shares)
     figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()

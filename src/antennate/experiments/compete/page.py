@@ -10,7 +10,7 @@ from antennate.control.registry import about
 from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
-from antennate.experiments.compete.standings import CONTROLLER, PAIR, none_valid
+from antennate.experiments.compete.standings import ALPHA, CONTROLLER, PAIR, none_valid
 from antennate.studies.measures import Table, shown
 
 Result = Mapping[str, Any]
@@ -162,6 +162,23 @@ def sentence(result: Result) -> str:
     )
 
 
+def apart(result: Result) -> str:
+    """Which controllers the tests of success tell apart, in one sentence."""
+    short = short_names(ordered(result))
+    behind: dict[str, list[str]] = {}
+    for pair in result["paired"].values():
+        if pair["mcnemar_holm_p"] < ALPHA and not pair["tie"]:
+            names = pair["names"] if pair["success_difference"] > 0 else pair["names"][::-1]
+            behind.setdefault(names[0], []).append(names[1])
+    leads = [
+        f"`{short[name]}` before {', '.join(f'`{short[n]}`' for n in behind[name])}"
+        for name in ordered(result)
+        if name in behind
+    ]
+    which = "; ".join(leads) or "nobody from nobody"
+    return f"Told apart by McNemar's test, Holm's correction, 5 %: {which}."
+
+
 def markdown(result: Result) -> str:
     """The standing and the scenes as tables in Markdown."""
     names = ordered(result)
@@ -199,6 +216,7 @@ def readme(result: Result, rows: Sequence[Episode]) -> str:
     parts = [
         "# A competition of controllers",
         sentence(result),
+        apart(result),
         markdown(result),
         f"antennate {', '.join(sorted({row.version for row in rows}))}, MuJoCo "
         f"{', '.join(kinds['engine'])}, {', '.join(kinds['processor'])}. "
