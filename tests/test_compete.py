@@ -390,11 +390,10 @@ def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
 def test_what_a_broken_process_held_is_run_again_in_another(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
-    scenes = [SHORT, "flat+time_limit=0.2"]
-    words = ["--controllers", entries("Once"), "--scenes", *scenes, "--trials", "1"]
+    words = ["--controllers", entries("Once"), "--scenes", SHORT, "--trials", "6"]
     assert main(["compete", *words, "--no-figures", "--workers", "1", "--out", "run"]) == 0
     rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["timeout", "timeout"]
+    assert [row.outcome for row in rows] == ["timeout"] * 6
 
 
 def test_entries_with_helpers_of_one_name_each_get_their_own(
@@ -565,6 +564,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ("", "expected a table of trials, found no row"),
         ("controller,scene\nopen,flat\n", "with the columns controller, .*, found none named seed"),
         ("controller;scene\nopen;flat\n", "found none named controller"),
+        (
+            "controller,scene,seed,trial,trial,outcome\nopen,flat,1,0,1,timeout\n",
+            "expected a table of trials, found the column 'trial' twice",
+        ),
         (
             "controller,scene,seed,trial,outcome,time_s,engin\nopen,flat,1,0,timeout,1.0,3\n",
             r"expected a known column, found 'engin' \(did you mean engine\?\)",

@@ -155,6 +155,8 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     try:
         lines = csv.reader(io.StringIO(text), strict=True)
         names = next(lines, [])
+        if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+            raise ValueError(f"the column {twice[0]!r} twice")
         rows: list[dict[str, Any]] = []
         for line in filter(None, lines):
             if len(line) != len(names):

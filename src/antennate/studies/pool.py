@@ -107,6 +107,10 @@ def chunk_of(total: int, workers: int | Workers, most: int) -> int:
     return max(1, min(most, math.ceil(total / (3 * workers_from(workers).count))))
 
 
+def no_group(*task: Any) -> None:
+    """The group of a task where all are of one."""
+
+
 def places_of(records: Iterable[str]) -> set[int]:
     """Places of the tasks that a shard kept, by the keys of its records: those of one call."""
     return {int(key.removeprefix("0.")) for key in records if key.startswith("0.")}
@@ -184,6 +188,7 @@ def gather(
     batched: Callable[..., Any] | None = None,
     again: bool = False,
     fresh: bool = False,
+    group: Callable[..., Any] = no_group,
 ) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
 
@@ -200,6 +205,7 @@ def gather(
         batched: The same for `--engine warp`; see `Work`.
         again: Whether what fails is run again in another process; see `Work`.
         fresh: Whether each chunk has a process of its own; see `Work`.
+        group: group(*task) -> what tasks of one chunk have in common.
 
     Raises:
         WorkerError: A task failed, or its workers died.
@@ -217,7 +223,8 @@ def gather(
         raise WorkerError(
             f"expected {len(tasks)} finished trials, found {len(call.results)}: a shard is missing"
         )
-    parts = [todo[i : i + chunk] for i in range(0, len(todo), chunk)]
+    groups = [[*some] for _, some in itertools.groupby(todo, lambda i: group(*tasks[i]))]
+    parts = [some[i : i + chunk] for some in groups for i in range(0, len(some), chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout

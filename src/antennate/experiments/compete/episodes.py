@@ -160,29 +160,23 @@ def _processor_time() -> float:
 
 
 def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None]) -> None:
-    """Run some episodes of one controller in this process, those of one scene in lockstep.
+    """Run episodes of one controller in one scene with one seed, in this process and in lockstep.
 
     Args:
         draws: What they are run from, each as the only argument of a task.
         emit: Takes the place of each and its row as it ends.
     """
-    cells: dict[tuple[str, str, int], dict[int, int]] = {}
-    for place, (draw,) in enumerate(draws):
-        cells.setdefault((draw.controller, draw.scene, draw.seed), {})[draw.trial] = place
-    for (controller, scene, seed), places in cells.items():
-        config = tunnel_config(scene, controller, seed)
-        first = draws[next(iter(places.values()))][0]
-        name = condition(controller, config.readings[0])
-        needs: list[str] = []
-        make = functools.partial(_timed, first.decision_limit, needs)
+    first = draws[0][0]
+    config = tunnel_config(first.scene, first.controller, first.seed)
+    places = {draw.trial: place for place, (draw,) in enumerate(draws)}
+    needs: list[str] = []
 
-        def take(
-            item: tuple[TrialResult, Any], places: Any = places, needs: list[str] = needs
-        ) -> None:
-            place = places[item[0].trial]
-            emit(place, _row_of(draws[place][0], item[0], " ".join(needs)))
+    def take(item: tuple[TrialResult, Any]) -> None:
+        place = places[item[0].trial]
+        emit(place, _row_of(draws[place][0], item[0], " ".join(needs)))
 
-        run_trials(config, name, list(places), take, make=make)
+    make = functools.partial(_timed, first.decision_limit, needs)
+    run_trials(config, condition(first.controller, config.readings[0]), [*places], take, make=make)
 
 
 def _timed(

@@ -83,8 +83,11 @@ def draws(config: CompeteConfig) -> list[Draw]:
     else:
         rows = read_rows(Path(config.check))
         keys = [(row.controller, row.scene, row.seed, row.trial) for row in rows]
-        order = list(dict.fromkeys(key[0] for key in keys))
-        keys.sort(key=lambda key: order.index(key[0]))
+        first: dict[tuple[Any, ...], int] = {}
+        for place, key in enumerate(keys):
+            first.setdefault(key[:1], place)
+            first.setdefault(key[:3], place)
+        keys.sort(key=lambda key: (first[key[:1]], first[key[:3]]))
     drawn = config.hidden and config.seed not in DEVELOPMENT
     return [Draw(*key, config.decision_limit, drawn) for key in keys]
 
@@ -159,7 +162,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> CompeteOutcome:
-    """Run all episodes; the processes of one controller end before those of the next begin.
+    """Run all episodes; those of one controller in one scene share processes, and no others do.
 
     One that fails, as its controller changed what others need, is run again in a fresh process.
 
@@ -167,26 +170,22 @@ def run(
         WorkerError: A worker process failed.
     """
     workers = replace(workers_from(workers), engine=None, apart=True, _staying=None)
-    planned, rows = draws(config), list[Episode]()
-    for name in dict.fromkeys(draw.controller for draw in planned):
-        own = [draw for draw in planned if draw.controller == name]
-        before = len(rows)
+    planned = draws(config)
 
-        def given_up(place: int, failure: Failure, own: list[Draw] = own) -> Episode:
-            return lost(own[place], failure.reason)
+    def given_up(place: int, failure: Failure) -> Episode:
+        return lost(planned[place], failure.reason)
 
-        def step(done: int, total: int, before: int = before) -> None:
-            on_step(before + done, len(planned))
-
-        rows += gather(
-            run_episodes,
-            [(draw,) for draw in own],
-            *(workers, step, on_row),
-            chunk=chunk_of(len(own), workers, BATCH),
-            together=True,
-            lost=given_up,
-            again=True,
-        )
+    rows = gather(
+        run_episodes,
+        [(draw,) for draw in planned],
+        *(workers, on_step, on_row),
+        chunk=chunk_of(len(planned), workers, BATCH),
+        together=True,
+        lost=given_up,
+        again=True,
+        fresh=True,
+        group=lambda draw: (draw.controller, draw.scene, draw.seed),
+    )
     return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
 
 
