@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from antennate.experiments.force.explained import Curve, by_group, explained
 from antennate.jackknife import jackknife95, median95
-from antennate.studies.statistics import Curve, by_group, explained, mean95
+from antennate.studies.statistics import mean95
 
 
 def test_curve_through_rising_points_is_the_points():

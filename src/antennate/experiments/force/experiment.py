@@ -19,6 +19,7 @@ import numpy as np
 from antennate import figures as style
 from antennate.antenna.statics import Chain, about, equilibrium, with_profile
 from antennate.experiments.bench import bench_films, between
+from antennate.experiments.force.explained import by_group, explained
 from antennate.experiments.force.physics import (
     ForceConfig,
     Points,
@@ -32,7 +33,6 @@ from antennate.sim.bench import Watch
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.pool import Workers, gather
-from antennate.studies.statistics import by_group, explained
 from antennate.types import Floats, Ints
 
 if TYPE_CHECKING:
