@@ -432,6 +432,33 @@ def test_figures_that_did_not_fit_are_drawn_by_resume(
     assert not (tmp_path / "run" / "trials.store.jsonl").exists()
 
 
+def test_shards_together_are_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = [
+        "--controllers",
+        "open",
+        "centre",
+        "--scenes",
+        SHORT,
+        "--trials",
+        "3",
+        "--workers",
+        "1",
+    ]
+    assert main(["compete", *words, "--no-figures", "--out", "whole"]) == 0
+    for number in "12":
+        assert main(["compete", *words, "--shard", f"{number}/2", "--out", f"part{number}"]) == 0
+    assert main(["study", "merge", "part1", "part2", "--no-figures", "--out", "all"]) == 0
+    for name in ("trials.csv", "result.json", "README.md", "config.toml"):
+        assert Path("all", name).read_bytes() == Path("whole", name).read_bytes()
+    capsys.readouterr()
+    assert main(["compete", *words, "--hidden", "--shard", "1/2", "--out", "none"]) == BAD_INPUT
+    assert "each shard would draw a seed of its own" in capsys.readouterr().err
+    assert not Path("none").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [

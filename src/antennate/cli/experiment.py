@@ -225,6 +225,11 @@ def _require_possible(options: Options, config: Params) -> None:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
+    if options.shard is not None and getattr(config, "hidden", False):
+        raise ConfigError(
+            "--shard: expected no --hidden beside it, as each shard would draw a seed of its own; "
+            "give --seed"
+        )
 
 
 _MOST_SHARDS = 999_999

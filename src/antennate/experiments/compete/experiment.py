@@ -204,7 +204,6 @@ EXPERIMENT = Experiment.of_folder(
     failed=failed,
     parts="episodes",
     measures=CONTROLLER,
-    in_shards=False,
     anywhere=False,
     captions={
         "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "
