@@ -1,0 +1,12 @@
+"""Rivals at the gait frequency of `entries/apprentice`, 1 Hz: `docs/science/one_hertz.py:NAME`."""
+
+from antennate.control.registry import make_controller
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Controller
+
+
+def geometric(control: ControlParams, robot: RobotSpec, batch: int) -> Controller:
+    """`geometric` at 1 Hz, what the entry was taught by."""
+    gait = control.gait.model_copy(update={"frequency": 1.0})
+    return make_controller("geometric", control.model_copy(update={"gait": gait}), robot, batch)
