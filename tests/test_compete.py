@@ -432,24 +432,18 @@ def test_figures_that_did_not_fit_are_drawn_by_resume(
     assert not (tmp_path / "run" / "trials.store.jsonl").exists()
 
 
-def test_shards_together_are_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
+    entries: Callable[[str], str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = [
-        "--controllers",
-        "open",
-        "centre",
-        "--scenes",
-        SHORT,
-        "--trials",
-        "3",
-        "--workers",
-        "1",
-    ]
-    assert main(["compete", *words, "--no-figures", "--out", "whole"]) == 0
+    """Wherever they are merged."""
+    words = ["--controllers", "open", entries("Ends"), "--scenes", SHORT, "--trials", "3"]
+    words += ["--workers", "1", "--no-figures"]
+    assert main(["compete", *words, "--out", "whole"]) == 0
     for number in "12":
         assert main(["compete", *words, "--shard", f"{number}/2", "--out", f"part{number}"]) == 0
+    monkeypatch.setattr(antennate.experiments.compete.episodes, "processor", lambda: "another")
     assert main(["study", "merge", "part1", "part2", "--no-figures", "--out", "all"]) == 0
     for name in ("trials.csv", "result.json", "README.md", "config.toml"):
         assert Path("all", name).read_bytes() == Path("whole", name).read_bytes()
@@ -560,6 +554,27 @@ def test_only_a_hidden_run_draws_a_seed_and_takes_no_other(tmp_path: Path) -> No
 
 
 # a table that is run again
+
+
+def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> None:
+    keys = [(5, 0), (6, 1), (5, 1), (6, 0)]
+    rows: list[Episode] = []
+    for seed, trial in keys:
+        run_episodes([(Draw("open", SHORT, seed, trial, 0.05),)], lambda i, row: rows.append(row))
+    assert len({row.progress_m for row in rows}) == len(keys)
+    (tmp_path / "a.csv").write_text(to_csv(map(asdict, rows)))
+    again = antennate.run("compete", check=str(tmp_path / "a.csv"))
+    assert again.summary["check"]["same"] == len(keys)
+    assert sorted((row.seed, row.trial) for row in again.rows) == sorted(keys)
+
+
+def test_a_rival_at_1_hz_walks_as_by_the_parameter() -> None:
+    file = Path(__file__).parents[1] / "docs" / "science" / "one_hertz.py"
+    (row,) = episodes(f"{file}:geometric", scene="uturn+time_limit=6")
+    settings: dict[str, Any] = {"controllers": ["geometric"], "scene": "uturn", "trials": 1}
+    settings |= {"control": {"gait": {"frequency": 1.0}}, "time_limit": 6.0}
+    result = antennate.run("tunnel", seed=DEVELOPMENT.start, **settings)
+    assert row.progress_m == result.rows[0].progress_m > 0.5
 
 
 def test_a_table_is_run_again_and_rows_that_differ_are_named(

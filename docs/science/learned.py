@@ -1,6 +1,7 @@
 """The tables of learned policies in docs/envs.md: `python docs/science/learned.py`.
 
-They are made of rows of docs/science/learned.csv: trials of `antennate tunnel` that the page names.
+They are made of rows of docs/science/learned.csv: trials of `antennate tunnel` that the page names;
+and of docs/science/learned_elsewhere.csv, the table of an `antennate compete` in other scenes.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
+from antennate.experiments.compete.checking import read_rows
 from antennate.studies.statistics import holm, mcnemar, signed_rank
 
 ROWS, SEED = Path(__file__).with_suffix(".csv"), "67957488"
 STUDENT = "taught"
 OTHERS = tuple(f"taught, seed {seed}" for seed in (22, 23, 24, 25))
 RIVALS = ("blind twin", "timed", "timed at 1 Hz", "geometric", "geometric at 1 Hz")
+ELSEWHERE, ENTRY = ROWS.with_name("learned_elsewhere.csv"), "entries/apprentice/policy.onnx"
+CONTROL = "docs/science/one_hertz.py:geometric"
 RESAMPLES = 4000
 
 
@@ -52,6 +56,29 @@ def main() -> None:
     print()
     five = np.mean([own, *students], axis=0)
     compared([(f"| {name} ", five, trials[name]) for name in RIVALS[1:]])
+    print()
+    elsewhere()
+
+
+def elsewhere() -> None:
+    """Print the entry beside its rivals in scenes in which it did not learn, then the control."""
+    trials: dict[tuple[str, str], dict[tuple[int, int], tuple[bool, float]]] = {}
+    for row in read_rows(ELSEWHERE):
+        out = row.outcome == "success"
+        draws = trials.setdefault((row.scene, row.controller), {})
+        draws[row.seed, row.trial] = out, row.time_s if out else row.limit_s
+    for control in (False, True):
+        cells, p = [], []
+        for (scene, name), draws in trials.items():
+            if name != ENTRY and (name == CONTROL) is control:
+                own = np.array([trials[scene, ENTRY][draw] for draw in draws])
+                other = np.array(list(draws.values()))
+                p.append(signed_rank(own[:, 1] - other[:, 1]))
+                crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
+                cell = f"{shown(scene, own)}{shown(name, other)}| {less(own, other)} "
+                cells.append((cell, f"{crossed.mcnemar_p:.2g}"))
+        for (cell, crossed), times in zip(cells, holm(p), strict=True):
+            print(f"{cell}| {times:.2g} | {crossed} |")
 
 
 def compared(pairs: list[tuple[str, np.ndarray, np.ndarray]]) -> None:

@@ -1,4 +1,4 @@
-"""Rivals at the gait frequency of `entries/apprentice`, 1 Hz: `docs/science/one_hertz.py:NAME`."""
+"""A rival of `entries/apprentice` at its gait frequency: `docs/science/one_hertz.py:geometric`."""
 
 from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams
@@ -7,6 +7,6 @@ from antennate.types import Controller
 
 
 def geometric(control: ControlParams, robot: RobotSpec, batch: int) -> Controller:
-    """`geometric` at 1 Hz, what the entry was taught by."""
+    """`geometric` at 1 Hz, by which the entry was taught."""
     gait = control.gait.model_copy(update={"frequency": 1.0})
     return make_controller("geometric", control.model_copy(update={"gait": gait}), robot, batch)

@@ -129,6 +129,8 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
             f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
             "found none"
         )
+    if options.shard is not None and (why := experiment.undivided(config)):
+        raise ConfigError(f"--shard: {why}")
     config = experiment.settled(config, options.out if options.resume or options.retry else None)
     experiment.check(config)
     if options.video:
@@ -224,11 +226,6 @@ def _require_possible(options: Options, config: Params) -> None:
     if options.shard is not None and finished and not options.overwrite:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
-        )
-    if options.shard is not None and getattr(config, "hidden", False):
-        raise ConfigError(
-            "--shard: expected no --hidden beside it, as each shard would draw a seed of its own; "
-            "give --seed"
         )
 
 

@@ -283,6 +283,7 @@ class Experiment(Generic[Config, Found]):
         tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
             trials; None if it is the list of `trials`, or if a run does not go on with more.
         in_shards: Whether its trials are known from the start, so that shards can divide them.
+        undivided: Why they cannot divide those of a configuration; empty where they can.
     """
 
     name: str
@@ -309,6 +310,7 @@ class Experiment(Generic[Config, Found]):
     on_workers: bool = True
     anywhere: bool = True
     in_shards: bool = True
+    undivided: Callable[[Config], str] = lambda config: ""
     tasks: Callable[[Config], Sequence[Any]] | None = None
 
     @property

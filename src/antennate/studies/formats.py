@@ -14,6 +14,7 @@ import json
 import math
 import re
 import sys
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
@@ -155,7 +156,7 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     try:
         lines = csv.reader(io.StringIO(text), strict=True)
         names = next(lines, [])
-        if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        if twice := [name for name, count in Counter(names).items() if count > 1]:
             raise ValueError(f"the column {twice[0]!r} twice")
         rows: list[dict[str, Any]] = []
         for line in filter(None, lines):

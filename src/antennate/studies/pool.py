@@ -107,10 +107,6 @@ def chunk_of(total: int, workers: int | Workers, most: int) -> int:
     return max(1, min(most, math.ceil(total / (3 * workers_from(workers).count))))
 
 
-def no_group(*task: Any) -> None:
-    """The group of a task where all are of one."""
-
-
 def places_of(records: Iterable[str]) -> set[int]:
     """Places of the tasks that a shard kept, by the keys of its records: those of one call."""
     return {int(key.removeprefix("0.")) for key in records if key.startswith("0.")}
@@ -145,7 +141,7 @@ class _Call:
             raise failure.raised()
         result = self._lost(place, failure)
         if self._workers.store is not None:
-            content = {"failure": [failure.status, failure.reason]}
+            content = {"failure": [failure.status, failure.reason], "result": encoded(result)}
             self._workers.store.append(key_of(self._number, place), content)
         self._finish(place, result)
 
@@ -161,19 +157,23 @@ class _Call:
             record = records.pop(key_of(self._number, place), None)
             if record is None:
                 continue
-            if "failure" in record:
-                if self._lost is None or self._workers.retry:
-                    continue
-                result = self._lost(place, Failure(*record["failure"]))
-            else:
-                try:
-                    result = decoded(record["result"], self._packages)
-                except ValueError:
-                    continue  # of a class that is no more: it is run again
+            if "failure" in record and (self._lost is None or self._workers.retry):
+                continue
+            try:
+                result = decoded(record["result"], self._packages)
+            except ValueError:
+                continue  # of a class that is no more: it is run again
             self.results[place] = result
             self._take(result)
         if self.results:
             self._on_step(len(self.results), self._total)
+
+
+def _divided(places: Sequence[int], most: int) -> list[Sequence[int]]:
+    """Parts of at most so many, as few and as alike in size as can be."""
+    count = math.ceil(len(places) / most)
+    ends = [len(places) * k // count for k in range(count + 1)]
+    return [places[first:end] for first, end in itertools.pairwise(ends)]
 
 
 def gather(
@@ -188,7 +188,7 @@ def gather(
     batched: Callable[..., Any] | None = None,
     again: bool = False,
     fresh: bool = False,
-    group: Callable[..., Any] = no_group,
+    group: Callable[..., Any] | None = None,
 ) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
 
@@ -205,7 +205,7 @@ def gather(
         batched: The same for `--engine warp`; see `Work`.
         again: Whether what fails is run again in another process; see `Work`.
         fresh: Whether each chunk has a process of its own; see `Work`.
-        group: group(*task) -> what tasks of one chunk have in common.
+        group: group(*task) -> what neighbouring tasks have in common if one chunk may hold them.
 
     Raises:
         WorkerError: A task failed, or its workers died.
@@ -223,8 +223,8 @@ def gather(
         raise WorkerError(
             f"expected {len(tasks)} finished trials, found {len(call.results)}: a shard is missing"
         )
-    groups = [[*some] for _, some in itertools.groupby(todo, lambda i: group(*tasks[i]))]
-    parts = [some[i : i + chunk] for some in groups for i in range(0, len(some), chunk)]
+    groups = itertools.groupby(todo, lambda i: group(*tasks[i]) if group else None)
+    parts = [part for _, some in groups for part in _divided([*some], chunk)]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout

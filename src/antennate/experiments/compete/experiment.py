@@ -42,7 +42,7 @@ PATIENCE = 120.0
 
 @dataclass(frozen=True, slots=True)
 class CompeteOutcome:
-    """All rows in the order of controllers, scenes and draws, and the table that was checked."""
+    """All rows in the order of `draws`, and the table that was checked."""
 
     config: CompeteConfig
     rows: list[Episode]
@@ -68,7 +68,7 @@ class CompeteOutcome:
 
 
 def draws(config: CompeteConfig) -> list[Draw]:
-    """All that is to be run, controller by controller.
+    """All that is to be run, controller by controller, scene by scene and seed by seed.
 
     Raises:
         ConfigError: The table to check cannot be read.
@@ -83,11 +83,9 @@ def draws(config: CompeteConfig) -> list[Draw]:
     else:
         rows = read_rows(Path(config.check))
         keys = [(row.controller, row.scene, row.seed, row.trial) for row in rows]
-        first: dict[tuple[Any, ...], int] = {}
-        for place, key in enumerate(keys):
-            first.setdefault(key[:1], place)
-            first.setdefault(key[:3], place)
-        keys.sort(key=lambda key: (first[key[:1]], first[key[:3]]))
+        names = list(dict.fromkeys(key[0] for key in keys))
+        cells = {key[:3]: place for place, key in reversed([*enumerate(keys)])}
+        keys.sort(key=lambda key: (names.index(key[0]), cells[key[:3]]))
     drawn = config.hidden and config.seed not in DEVELOPMENT
     return [Draw(*key, config.decision_limit, drawn) for key in keys]
 
@@ -162,7 +160,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> CompeteOutcome:
-    """Run all episodes; those of one controller in one scene share processes, and no others do.
+    """Run all episodes; a process serves one controller in one scene alone, and then ends.
 
     One that fails, as its controller changed what others need, is run again in a fresh process.
 
@@ -196,12 +194,21 @@ def failed(result: Mapping[str, Any]) -> bool:
     return len(none_valid(result)) == len(result["controllers"])
 
 
+def undivided(config: CompeteConfig) -> str:
+    """Why shards cannot divide this run; empty if they can."""
+    hidden = (
+        "expected no --hidden beside it, as each shard would draw a seed of its own; give --seed"
+    )
+    return hidden if config.hidden else ""
+
+
 EXPERIMENT = Experiment.of_folder(
     *(__name__, CompeteConfig, run, tables, sentence),
     settled=settled,
     check=check,
     files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
     failed=failed,
+    undivided=undivided,
     parts="episodes",
     measures=CONTROLLER,
     anywhere=False,
