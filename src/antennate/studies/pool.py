@@ -198,7 +198,7 @@ def gather(
         workers: How many, or `Workers`.
         on_step: Called after each with how many of how many tasks are done.
         on_result: Called with each result as it comes, in no particular order.
-        chunk: Tasks given to a worker at once.
+        chunk: Most tasks that a worker is given at once.
         together: Whether the function takes a chunk at once, and emits its results.
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.
