@@ -205,13 +205,13 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   leave, too. So the student is six draws short of its teacher, and the teacher needs to know its
   way back.
 - **Where it had not learned**, at the corner of 120° and in the dead end, it beats `closed` and
-  `geometric`. On the first draws of the [board](leaderboard.md) it was ahead of both in these two
-  scenes of eight; so 100 fresh draws of each were run, of a hidden seed, 1530184314, with a
-  criterion that stood before, and is as above but for Holm's correction for the four tests. At the
-  corner that is the gait of 1 Hz: its teacher at 1 Hz, the control, is no slower there. In the dead
-  end it is faster than its teacher, too; against `closed` the interval of the mean does not exclude
-  0. `timed` did not run: on the 24 draws of the board that both have, it crosses 18 and 11, the
-  policy 20 and 12.
+  `geometric`. On the first 24 draws of the [board](leaderboard.md) it was ahead of both in these
+  two scenes of eight. So 100 fresh draws of each were run, of a hidden seed, 1530184314. The
+  criterion stood before that run, and is as above, with Holm's correction for the four tests. At
+  the corner the gait alone explains it: its teacher at 1 Hz, the control, is no slower there. In
+  the dead end it is faster than its teacher, too. Against `closed` there, the interval of the mean
+  difference does not exclude zero. It is not shown to beat the clock: of 24 draws of each scene on
+  the board `timed` crosses 18 and 11, the policy 20 and 12.
 
   | scene | crossed of 100 | time [s] | rival | crossed | time [s] | less [s] | Wilcoxon, Holm |
   |---|---|---|---|---|---|---|---|
@@ -223,11 +223,11 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   | | | | at 1 Hz | 37 | 80.5 | -10.8 (-18.4 to -3.2) | 0.021, of 2 |
 
   ```bash
-  uv run antennate compete --hidden --trials 100 --scenes corner deadend --controllers \
+  uv run antennate compete --hidden --trials 100 --scenes corner deadend --controllers \\
       entries/apprentice/policy.onnx closed geometric docs/science/one_hertz.py:geometric
   ```
 
-  61 of its 84 failures there leave by the entrance.
+  56 of its 84 failures there leave by the entrance.
 - **Five training seeds** of the same program, on the same draws. Four were taught after those draws
   were known, but nothing of the program was changed since. The criterion for these tables, too,
   stood before they ran. The entry stays the first, whatever the others reach: to choose the best
