@@ -211,8 +211,8 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   the corner the gait alone explains it: its teacher at 1 Hz, the control, is no slower there. In
   the dead end it is faster than its teacher, too. Against `closed` there, the interval of the mean
   difference does not exclude zero.
-  **It does not beat the clock**: `timed`, run on the same draws once the others were known, is 18.8 s
-  faster at the corner, surely so, and as good in the dead end.
+  **It does not beat the clock**: `timed`, run on the same draws once the others were known, is
+  18.8 s faster at the corner, surely so; in the dead end neither is shown to be better.
 
   | scene | crossed of 100 | time [s] | rival | crossed | time [s] | less [s] | Wilcoxon, Holm |
   |---|---|---|---|---|---|---|---|
