@@ -17,6 +17,7 @@ from hypothesis import settings
 from antennate.cli import main
 from antennate.lookup import ADDED
 from antennate.sim.engine_setup import dropped
+from antennate.studies.pool import core_count
 
 settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
 settings.load_profile("any machine")
@@ -41,6 +42,12 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
 HERE = tempfile.mkdtemp(prefix="tests-")
 """An empty folder to run in, so that no robot.toml that a user left in the clone is read."""
 atexit.register(shutil.rmtree, HERE, ignore_errors=True)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than cores: many tests wait for programs that they started."""
+    return core_count() + 1
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -94,13 +94,13 @@ def test_fifty_links_are_a_cantilever() -> None:
         (10.0, 0.81061, 0.55500),
     ],
 )
-def test_two_hundred_links_are_the_elastica(
+def test_a_hundred_links_are_the_elastica(
     load: float, sideways: float, shortening: float
 ) -> None:
     """Tip of a cantilever under P L^2 / E I (Mattiasson 1981, Int. J. Num. Meth. Eng. 17)."""
-    beam = uniform_beam(1.0, 1.0, 200)
+    beam = uniform_beam(1.0, 1.0, 100)
     angles = equilibrium(beam, np.array([1.0 - 1e-9]) * beam.length, np.array([[0.0, load]])).angles
-    tip = shape(beam, angles)[0, -1] + [1.0 / 400, 0.0]
+    tip = shape(beam, angles)[0, -1] + [1.0 / 200, 0.0]
     assert tip[1] == pytest.approx(sideways, abs=2e-3)
     assert 1.0 - tip[0] == pytest.approx(shortening, abs=2e-3)
 

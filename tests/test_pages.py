@@ -107,7 +107,7 @@ def test_on_a_phone_every_column_of_a_comparison_is_seen_and_what_is_wider_says_
     tmp_path: Path,
 ) -> None:
     three = ("open", "paper", "closed")  # beside one another, wider than a phone
-    settings = {"trials": 2, "time_limit": 12.0, "seed": 5, "controllers": three}
+    settings = {"trials": 2, "time_limit": 4.0, "seed": 5, "controllers": three}
     antennate.run("tunnel", out=tmp_path / "one", **settings)
     words = ["report", "--compare", str(tmp_path / "one"), str(tmp_path / "one")]
     assert main([*words, "--out", str(tmp_path / "both.html")]) == 0
