@@ -94,9 +94,7 @@ def test_fifty_links_are_a_cantilever() -> None:
         (10.0, 0.81061, 0.55500),
     ],
 )
-def test_a_hundred_links_are_the_elastica(
-    load: float, sideways: float, shortening: float
-) -> None:
+def test_a_hundred_links_are_the_elastica(load: float, sideways: float, shortening: float) -> None:
     """Tip of a cantilever under P L^2 / E I (Mattiasson 1981, Int. J. Num. Meth. Eng. 17)."""
     beam = uniform_beam(1.0, 1.0, 100)
     angles = equilibrium(beam, np.array([1.0 - 1e-9]) * beam.length, np.array([[0.0, load]])).angles
