@@ -315,6 +315,8 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
     [
         ("--controllers entries.py:Shape", "expected yaw of shape (1, 5), found (1, 2)"),
         ("--controllers clsoed", "did you mean closed?"),
+        ("--controllers entries.py:Ends ./entries.py:Ends", "controllers must differ"),
+        ("--controllers a/p.onnx open ./a//p.onnx", "controllers must differ"),
         ("--controllers missing.py:Mine", "no file"),
         ("--scenes utrun", "did you mean uturn?"),
         ("--scenes uturn+variation.noise=3", "'uturn+variation.noise=3': "),

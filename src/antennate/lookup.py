@@ -103,15 +103,18 @@ class Registry(Generic[T]):
         self.added[name] = value
 
     def check(self, name: str) -> str:
-        """Return the name if it may be valid; no code of the user runs.
+        """Return the name if it may be valid, that of a file in its shortest form; no code runs.
 
         Raises:
             ConfigError: It is neither a known name nor MODULE:NAME nor FILE.py:NAME.
         """
         place, _, attribute = name.rpartition(":")
-        known = name in self._ours or name in self.added or name in self.names
-        if known or (place and attribute) or Path(name).suffix in self._files:
+        if name in self._ours or name in self.added or name in self.names:
             return name
+        if place and attribute:
+            return f"{Path(place)}:{attribute}" if place.endswith(".py") else name
+        if Path(name).suffix in self._files:
+            return str(Path(name))
         forms = "FILE.xml, MODULE:NAME" if self._kind == "scene" else "MODULE:NAME"
         forms = ", ".join([*(f"FILE{end}" for end in self._files), forms])
         meant = f" (did you mean {name}:NAME?)" if name.endswith(".py") else ""
