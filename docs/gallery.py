@@ -49,11 +49,11 @@ FEW = {
     "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
     "geometry": "--gaits 4 --wave-numbers 1 --leads 5 --front-waves 1 --turns 2 --repeats 2",
-    "climb": "--trials 1 --heights 0.05 --grounds gap:0.1 --conditions climb --time-limit 30",
+    "climb": "--trials 1 --heights 0.05 --grounds gap:0.1 --conditions climb --sensing 1 --time-limit 9",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",
-    "dataset": "--trials 20",
+    "dataset --seed 1": "--trials 10",
     "bench touch": "--trials 1 --speeds 0.15",
     "tunnel": "--trials 1 --time-limit 20",
     "bench wall": "--trials 1",
@@ -76,12 +76,15 @@ def check() -> None:
     """Compare the pictures with the pages, and the gallery with the experiments.
 
     Raises:
-        SystemExit: A picture is missing, one is shown nowhere, or the gallery lacks an experiment.
+        SystemExit: A picture is missing, one is shown nowhere, the gallery lacks an experiment, or
+            options of --quick are those of no command in it.
     """
     text = (ROOT / "gallery.md").read_text(encoding="utf-8")
     names = map(command_words, experiments.names())
     if lacks := [name for name in names if f"`antennate {name}" not in text]:
         raise SystemExit(f"docs/gallery.md: expected every experiment, lacks {', '.join(lacks)}")
+    if unused := FEW.keys() - gallery().keys():
+        raise SystemExit(f"docs/gallery.py: expected headings, found {', '.join(sorted(unused))}")
     pages = [*ROOT.rglob("*.md"), ROOT.parent / "README.md"]
     shown = {name for page in pages for name in _PICTURE.findall(page.read_text(encoding="utf-8"))}
     there = {path.name for path in IMAGES.iterdir()}
