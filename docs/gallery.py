@@ -49,7 +49,8 @@ FEW = {
     "bench force": "--profiles descending --speeds 0.15 --place-step 0.1",
     "gait": "--sweep-points 4 --cycles 2",
     "geometry": "--gaits 4 --wave-numbers 1 --leads 5 --front-waves 1 --turns 2 --repeats 2",
-    "climb": "--trials 1 --heights 0.05 --grounds gap:0.1 --conditions climb --sensing 1 --time-limit 9",
+    "climb": "--trials 1 --heights 0.05 --grounds gap:0.1 --conditions climb --sensing 1 "
+    "--time-limit 10",
     "gait --config examples/hexapod.toml": "--draws 5 --sweep-points 4",
     "study studies/wall_design.toml": "--trials 1",
     "bench sweep": "--profiles descending --estimate.trials 8",
