@@ -63,6 +63,7 @@ def test_a_long_recording_has_the_intervals_of_its_pushes(tmp_path: Path) -> Non
     assert ends[0] == pytest.approx(ends[1], rel=0.002)  # one reading lies between two pushes
 
 
+@pytest.mark.slow
 def test_intervals_over_four_pushes_hold_the_truth_as_often_as_they_say() -> None:
     """Pushes with offsets of their own about the true curve: of 60 sets, 52 is beyond three sigma.
 

@@ -25,10 +25,8 @@ PARAMS = ClimbParams()
 RISE = 0.12
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["climb", *(pytest.param(name, marks=pytest.mark.slow) for name in ("lifted", "rhythm"))],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["climb", "lifted", "rhythm"])
 def test_controllers_that_climb_keep_the_contract(name: str) -> None:
     check_controller(name, robot=ROBOT)
 

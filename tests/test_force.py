@@ -151,8 +151,10 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
     "speeds",
     [
         (0.5,),
-        *(pytest.param(s, marks=pytest.mark.slow) for s in ((0.4, 0.8), (0.3, 0.6, 0.9))),
-        (0.2, 0.4, 0.6, 0.8),
+        *(
+            pytest.param(s, marks=pytest.mark.slow)
+            for s in ((0.4, 0.8), (0.3, 0.6, 0.9), (0.2, 0.4, 0.6, 0.8))
+        ),
     ],
 )
 def test_traverses_that_fit_and_that_test_meet_every_speed_in_any_order(

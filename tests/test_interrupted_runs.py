@@ -295,7 +295,7 @@ def test_help_lists_no_option_that_is_always_refused(
     assert OF_WORKERS - listed == missing
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_walls_of_which_none_is_valid_end_with_2(
     workers: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

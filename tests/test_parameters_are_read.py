@@ -280,7 +280,7 @@ PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
 
 
-LONGEST = ("geometry", "climb", "dataset")
+LONGEST = ("geometry", "climb", "dataset", "sweep")
 
 
 @pytest.mark.parametrize(

@@ -198,6 +198,7 @@ def test_killed_twice_before_its_first_trial_the_old_run_is_still_there() -> Non
     assert contents("run.old") == before
 
 
+@pytest.mark.slow
 def test_killed_after_its_first_trial_the_new_run_goes_on() -> None:
     before = contents("run")
     killed_once(Path("begun"), slow_study(free=1))

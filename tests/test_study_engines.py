@@ -453,7 +453,11 @@ def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
     [
         ("tunnel", ["--trials", "3", "--time-limit", "0.5", "--controllers", "open", "closed"]),
         ("wall", ["--trials", "2", "--profiles", "stiff", *NEAR]),
-        ("gait", ["--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2", *QUICK]),
+        pytest.param(
+            "gait",
+            ["--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2", *QUICK],
+            marks=pytest.mark.slow,
+        ),
         ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3"]),
     ],
 )

@@ -141,7 +141,9 @@ def test_what_varies_for_a_function_has_a_name_of_its_own(
     assert ": expected another name, " in line
 
 
-@pytest.mark.parametrize("name", ["assumptions", "difficulty"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("assumptions", marks=pytest.mark.slow), "difficulty"]
+)
 def test_the_studies_of_the_tunnel_can_be_run(name: str) -> None:
     file = Path(__file__).parents[1] / "studies" / f"tunnel_{name}.toml"
     study.check(read_file(file, StudyConfig))

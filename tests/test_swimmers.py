@@ -199,6 +199,7 @@ def test_the_search_finds_the_published_stroke() -> None:
     np.testing.assert_allclose(metres.cosine, stroke.cosine, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_corrected_integral_is_good_in_minimum_perturbation_coordinates_alone() -> None:
     chain = purcell()
     for link in range(3):
@@ -280,7 +281,7 @@ def test_plain_and_corrected_integrals_are_those_of_their_curvatures() -> None:
 
 
 @pytest.mark.parametrize(
-    "links", [3, 4, 5, 6, *(pytest.param(n, marks=pytest.mark.slow) for n in (7, 8, 9)), 10]
+    "links", [3, 4, 5, 6, *(pytest.param(n, marks=pytest.mark.slow) for n in range(7, 11))]
 )
 def test_small_strokes_of_least_energy_are_the_ellipse_of_the_largest_eigenvalue(
     links: int,
@@ -417,6 +418,7 @@ def test_two_mirrored_lobes_go_farther_the_other_way() -> None:
     np.testing.assert_allclose([least[2], most[2]], 0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_links_are_those_at_which_the_centred_loop_is_best() -> None:
     assert max((1.2, ARM, 1.5), key=centred) == ARM
 
