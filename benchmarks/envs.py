@@ -96,8 +96,6 @@ def first_observations(scene: str, numbers: list[int]) -> list[str]:
     texts = []
     for number in numbers:
         observation, info = env.reset(seed=7, options={"episode_number": number})
-        if info["episode_number"] < number:
-            raise SystemExit(f"expected episode {number}, found {info['episode']}")
         texts.append(observation.tobytes().hex() + np.array(info["head"]).tobytes().hex())
         for step in range(WALKED):
             env.step((number + step) % 4)

@@ -91,6 +91,11 @@ def main() -> None:
     paths = [word for word in sys.argv[1:] if not word.startswith("-")]
     if paths and "--check" in sys.argv[1:]:
         sys.exit("expected --check or tables to join, found both")
+    page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        sys.exit(f"leaderboard.md: expected the lines {BEGIN} and {END}")
     if paths:
         try:
             table = joined(paths)
@@ -99,9 +104,6 @@ def main() -> None:
         ROWS.write_text(table, encoding="utf-8")
     rows = read_rows(ROWS)
     result = result_of(rows)
-    page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
-    before, _, rest = page.partition(BEGIN)
-    _, _, after = rest.partition(END)
     text = f"{before}{BEGIN}\n{board(rows, result)}\n{END}{after}"
     if "--check" not in sys.argv[1:]:
         from antennate.experiments.compete.figure import drawn

@@ -323,7 +323,10 @@ def main() -> None:
     parser.add_argument("--readings", default="own", choices=["own", "none"])
     parser.add_argument("--decisions", type=int, default=60_000)
     parser.add_argument("--seed", type=int, default=1)
-    print(teach(parser.parse_args()))
+    options = parser.parse_args()
+    if options.decisions < 1:
+        parser.error(f"--decisions: expected at least 1, found {options.decisions}")
+    print(teach(options))
 
 
 if __name__ == "__main__":

@@ -25,12 +25,19 @@ class RslRlEnv(VecEnv):
         name: Id of the environment.
         num_envs: Number of robots B.
         seed: Seed of the episodes.
-        values: As of `gym.make_vec`; the action is a gait if they name none.
+        values: As of `gym.make_vec`; the action is a gait if they name none. A scene that draws its
+            limit, as corridors do, needs a `time_limit`.
+
+    Raises:
+        ValueError: The action is no vector of numbers.
     """
 
     def __init__(self, name: str, num_envs: int, seed: int = 0, **values: Any) -> None:
-        values = {"action": "gait", "autoreset_mode": "SAME_STEP", **values}
+        action = {} if "interface" in values else {"action": "gait"}
+        values = {**action, "autoreset_mode": "SAME_STEP", **values}
         self._envs: Any = gym.make_vec(name, num_envs=num_envs, **values)
+        if not isinstance(self._envs.single_action_space, gym.spaces.Box):
+            raise ValueError("expected the action gait or joints, which rsl_rl can answer")
         self.num_envs, self.device, self.cfg = num_envs, torch.device("cpu"), values
         self.num_actions = self._envs.single_action_space.shape[0]
         config = self._envs.config

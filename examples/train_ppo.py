@@ -266,8 +266,8 @@ def main() -> None:
             f"expected a worker for each of {len(options.scene)} scenes, found "
             f"--workers {options.workers}"
         )
-    needed = [options.begin] if options.begin else [options.out] if options.export else []
-    for folder in needed:
+    needed = (options.begin, options.out if options.export else None)
+    for folder in filter(None, needed):
         if not (folder / "weights.npz").is_file():
             parser.error(f"expected saved weights, found no {folder / 'weights.npz'}")
     if not options.export:

@@ -75,6 +75,13 @@ def test_a_scene_that_is_added_gets_one(monkeypatch: pytest.MonkeyPatch) -> None
             del gym.registry[name]
 
 
+def test_scenes_whose_ids_are_the_same_are_named() -> None:
+    for name in ("my-floor", "my_floor"):
+        SCENES.add(name, lambda: FlatScene(0.5))
+    with pytest.raises(ConfigError, match=r"MyFloor-v1: .* found my-floor and my_floor"):
+        envs.register()
+
+
 def test_gymnasium_finds_them_by_the_package_which_stays_free_of_it() -> None:
     code = (
         "import sys, antennate; assert 'gymnasium' not in sys.modules; "
@@ -158,6 +165,8 @@ def test_time_and_number_of_decisions_truncate() -> None:
 
 def test_a_robot_on_its_back_has_overturned() -> None:
     env = single("Flat")
+    with pytest.raises(ResetNeeded, match="before the world"):
+        _ = env.world
     env.reset(seed=1)
     world = env.world
     quaternion = world.data.qpos[world.root + 3 : world.root + 7]
@@ -391,8 +400,9 @@ def test_actions_seeds_and_masks_are_looked_at() -> None:
     for mask in ([True], [False, False], [1, 0]):
         with pytest.raises(ConfigError, match="reset_mask: expected 2 booleans"):
             env.reset(options={"reset_mask": np.array(mask)})
-    with pytest.raises(ConfigError, match="seed: expected a whole number"):
-        env.reset(seed=-1)
+    for seed in (-1, True, 2**63):
+        with pytest.raises(ConfigError, match="seed: expected a whole number of 0 to 4611686"):
+            env.reset(seed=seed)
     with pytest.raises(ConfigError, match="autoreset_mode: expected one of"):
         vector(2, "Flat", autoreset_mode="NEXTSTEP")
 
@@ -463,12 +473,12 @@ def test_a_first_seed_is_that_of_rows_that_are_not_reset_with_it_too():
         ({"seed": "ab"}, "seed: expected a whole number, or 2 of them, found 'ab'"),
         ({"seed": np.array(4)}, "seed: expected a whole number, or 2 of them, found "),
         ({"seed": [1, 2, 3]}, "seed: expected 2 of them, found 3"),
-        ({"seed": [1, [2]]}, "seed: expected a whole number of at least 0, found "),
+        ({"seed": [1, [2]]}, "seed: expected a whole number of 0 to 4611686018427387904, found "),
         ({"seed": {1, 2}}, "seed: expected a whole number, or 2 of them, found "),
-        ({"seed": [1, -2]}, "seed: expected a whole number of at least 0, found -2"),
+        ({"seed": [1, -2]}, "seed: expected a whole number of 0 to 4611686018427387904, found -2"),
         ({"options": {"episode_number": [1, 2, 3]}}, "episode_number: expected 2 of them, found 3"),
         ({"options": {"episode_number": [0, [1]]}}, "episode_number: expected a whole number of"),
-        ({"options": {"episode_number": 0.5}}, "episode_number: expected a whole number of at"),
+        ({"options": {"episode_number": 0.5}}, "episode_number: expected a whole number of 0"),
         (
             {"options": {"mask": [True, True]}},
             "expected reset_mask or episode_number, found 'mask'",
@@ -498,7 +508,10 @@ def test_an_unknown_option_of_a_reset_is_refused(options, said):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({"num_envs": 2.5}, "num_envs: expected a whole number of at least 0, found 2.5"),
+        (
+            {"num_envs": 2.5},
+            "num_envs: expected a whole number of 0 to 4611686018427387904, found 2.5",
+        ),
         ({"action": "gait", "interface": None}, "interface: expected values by name, found None"),
         (
             {"action": "gait", "interface": {"action": "joints"}},

@@ -15,12 +15,10 @@ import pytest
 from antennate.control.policy.controller import Policy
 from antennate.control.policy.interface import PolicyInterface
 from antennate.control.policy.observer import Observer
-from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.testing import check_controller
 from antennate.types import AntennaFrame
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -156,26 +154,3 @@ def test_the_example_teaches_and_its_policy_walks(tmp_path: Path) -> None:
     config = TunnelConfig(time_limit=3.0, scene="uturn", controllers=(str(path),))
     run_trials(config, str(path), [0], lambda r: rows.append(r[0]))
     assert rows[0].outcome != "invalid"
-
-
-ENTRY = Path(__file__).parents[1] / "entries/apprentice"
-
-
-def test_the_entry_keeps_the_protocol_of_controllers() -> None:
-    pytest.importorskip("onnxruntime")
-    path = str(ENTRY / "policy.onnx")
-    check_controller(lambda c, r, b: make_controller(path, c, r, b))
-
-
-def test_the_entry_answers_by_what_it_feels() -> None:
-    pytest.importorskip("onnxruntime")
-    policy, rng = Policy(ENTRY / "policy.onnx"), np.random.default_rng(8)
-    names = [quantity.name for quantity in policy.contract.observations]
-    felt = [i for i, name in enumerate(names) if name.startswith("flex")]
-    own = rng.normal(0.0, 1.0, (200, len(names))).astype(np.float32)
-    other = own.copy()
-    other[:, felt] = rng.normal(0.5, 1.0, (200, len(felt)))
-    before, after = (
-        [policy.answer(x[None], policy.start())[0] for x in seen] for seen in (own, other)
-    )
-    assert (np.array(before) != np.array(after)).any()

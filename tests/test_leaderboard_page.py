@@ -52,6 +52,15 @@ def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -
     assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
 
 
+def test_a_page_without_its_marks_is_left_as_it_is(page: Path) -> None:
+    page.write_text(page.read_text().replace("<!-- end of board -->", ""))
+    before = page.read_text()
+    done = run(page.parent, str(page.with_suffix(".csv")))
+    assert done.returncode == 1
+    assert "expected the lines <!-- board" in done.stderr
+    assert page.read_text() == before
+
+
 def test_tables_of_several_runs_are_joined(page: Path, tmp_path: Path) -> None:
     file = page.with_suffix(".csv")
     (tmp_path / "a.csv").write_text(file.read_text())

@@ -314,7 +314,25 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
     old = json.loads(contract().model_dump_json()) | {"version": 2}
     model.metadata_props.add(key="antennate", value=json.dumps(old))
     (tmp_path / "new.onnx").write_bytes(model.SerializeToString())
+    for name, shape in {"less": [-1, 1], "much": [10**6, 2], "other": [1, 2]}.items():
+        model = onnx.load(str(counting(tmp_path / "state.onnx")))
+        found = json.loads(model.metadata_props[0].value)
+        found["states"][0]["shape"] = shape
+        model.metadata_props[0].value = json.dumps(found)
+        model.graph.input[1].type.tensor_type.shape.dim[1].dim_param = "any"
+        model.graph.output[1].type.tensor_type.shape.dim[1].dim_param = "some"
+        if name == "other":  # a sum that has one column whatever it is given
+            axes = onnx.numpy_helper.from_array(np.array([1], np.int64), "axes")
+            model.graph.initializer.append(axes)
+            total = onnx.helper.make_node("ReduceSum", ["n", "axes"], ["sum"], keepdims=1)
+            model.graph.node.insert(0, total)
+            for node in model.graph.node[1:]:
+                node.input[:] = ["sum" if each == "n" else each for each in node.input]
+        (tmp_path / f"{name}.onnx").write_bytes(model.SerializeToString())
     for name, words in {
+        "less": "states[0].shape: expected a shape of 1 to 1000000 numbers, found [-1, 1]",
+        "much": "states[0].shape: expected a shape of 1 to 1000000 numbers, found [1000000, 2]",
+        "other": "expected m of shape (1, 2), found (1, 1)",
         "bare": "expected a policy with a contract",
         "text": "expected an ONNX model",
         "size": "expected action of shape (1, 4), found (1, 3)",

@@ -5,7 +5,7 @@ Importing this registers them; see docs/envs.md.
 
 from __future__ import annotations
 
-from antennate.errors import MissingPackageError
+from antennate.errors import ConfigError, MissingPackageError
 
 try:
     from gymnasium.envs import registration
@@ -34,13 +34,21 @@ _NAMES = {"uturn": "UTurn", "corner": "Corner120", "deadend": "DeadEnd"}
 
 
 def ids() -> dict[str, str]:
-    """The scene of each environment, by its id."""
-    names = {name: _NAMES.get(name, _capitals(name)) for name in SCENES.names}
-    return {f"{NAMESPACE}/{name}-v{VERSION}": scene for scene, name in names.items()}
+    """The scene of each environment, by its id.
+
+    Raises:
+        ConfigError: Two scenes have names that differ in no letter.
+    """
+    found: dict[str, str] = {}
+    for scene in SCENES.names:
+        full = f"{NAMESPACE}/{_NAMES.get(scene, _capitals(scene))}-v{VERSION}"
+        if (other := found.setdefault(full, scene)) != scene:
+            raise ConfigError(f"{full}: expected one scene of that id, found {other} and {scene}")
+    return found
 
 
 def register() -> tuple[str, ...]:
-    """Register an environment for every scene that has a name; the ids.
+    """Register an environment for every scene that has a name; the ids. Raises what `ids` does.
 
     Importing this module does so; call it again after a scene was added. Each has a second id
     without the namespace, for `gymnasium.make("antennate:Tunnel-v1")`.

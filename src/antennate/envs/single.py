@@ -51,7 +51,13 @@ class AntennaEnv(Env[Any, Any]):
 
     @property
     def world(self) -> World:
-        """The world of the running episode: what only the simulation knows, and its engine."""
+        """The world of the running episode: what only the simulation knows, and its engine.
+
+        Raises:
+            ResetNeeded: There is no episode.
+        """
+        if not self._episodes.running.all():
+            raise ResetNeeded("expected a reset before the world of an episode")
         return self._episodes.world(0)
 
     def reset(

@@ -164,9 +164,10 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
         count = self.num_envs
         self._seed_by_chance(seed)
         if isinstance(seed, int | np.integer):
-            self._np_random, self._np_random_seed = _generator(int(seed)), int(seed)
+            number = whole("seed", seed)
+            self._np_random, self._np_random_seed = np.random.default_rng(number), number
             for row in np.flatnonzero(rows | (not self._seeded)).tolist():
-                self._episodes.seed(row, int(seed), row, count)
+                self._episodes.seed(row, number, row, count)
         elif seed is not None:
             seeds = _each("seed", seed, count)
             for row in np.flatnonzero(rows).tolist():
@@ -200,10 +201,6 @@ def _is_list(values: Any) -> bool:
     return array or (isinstance(values, Sequence) and not isinstance(values, str))
 
 
-def _generator(seed: int) -> np.random.Generator:
-    return np.random.default_rng(whole("seed", seed))
-
-
 def known_options(options: Mapping[str, Any] | None, names: Sequence[str]) -> Mapping[str, Any]:
     """The options of a reset.
 
@@ -225,10 +222,13 @@ def whole(name: str, value: Any) -> int:
     """A seed or the number of an episode.
 
     Raises:
-        ConfigError: It is no whole number of at least 0.
+        ConfigError: It is no whole number of 0 to `LARGEST_SEED`.
     """
-    if not isinstance(value, int | np.integer) or not 0 <= value <= LARGEST_SEED:
-        raise ConfigError(f"{name}: expected a whole number of at least 0, found {shown(value)}")
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_whole or not 0 <= value <= LARGEST_SEED:
+        raise ConfigError(
+            f"{name}: expected a whole number of 0 to {LARGEST_SEED}, found {shown(value)}"
+        )
     return int(value)
 
 

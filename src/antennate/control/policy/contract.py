@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
-from pydantic import ValidationError
+from pydantic import ValidationError, field_validator
 
 from antennate.control.policy.interface import (
     VERSION,
@@ -32,6 +32,8 @@ from antennate.robots.spec import RobotSpec
 
 KEY = "antennate"
 """Name of the metadata of a file that holds the contract."""
+LARGEST_STATE = 1_000_000
+"""Numbers that one recurrent state may have."""
 
 
 class Entry(Strict):
@@ -56,6 +58,15 @@ class State(Strict):
     input: str
     output: str
     shape: tuple[int, ...]
+
+    @field_validator("shape")
+    @classmethod
+    def _of_some_numbers(cls, shape: tuple[int, ...]) -> tuple[int, ...]:
+        if min(shape, default=1) < 1 or math.prod(shape) > LARGEST_STATE:
+            raise ValueError(
+                f"expected a shape of 1 to {LARGEST_STATE} numbers, found {list(shape)}"
+            )
+        return shape
 
 
 class Contract(Strict):

@@ -92,7 +92,7 @@ class Policy:
         )
         size = len(self.contract.observations)
         try:
-            answer, _ = self.answer(np.zeros((1, size), np.float32), self.start())
+            answer, states = self.answer(np.zeros((1, size), np.float32), self.start())
         except ControllerError as error:
             takes = ", ".join(f"{node.name} as {node.type} {node.shape}" for node in inputs)
             raise ConfigError(
@@ -104,6 +104,11 @@ class Policy:
                 f"{path}: expected {ACTION} of shape (1, {len(self.contract.actions)}), found "
                 f"{answer.shape}"
             )
+        for state in self.contract.states:
+            if (shape := states[state.input].shape) != state.shape:
+                raise ConfigError(
+                    f"{path}: expected {state.output} of shape {state.shape}, found {shape}"
+                )
 
     def start(self) -> dict[str, Vector]:
         """The recurrent states of a robot that begins, by input."""

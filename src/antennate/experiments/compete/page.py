@@ -185,8 +185,8 @@ def markdown(result: Result) -> str:
     short = short_names(names)
     lines = [
         "| controller | rank (95 %) | successes | Wilson 95 % by draws [%] | restricted mean time "
-        "[% of limit] (95 %) | speed [m/s] | on its back | INVALID |",
-        "|---|---|---|---|---|---|---|---|",
+        "[% of limit] (95 %) | speed over successes [m/s] | fell | on its back | INVALID |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name in names:
         row = result["controllers"][name]
@@ -196,7 +196,8 @@ def markdown(result: Result) -> str:
         lines.append(
             f"| `{short[name]}` | {rank} | {row['successes']} of {row['episodes']} | "
             f"{shown(row['wilson95'], '.0f', 100.0)} | {time} ({ends}) | "
-            f"{shown(row['speed_m_s'], '.3f')} | {row['overturned']} | {row['invalid']} |"
+            f"{shown(row['speed_m_s'], '.3f')} | {row['fell']} | {row['overturned']} | "
+            f"{row['invalid']} |"
         )
     lines += ["", f"| scene | {' | '.join(f'`{short[n]}`' for n in names)} |"]
     lines += ["|---" * (len(names) + 1) + "|"]

@@ -43,6 +43,7 @@ CONTROLLER = (
     Measure("speed_m_s", "speed over successes", "m/s", form=".3f", interval="speed_95"),
     Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
     Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
+    Measure("fell", "fell", of=count("outcome", "fell"), form="d"),
     Measure("overturned", "on its back at the end", of=total, form="d"),
     Measure("invalid", "INVALID", of=count("outcome", "invalid"), form="d"),
 )
