@@ -58,6 +58,19 @@ def test_holm_raises_p_values_as_its_paper_says(p: list[float], wanted: list[flo
     assert holm(p) == pytest.approx(wanted)
 
 
+def test_each_way_to_end_is_counted_and_together_they_are_all_episodes() -> None:
+    ends = ["success", "timeout", "left", "overturned", "fell", "fell", "invalid"]
+    rows = [
+        replace(row, outcome=end, overturned=end == "overturned")
+        for row, end in zip(rows_of("open", [LIMIT] * 7), ends, strict=True)
+    ]
+    result = standings(rows, 0.01)
+    names = ("successes", "timeouts", "left", "overturned", "fell", "invalid")
+    assert [result["controllers"]["open"][name] for name in names] == [1, 1, 1, 1, 2, 1]
+    assert "| fell | on its back | INVALID |" in markdown(result)
+    assert markdown(result).splitlines()[2].endswith("| 2 | 1 | 1 |")
+
+
 def test_a_difference_that_two_processors_make_is_a_tie() -> None:
     """200 and 198 of 200; 197 is beyond it."""
     first = rows_of("a", [10.0] * 200)
