@@ -295,7 +295,9 @@ uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
   they are zeros at a start. A policy starts at the first reading that can be used; until then the
   robot holds, and nothing enters its history.
 - A policy made for another robot, rate, gait, observation or action is refused before the first
-  trial, with what was expected and what was found. Ids, directions and zeros of servos may differ.
+  trial, with what was expected and what was found. Ids, directions and zeros of servos may differ,
+  and so may the calibration of the antennae: one that is given `counts` is right for the sensor it
+  was trained with alone, `flex` and `level` are made of any sensor by its own calibration.
 - An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind
   every controller.
 
