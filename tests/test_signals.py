@@ -137,6 +137,30 @@ def test_B19_a_signal_that_came_before_the_first_tick_ends_the_drive_with_a_repo
     assert made.session.tally.sent == 0
 
 
+@pytest.mark.parametrize("where", ["before", "within"])
+def test_B19_a_tick_that_a_signal_ends_is_told_once_and_whole(where: str) -> None:
+    """As a log is told of it, which is complete."""
+    made, begun, told = rig(TwinConfig()), list[float](), list[float]()
+
+    def strike(at: str) -> None:
+        if at == where and len(begun) == 30:
+            signal.raise_signal(signal.SIGINT)
+
+    def watches() -> bool:
+        strike("before")
+        return True
+
+    def on_tick(_: Any, t: float) -> None:
+        begun.append(t)
+        strike("within")
+        told.append(t)
+
+    report = drive(made.session, CONFIG, True, on_tick, Operator(watches=watches))
+    assert (report.ended, report.safe) == ("a signal", True)
+    assert report.timing is not None
+    assert len(begun) == len(told) == report.timing.ticks == (31 if where == "before" else 30)
+
+
 def test_torque_waits_until_somebody_sees_the_robot() -> None:
     made, asked = rig(TwinConfig()), [0]
 

@@ -141,7 +141,8 @@ def drive(
         session: As from `connect`.
         config: For how long.
         arm: Whether torque may come on.
-        on_tick: Called after every tick with the session and the time [s].
+        on_tick: Called once after every tick with the session and the time [s]. A signal does not
+            interrupt it: it ends the drive afterwards.
         operator: Who may stop it. Its signals are ignored afterwards.
     """
     going = _Going(session, config, arm, on_tick, operator)
@@ -154,6 +155,7 @@ def drive(
                 run_loop(session, session.control, session.period, partial(going.step, stop))
             finally:
                 stop.closed = True
+                going.tell()
         except KeyboardInterrupt as error:  # of a signal, or of a controller that asks to end
             report.ended = _SIGNAL if stop.received else str(error) or "its controller"
         finally:
@@ -187,6 +189,7 @@ class _Going:
         patience, longest = config.touch.patience, config.duration or math.inf
         self._dry = DryRun(session.quality, config.dry_run, patience, arm, longest)
         self._failed_at = math.inf
+        self._told = 0
         pressed = operator.pressed
         self._key = None if pressed is None else DeadMan(config.dead_man, pressed)
         session.orders.released = self._key is not None
@@ -203,7 +206,9 @@ class _Going:
             session.orders.released = key.released
         self.report.refusal = dry.refusal
         self.report.watch(session)
-        self._on_tick(session, session.clock.now())
+        stop.closed = True  # what was done is logged once, whole
+        self.tell()
+        stop.closed = False
         over = self._failed(t)
         at_end = "a fault" if self._failed_at < math.inf else "the end of its time"
         reasons = (
@@ -215,6 +220,13 @@ class _Going:
         )
         self.report.ended = next((text for true, text in reasons if true), "")
         return not self.report.ended
+
+    def tell(self) -> None:
+        """Tell the last tick to `on_tick`, unless that is done: a signal may come between both."""
+        timing = self._session.timing
+        if timing is not None and timing.ticks > self._told:
+            self._told = timing.ticks
+            self._on_tick(self._session, self._session.clock.now())
 
     def _failed(self, t: float) -> bool:
         """Whether the time to look at a fault is over, and torque can be taken off now or never."""
