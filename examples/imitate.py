@@ -4,7 +4,6 @@
     antennate tunnel --scene uturn --controllers timed geometric my_policy/policy.onnx --seed 5
 
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
-
 The teacher is the search of `geometric`, its ways and angles by a faster gait. The student learns
 on its own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in
 turns with the teacher; the teacher says at each decision how to go on after what the student did;
@@ -308,10 +307,8 @@ def teach(options: argparse.Namespace) -> Path:
         minutes = (time.monotonic() - start) / 60.0
         print(f"{minutes:.1f} min: {decisions} decisions, {100 * right:.0f} % as told", flush=True)
     lessons.train(10, RATE / 5)
-    about = (
-        f"examples/imitate.py, scenes {' '.join(options.scene)}, readings {readings}, seed "
-        f"{options.seed}, {decisions} decisions"
-    )
+    words = f"scenes {' '.join(options.scene)}, readings {readings}, seed {options.seed}"
+    about = f"examples/imitate.py, {words}, {decisions} decisions"
     options.out.mkdir(parents=True, exist_ok=True)
     return network.save(options.out / "policy.onnx", classes[0].envs.unwrapped.config, about)
 

@@ -25,8 +25,7 @@ class RslRlEnv(VecEnv):
         name: Id of the environment.
         num_envs: Number of robots B.
         seed: Seed of the episodes.
-        values: As of `gym.make_vec`; the action is a gait if they name none. A scene that draws its
-            limit, as corridors do, needs a `time_limit`.
+        values: As of `gym.make_vec`, a gait if they name no action; corridors need `time_limit`.
 
     Raises:
         ValueError: The action is no vector of numbers.
