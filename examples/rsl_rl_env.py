@@ -32,7 +32,7 @@ class RslRlEnv(VecEnv):
     """
 
     def __init__(self, name: str, num_envs: int, seed: int = 0, **values: Any) -> None:
-        action = {} if "interface" in values else {"action": "gait"}
+        action = {} if "action" in dict(values.get("interface", {})) else {"action": "gait"}
         values = {**action, "autoreset_mode": "SAME_STEP", **values}
         self._envs: Any = gym.make_vec(name, num_envs=num_envs, **values)
         if not isinstance(self._envs.single_action_space, gym.spaces.Box):

@@ -37,14 +37,14 @@ def ids() -> dict[str, str]:
     """The scene of each environment, by its id.
 
     Raises:
-        ConfigError: Two scenes have names that differ in no letter.
+        ConfigError: Two scenes have names that make the same id.
     """
-    found: dict[str, str] = {}
+    scenes: dict[str, str] = {}
     for scene in SCENES.names:
         full = f"{NAMESPACE}/{_NAMES.get(scene, _capitals(scene))}-v{VERSION}"
-        if (other := found.setdefault(full, scene)) != scene:
+        if (other := scenes.setdefault(full, scene)) != scene:
             raise ConfigError(f"{full}: expected one scene of that id, found {other} and {scene}")
-    return found
+    return scenes
 
 
 def register() -> tuple[str, ...]:

@@ -176,7 +176,7 @@ def apart(result: Result) -> str:
 
 
 def _before(result: Result, p: str, ahead: Callable[[Mapping[str, Any]], float]) -> str:
-    """Who is surely before whom: by how much each pair's first is ahead, and its p."""
+    """Which controllers are ahead of which, by the p of that name and each pair's lead."""
     short = short_names(ordered(result))
     behind: dict[str, list[str]] = {}
     for pair in result["paired"].values():
