@@ -689,6 +689,18 @@ def test_on_the_same_processor_a_single_row_that_differs_is_refused(change: dict
     assert refused(elsewhere, 0.01) == bool({"limit_s", "given"} & change.keys())
 
 
+@pytest.mark.parametrize(
+    ("theirs", "same"),
+    [("Xeon 6 (model 7)", True), ("Xeon 6", True), ("Xeon 6 (model 8)", False), ("Xeon", False)],
+)
+def test_processors_of_one_name_differ_by_their_numbers(theirs: str, same: bool) -> None:
+    """Tables of before hold the name alone: it says no more, so it has to repeat."""
+    ours = [replace(HERE, trial=trial, processor="Xeon 6 (model 7)") for trial in range(200)]
+    rows = [replace(row, processor=theirs) for row in ours]
+    check = compared([replace(rows[0], time_s=19.99), *rows[1:]], ours)
+    assert check["broken"] == same
+
+
 def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean() -> None:
     """As measured there: a spread of 9.5 s on a limit of 100 s."""
     noise = np.random.default_rng(1).normal(0.0, 9.5, 200)

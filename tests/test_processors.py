@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 from test_replaced_runs import SLOW, killed_once, program
 
+from antennate.studies import work
 from antennate.studies.store import STORE, line, read_store
 
 WORDS = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", "--no-figures"]
@@ -63,3 +65,34 @@ def test_a_run_killed_beside_its_result_names_all_processors_with_trials(
     assert named() == f"Not {here} and {here}"
     assert program(*WORDS, FREE="9").wait(120) == 0
     assert named() == f"Not {here} and {here}"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        (
+            "processor\t: 0\nvendor_id\t: GenuineIntel\ncpu family\t: 6\nmodel\t\t: 207\n"
+            "model name\t: Intel(R) Xeon(R) Processor\nstepping\t: 2\n\nprocessor\t: 1\n",
+            "Intel(R) Xeon(R) Processor (family 6 model 207 stepping 2)",
+        ),
+        (
+            "processor\t: 0\nBogoMIPS\t: 108.00\nCPU implementer\t: 0x41\nCPU variant\t: 0x0\n"
+            "CPU part\t: 0xd08\nCPU revision\t: 3\n\nModel\t\t: Raspberry Pi 4 Model B Rev 1.1\n",
+            "aarch64 (CPU implementer 0x41 CPU part 0xd08 CPU variant 0x0)",
+        ),
+        ("", "aarch64"),
+    ],
+)
+def test_processors_of_one_name_are_told_apart(
+    text: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Virtual machines name all of a family alike; a Raspberry Pi names none."""
+    (tmp_path / "cpuinfo").write_text(text)
+    monkeypatch.setattr(work, "_CPUINFO", tmp_path / "cpuinfo")
+    monkeypatch.setattr(platform, "processor", lambda: "")
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+    work.processor.cache_clear()
+    try:
+        assert work.processor() == name
+    finally:
+        work.processor.cache_clear()

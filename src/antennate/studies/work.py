@@ -20,14 +20,21 @@ from antennate.lookup import ADDED, NotSent
 _CPUINFO = Path("/proc/cpuinfo")
 
 
+_NUMBERS = ("cpu family", "model", "stepping", "CPU implementer", "CPU part", "CPU variant")
+"""What tells processors apart that a virtual machine calls by one name, of Intel, AMD and ARM."""
+
+
 @functools.cache
 def processor() -> str:
-    """Its model, as the system calls it."""
+    """Its model, as the system calls it, and the numbers of that model."""
     try:
-        model = re.search(r"^model name\s*:\s*(.+)$", _CPUINFO.read_text(), re.M)
+        first = _CPUINFO.read_text().partition("\n\n")[0]
     except OSError:
-        model = None
-    return model[1].strip() if model else platform.processor() or platform.machine()
+        first = ""
+    known = dict(re.findall(r"^(\S.*?)[ \t]*:[ \t]*(\S.*)$", first, re.M))
+    model = known.get("model name") or platform.processor() or platform.machine()
+    numbers = [f"{name.removeprefix('cpu ')} {known[name]}" for name in _NUMBERS if name in known]
+    return " ".join([model.strip(), *([f"({' '.join(numbers)})"] if numbers else [])])
 
 
 class Processor(str):
