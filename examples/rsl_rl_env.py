@@ -32,7 +32,8 @@ class RslRlEnv(VecEnv):
     """
 
     def __init__(self, name: str, num_envs: int, seed: int = 0, **values: Any) -> None:
-        action = {} if "action" in dict(values.get("interface", {})) else {"action": "gait"}
+        own = values.get("interface", {})
+        action = {} if "action" in getattr(own, "model_fields_set", own) else {"action": "gait"}
         values = {**action, "autoreset_mode": "SAME_STEP", **values}
         self._envs: Any = gym.make_vec(name, num_envs=num_envs, **values)
         if not isinstance(self._envs.single_action_space, gym.spaces.Box):
@@ -47,8 +48,7 @@ class RslRlEnv(VecEnv):
 
     def get_observations(self) -> TensorDict:
         """The newest observations."""
-        policy = torch.from_numpy(self._observation)
-        return TensorDict({"policy": policy}, batch_size=[self.num_envs])
+        return TensorDict({"policy": torch.from_numpy(self._observation)}, [self.num_envs])
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict]:
         """One decision; robots whose episode ended begin the next one."""

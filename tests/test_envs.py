@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,7 +18,7 @@ from gymnasium.vector import AutoresetMode
 
 from antennate import envs
 from antennate.control.policy.interface import PolicyInterface, observations
-from antennate.envs.reward import EXIT, HOLD, PROGRESS, TIME
+from antennate.envs.reward import EARLY, EXIT, HOLD, PROGRESS, TIME
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
@@ -138,6 +139,38 @@ def test_the_reward_is_progress_time_and_exit() -> None:
     assert info["outcome"] == "success"
     assert sums.tolist() == pytest.approx([info["progress"] - begin["progress"], -0.01 * count, 1])
     assert total == pytest.approx(sums.sum())
+
+
+@pytest.mark.parametrize("values", [{}, {"ticks": 50}, {"max_episode_steps": 300}])
+def test_who_leaves_by_the_entrance_pays_for_all_the_time_that_is_left(
+    values: dict[str, Any],
+) -> None:
+    """A failure costs as much as to stay until the limit of 100 s, whenever it comes."""
+    ticks = values.pop("ticks", 10)
+    env = envs.AntennaEnv("uturn", interface={"ticks": ticks}, **values)
+    _, begin = env.reset(seed=1)
+    total, count, over, info = 0.0, 0, False, {}
+    while not over:
+        _, reward, over, _, info = env.step(3)  # REVERSE
+        total, count = total + reward, count + 1
+    assert (info["outcome"], info["t"] < 20) == ("left", True)
+    most = values.get("max_episode_steps", 10_000 // ticks)
+    assert info["reward_early"] == pytest.approx(EARLY.weight * (most - count))
+    assert total == pytest.approx(info["progress"] - begin["progress"] - 0.01 * most)
+
+
+def test_a_scene_of_ones_own_may_call_its_parts_as_it_likes(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "from antennate.sim.scenes.scene import FlatScene\n"
+        "class Gaps(FlatScene):\n"
+        "    def draw(self, robot, rng):\n"
+        "        drawn = super().draw(robot, rng)\n"
+        "        drawn.gap = 0.3\n"
+        "        return drawn\n"
+    )
+    env = envs.AntennaEnv(f"{tmp_path / 'own.py'}:Gaps")
+    env.reset(seed=1)
+    assert env.step(0)[4]["reward_hold"] == 0.0
 
 
 def test_beside_the_wall_the_gap_counts() -> None:
@@ -381,6 +414,10 @@ def test_constants_are_drawn_for_each_episode_within_their_ranges() -> None:
         ({"control": {"rate": 333.0}}, "control.rate"),
         ({"robot": {"antennae": {"kind": "none"}}}, "a robot with antennae"),
         ({"readings": "yoked"}, "readings"),
+        ({"interface": {"frequency": (0.3, 0.5)}}, "interface.frequency: .* 'maneuver'"),
+        ({"interface": {"action": "joints", "turn_offset": 0.3}}, "turn_offset: .* 'joints'"),
+        ({"control": {"search": {"patience": 9.0}}}, "control.search.patience: .* do not read"),
+        ({"action": "gait", "control": {"gait": {"frequency": 0.5}}}, "gait.frequency: .* 'gait'"),
     ],
 )
 def test_values_that_cannot_be_used_are_refused_in_one_line(values: Any, word: str) -> None:

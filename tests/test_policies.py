@@ -314,7 +314,12 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
     old = json.loads(contract().model_dump_json()) | {"version": 2}
     model.metadata_props.add(key="antennate", value=json.dumps(old))
     (tmp_path / "new.onnx").write_bytes(model.SerializeToString())
-    for name, shape in {"less": [-1, 1], "much": [10**6, 2], "other": [1, 2]}.items():
+    for name, shape in {
+        "less": [-1, 1],
+        "much": [10**6, 2],
+        "other": [1, 2],
+        "real": [1, 1],
+    }.items():
         model = onnx.load(str(counting(tmp_path / "state.onnx")))
         found = json.loads(model.metadata_props[0].value)
         found["states"][0]["shape"] = shape
@@ -328,11 +333,18 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
             model.graph.node.insert(0, total)
             for node in model.graph.node[1:]:
                 node.input[:] = ["sum" if each == "n" else each for each in node.input]
+        if name == "real":  # a state that comes back as other numbers than it is given
+            (last,) = (node for node in model.graph.node if "m" in node.output)
+            last.output[:] = ["single" if each == "m" else each for each in last.output]
+            double = onnx.TensorProto.DOUBLE
+            model.graph.node.append(onnx.helper.make_node("Cast", ["single"], ["m"], to=double))
+            model.graph.output[1].type.tensor_type.elem_type = double
         (tmp_path / f"{name}.onnx").write_bytes(model.SerializeToString())
     for name, words in {
+        "real": "expected m as float32 of shape (1, 1), found float64 of shape (1, 1)",
         "less": "states[0].shape: expected a shape of 1 to 1000000 numbers, found [-1, 1]",
         "much": "states[0].shape: expected a shape of 1 to 1000000 numbers, found [1000000, 2]",
-        "other": "expected m of shape (1, 2), found (1, 1)",
+        "other": "expected m as float32 of shape (1, 2), found float32 of shape (1, 1)",
         "bare": "expected a policy with a contract",
         "text": "expected an ONNX model",
         "size": "expected action of shape (1, 4), found (1, 3)",

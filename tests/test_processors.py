@@ -88,7 +88,7 @@ def test_processors_of_one_name_are_told_apart(
 ) -> None:
     """Virtual machines name all of a family alike; a Raspberry Pi names none."""
     (tmp_path / "cpuinfo").write_text(text)
-    monkeypatch.setattr(work, "_CPUINFO", tmp_path / "cpuinfo")
+    monkeypatch.setattr(work, "CPUINFO", tmp_path / "cpuinfo")
     monkeypatch.setattr(platform, "processor", lambda: "")
     monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     work.processor.cache_clear()

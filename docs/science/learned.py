@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from antennate.experiments.compete.checking import read_rows
-from antennate.studies.statistics import holm, mcnemar, signed_rank
+from antennate.sim.scenes.scene import TIME_LIMIT
+from antennate.studies.statistics import difference95, holm, mcnemar, signed_rank
 
 ROWS, SEED = Path(__file__).with_suffix(".csv"), "67957488"
 STUDENT = "taught"
@@ -21,7 +22,6 @@ RIVALS = ("blind twin", "timed", "timed at 1 Hz", "geometric", "geometric at 1 H
 ELSEWHERE, ENTRY = ROWS.with_name("learned_elsewhere.csv"), "entries/apprentice/policy.onnx"
 FAMILIES = (("closed", "geometric"), ("docs/science/one_hertz.py:geometric",), ("timed",))
 """The rivals there, the control, and the clock, each with Holm's correction of its own."""
-RESAMPLES = 4000
 
 
 def read() -> dict[str, np.ndarray]:
@@ -90,11 +90,10 @@ def compared(pairs: list[tuple[str, np.ndarray, np.ndarray]]) -> None:
 
 
 def less(own: np.ndarray, other: np.ndarray) -> str:
-    """The mean of the differences of time [s] and its 95 % interval, by resampling draws."""
-    change = own[:, 1] - other[:, 1]
-    sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
-    low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
-    return f"{change.mean():+.1f} ({low:+.1f} to {high:+.1f})"
+    """The mean of the differences of time [s] and its 95 % interval over draws."""
+    mean, ends = difference95(own[:, 1], other[:, 1], TIME_LIMIT)
+    low, high = ends or (np.nan, np.nan)
+    return f"{mean:+.1f} ({low:+.1f} to {high:+.1f})"
 
 
 def shown(name: str, trials: np.ndarray) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.control.policy.interface import PolicyInterface
-from antennate.control.readers import HARDWARE_ALONE
+from antennate.control.readers import HARDWARE_ALONE, UNREAD_BY_POLICIES
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec, require_antennae
@@ -71,6 +71,14 @@ class EnvConfig(TrialConfig):
     """Time after which an episode is truncated; that of its scene if not given."""
     max_episode_steps: int | None = number(None, "1", "assumed: the time limit alone", ge=1)
     """Decisions after which an episode is truncated."""
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What this robot does not have, and what no policy with this action reads."""
+        own = {"gait": "gait.frequency", "joints": "gait.offset_rate"}
+        action = self.interface.action
+        paths = (*UNREAD_BY_POLICIES, "gait.turn_offset", *([own[action]] if action in own else []))
+        why = f"policies with the action {action!r} do not read it"
+        return {**super().unread_here(), **dict.fromkeys((f"control.{p}" for p in paths), why)}
 
     @model_validator(mode="after")
     def _agree(self) -> EnvConfig:

@@ -6,6 +6,7 @@ readings, the looks that end it and the physics are the same, so it is the same 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -285,8 +286,16 @@ class Episodes:
                 if not begins:
                     out = truth.outcome[row] == OUTCOMES.index("success")
                     gain = episode.progress - before
-                    truth.terms[row] = terms_of(scene, gain, head, out)
+                    left = 0 if out or truth.outcome[row] < 0 else self._left(row, episode)
+                    truth.terms[row] = terms_of(scene, gain, head, out, left)
             truth.progress[row] = episode.progress
+
+    def _left(self, row: int, episode: Episode) -> int:
+        """Decisions that an episode has left until its limit."""
+        seconds = self.config.interface.ticks * self.config.control.period
+        left = math.floor((self._limits[row] - self._t[row]) / seconds + 1e-6)
+        most = self.config.max_episode_steps
+        return max(0, left if most is None else min(left, most - episode.decisions))
 
     def _begun(self, rows: Bools) -> Truth:
         """The truth about rows that have just begun."""

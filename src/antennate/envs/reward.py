@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from antennate.sim.scenes.wall import GAP
+from antennate.sim.scenes.wall import GAP, Wall
 from antennate.types import Floats
 
 REWARD_VERSION = 1
@@ -32,11 +32,17 @@ class Term:
 PROGRESS = Term("progress", 1.0, "m", "progress along the route since the decision before")
 TIME = Term("time", -0.01, "decision", "every decision")
 EXIT = Term("exit", 1.0, "exit", "the decision in which the head goes out by the exit")
+EARLY = Term(
+    "early",
+    TIME.weight,
+    "decision",
+    "an end before the time limit that is not the exit: every decision that was left",
+)
 HOLD = Term("hold", -0.2, "m", f"scene `wall` alone: how far the gap to the wall is from {GAP:g} m")
-TERMS = (PROGRESS, TIME, EXIT, HOLD)
+TERMS = (PROGRESS, TIME, EXIT, EARLY, HOLD)
 
 
-def terms_of(scene: Any, gain: float, head: Floats, out: bool) -> tuple[float, ...]:
+def terms_of(scene: Any, gain: float, head: Floats, out: bool, left: int = 0) -> tuple[float, ...]:
     """The terms of one decision in the order of `TERMS`.
 
     Args:
@@ -44,6 +50,8 @@ def terms_of(scene: Any, gain: float, head: Floats, out: bool) -> tuple[float, .
         gain: Progress since the decision before [m].
         head: Position of the head, shape (2,) [m].
         out: Whether the head has gone out by the exit.
+        left: Decisions that were left until the limit, where the episode ends without the exit.
     """
-    error = abs(scene.gap(head) - GAP) if hasattr(scene, "gap") else 0.0
-    return PROGRESS.weight * gain, TIME.weight, EXIT.weight * out, HOLD.weight * error
+    error = abs(scene.gap(head) - GAP) if isinstance(scene, Wall) else 0.0
+    counts = (gain, 1.0, out, left, error)
+    return tuple(term.weight * count for term, count in zip(TERMS, counts, strict=True))

@@ -17,7 +17,8 @@ from typing import Any, Literal, Protocol
 from antennate.errors import LogError, WorkerError, in_one_line
 from antennate.lookup import ADDED, NotSent
 
-_CPUINFO = Path("/proc/cpuinfo")
+CPUINFO = Path("/proc/cpuinfo")
+"""Where Linux says what its processors are."""
 
 
 _NUMBERS = ("cpu family", "model", "stepping", "CPU implementer", "CPU part", "CPU variant")
@@ -28,7 +29,7 @@ _NUMBERS = ("cpu family", "model", "stepping", "CPU implementer", "CPU part", "C
 def processor() -> str:
     """Its model, as the system calls it, and the numbers of that model."""
     try:
-        first = _CPUINFO.read_text().partition("\n\n")[0]
+        first = CPUINFO.read_text().partition("\n\n")[0]
     except OSError:
         first = ""
     known = dict(re.findall(r"^(\S.*?)[ \t]*:[ \t]*(\S.*)$", first, re.M))

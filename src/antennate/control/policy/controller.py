@@ -105,9 +105,11 @@ class Policy:
                 f"{answer.shape}"
             )
         for state in self.contract.states:
-            if (shape := states[state.input].shape) != state.shape:
+            after = states[state.input]
+            if (after.dtype, after.shape) != (np.float32, state.shape):
                 raise ConfigError(
-                    f"{path}: expected {state.output} of shape {state.shape}, found {shape}"
+                    f"{path}: expected {state.output} as float32 of shape {state.shape}, found "
+                    f"{after.dtype} of shape {after.shape}"
                 )
 
     def start(self) -> dict[str, Vector]:

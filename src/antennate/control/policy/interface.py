@@ -6,6 +6,7 @@ Environments make their spaces of it, policy files carry it, docs/envs.md shows 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -51,6 +52,11 @@ class PolicyInterface(Params):
         (0.2, LARGEST_FREQUENCY), "Hz", "assumed: from a third of the usual one to the fastest"
     )
     """Slowest and fastest gait that it can choose."""
+
+    def unread_here(self) -> Mapping[str, str]:
+        """What belongs to another action."""
+        theirs = {"maneuver": ("frequency",), "gait": (), "joints": ("frequency", "turn_offset")}
+        return dict.fromkeys(theirs[self.action], f"the action {self.action!r} does not have it")
 
     @model_validator(mode="after")
     def _range(self) -> PolicyInterface:
