@@ -146,7 +146,7 @@ def test_the_centre_line_turns_left_by_its_angles() -> None:
 @pytest.mark.parametrize("distance", [0.2, -0.3])
 def test_every_point_of_a_moved_line_keeps_its_distance(distance: float) -> None:
     line = geometry.centre_line(BENT)
-    moved = geometry.offset_line(line, distance)
+    moved = np.concatenate(geometry.offset_corners(line, distance))
     dense = geometry.resample(moved, np.linspace(0.0, 2.5, 60))
     gaps = np.array([gap_to_line(p, line) for p in dense])
     assert gaps.min() == pytest.approx(abs(distance), abs=1e-9)
@@ -154,13 +154,13 @@ def test_every_point_of_a_moved_line_keeps_its_distance(distance: float) -> None
 
 
 def test_the_left_line_lies_on_the_left() -> None:
-    moved = geometry.offset_line(np.array([[0.0, 0.0], [1.0, 0.0]]), 0.2)
+    moved = np.concatenate(geometry.offset_corners(np.array([[0.0, 0.0], [1.0, 0.0]]), 0.2))
     assert moved == pytest.approx(np.array([[0.0, 0.2], [1.0, 0.2]]))
 
 
 def test_a_rounded_corner_touches_both_walls_and_keeps_its_radius() -> None:
     line = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    outer = geometry.offset_line(line, -0.2, corner_radius=0.15)
+    outer = np.concatenate(geometry.offset_corners(line, -0.2, corner_radius=0.15))
     centre = np.array([1.2 - 0.15, -0.2 + 0.15])
     assert np.linalg.norm(outer[1:-1] - centre, axis=1) == pytest.approx(
         np.full(len(outer) - 2, 0.15)
@@ -171,7 +171,8 @@ def test_a_rounded_corner_touches_both_walls_and_keeps_its_radius() -> None:
 
 def test_the_inner_corner_is_never_rounded() -> None:
     line = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    assert geometry.offset_line(line, 0.2, corner_radius=0.15)[1] == pytest.approx([0.8, 0.2])
+    inner = np.concatenate(geometry.offset_corners(line, 0.2, corner_radius=0.15))
+    assert inner[1] == pytest.approx([0.8, 0.2])
 
 
 @pytest.mark.parametrize(

@@ -177,9 +177,9 @@ def categories(panel: Axes, labels: Sequence[str]) -> None:
     panel.grid(visible=False, axis="x")
 
 
-def interval_note(note: str, trials: int) -> str:
+def interval_note(trials: int) -> str:
     """What a title says of intervals, or why there are none."""
-    return note if trials >= ENOUGH_TRIALS else f"no intervals below {ENOUGH_TRIALS} trials"
+    return "95 %" if trials >= ENOUGH_TRIALS else f"no intervals below {ENOUGH_TRIALS} trials"
 
 
 def intervals(

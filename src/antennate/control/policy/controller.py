@@ -20,7 +20,6 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
 
-SUFFIX = ".onnx"
 LARGEST = 50_000_000
 """Most bytes of a policy file."""
 OBSERVATION, ACTION = "observation", "action"

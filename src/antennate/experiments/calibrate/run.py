@@ -10,7 +10,7 @@ import functools
 import hashlib
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -35,9 +35,6 @@ from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
-
-if TYPE_CHECKING:
-    pass
 
 _BETTER = 0.2
 """How much more of the level each direction alone explains where hysteresis is asked about."""

@@ -365,7 +365,7 @@ def _draw_shares(panel: Axes, result: Mapping[str, Any]) -> None:
     style.categories(panel, [name.replace("_", "\n") for name in profiles])
     panel.set(
         ylabel="R² of force",
-        title=f"Share of force that flex explains\n({style.interval_note('95 %', trials)})",
+        title=f"Share of force that flex explains\n({style.interval_note(trials)})",
     )
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(bottom, 0.0), top + 0.35)

@@ -42,7 +42,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         low, high = (end(row["traverses"] for row in rows) for end in (min, max))
         over = "walls" if part == "speed_m_s" else "speeds"
         count = f"{low}" if low == high else f"{low} to {high}"
-        note = style.interval_note("95 %", result["trials"])
+        note = style.interval_note(result["trials"])
         panel.set_title(f"All {over}, n = {count} traverses a point,\n{note}")
         panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
     for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
@@ -52,7 +52,7 @@ def measures(result: Mapping[str, Any]) -> Figure:
         _draw(panel, speeds, "speed_m_s", latencies_by_speed, median, trials=result["trials"])
         _draw(panel, speeds, "speed_m_s", latencies_by_speed, ("p90_ms", ""), **_BAR)
         low, high = (end(row["n"] for row in latencies_by_speed) for end in (min, max))
-        note = style.interval_note("95 %", result["trials"])
+        note = style.interval_note(result["trials"])
         panel.set_title(f"Median, {note}, 90th percentile (bar),\nn = {low} to {high} contacts")
         panel.set_ylabel(measure.title)
         bottom, top = panel.get_ylim()

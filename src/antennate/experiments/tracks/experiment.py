@@ -223,9 +223,7 @@ def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any])
         )
     ticks = [*range(len(bars)), left + 1.5]
     names = [str(at + 1) for at in range(len(bars))]
-    panel.set_xticks(
-        ticks, [*names, f"mean of {len(table)},\n{style.interval_note('95 %', len(table))}"]
-    )
+    panel.set_xticks(ticks, [*names, f"mean of {len(table)},\n{style.interval_note(len(table))}"])
     panel.set_ylim(-0.02, 1.02)
     panel.set_ylabel("share of frames in contact")
     panel.set_title("Shapes in contact, by trial and over trials")

@@ -295,7 +295,7 @@ def _title_panels(
     mean.set(
         xlim=(0, 1.02 * most),
         xlabel=f"restricted mean {time}",
-        title=f"Time to the exit; {style.interval_note('95 %', trials)}",
+        title=f"Time to the exit; {style.interval_note(trials)}",
     )
     inside.set(
         xlim=(0, most),

@@ -56,9 +56,9 @@ def robot_in_scene(
     return spec
 
 
-def gear_shares(model: mujoco.MjModel, robot: RobotSpec, prefix: str = PREFIX) -> Floats:
+def gear_shares(model: mujoco.MjModel, robot: RobotSpec) -> Floats:
     """Friction of the gear of each actuator as a share of its motor's torque, shape (nu,)."""
-    gears = Gears(model, robot, prefix)
+    gears = Gears(model, robot, PREFIX)
     shares = 0.0 * model.actuator_gainprm[:, 0]
     shares[gears.drive] = gears.share
     return shares

@@ -28,16 +28,11 @@ def centre_line(params: TunnelParams) -> Floats:
     return np.array(points)
 
 
-def offset_line(points: Floats, distance: float, corner_radius: float = 0.0) -> Floats:
-    """The polyline moved sideways by `distance` [m], positive to the left, shape (n, 2).
+def offset_corners(points: Floats, distance: float, corner_radius: float = 0.0) -> list[Floats]:
+    """The polyline moved sideways by `distance` [m], positive to the left; of each corner (k, 2).
 
     Corners are mitred; where the moved line is the outer one it is rounded by `corner_radius` [m].
     """
-    return np.concatenate(offset_corners(points, distance, corner_radius))
-
-
-def offset_corners(points: Floats, distance: float, corner_radius: float = 0.0) -> list[Floats]:
-    """`offset_line`, the points at each corner of the polyline by themselves, each (k, 2)."""
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
