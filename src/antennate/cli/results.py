@@ -26,6 +26,7 @@ from antennate.messages import command_words
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
+from antennate.studies.page import spaced
 from antennate.studies.report import View, command_of, compare, report, write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import (
@@ -149,16 +150,11 @@ def drawn_table(table: Table) -> Any:
     drawn = Drawn(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     drawn.add_column("", overflow="fold")
     for name in table.columns:
-        parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else _words(name)
+        parts = re.sub(r"(?<=[/:])", "\n", name) if ":" in name else spaced(name)
         drawn.add_column(Text(parts), justify="right", overflow="fold")
     for name, cells in table.rows:
         drawn.add_row(Text(name), *(Text(cell) for cell in cells))
     return drawn
-
-
-def _words(name: str) -> str:
-    """A name with spaces for underscores, unless it is a file of the user."""
-    return name if set("/.") & set(name) else name.replace("_", " ")
 
 
 def print_table(table: Table) -> None:

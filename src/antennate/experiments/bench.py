@@ -37,10 +37,15 @@ def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
 
 
 def mean_since(first: Ints, values: Floats) -> Floats:
-    """Mean of values (n,) from the index `first` (n,) of each to itself, shape (n,)."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    end = np.arange(1, len(values) + 1)
-    return (total[end] - total[first]) / (end - first)
+    """Mean along the last axis (n,) from the index `first` (n,) of each to itself, same shape."""
+    total = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
+    end = np.arange(1, values.shape[-1] + 1)
+    return (total[..., end] - total[..., first]) / (end - first)
+
+
+def running_mean(values: Floats, length: int) -> Floats:
+    """Mean of the last values along the last axis, same shape; fewer where there are fewer."""
+    return mean_since(np.maximum(np.arange(1, values.shape[-1] + 1) - length, 0), values)
 
 
 def averaged(conditioning: ConditioningParams, values: Floats, rate: float) -> Floats:
@@ -48,8 +53,7 @@ def averaged(conditioning: ConditioningParams, values: Floats, rate: float) -> F
 
     While the window fills it is the mean of what there is.
     """
-    length = max(1, round(conditioning.averaging_time * rate))
-    return mean_since(np.maximum(np.arange(1, len(values) + 1) - length, 0), values)
+    return running_mean(values, max(1, round(conditioning.averaging_time * rate)))
 
 
 def flex_of(sensor: SensorParams, counts: Floats) -> Floats:

@@ -113,14 +113,14 @@ def grid(columns: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") 
     )
 
 
-def _words(name: str) -> str:
+def spaced(name: str) -> str:
     """A name with spaces for underscores, unless it is a file of the user."""
     return name if set("/.:") & set(name) else name.replace("_", " ")
 
 
 def numbers(table: Table) -> str:
     """A table of measures, with its title and its note, behind what its columns are."""
-    columns = ["", *map(_words, table.columns)]
+    columns = ["", *map(spaced, table.columns)]
     rows = [[name, *cells] for name, cells in table.rows]
     short = all(len(cell) < 30 for _, cells in table.rows for cell in cells)
     kind = "numbers" if short else ""  # short cells stand in columns, texts are left as they flow

@@ -19,10 +19,10 @@ from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples, plateau_of, white_noise
 from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
-from antennate.antenna.sensor import SensorChain, reading_noise
+from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError, ConfigError
-from antennate.experiments.bench import bench_films, mean_since
+from antennate.experiments.bench import bench_films, mean_since, recorded
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
@@ -196,11 +196,10 @@ def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Rec
     ways = 2 if rig.withdraw else 1
     ticks = ways * int(np.ceil((gap + rig.depth) / speed * config.antenna.sensor.rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
-    sensor = SensorChain(config.antenna.sensor, (), 1.0 / config.antenna.sensor.rate)
     t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(
         ticks, config.solver, watch
     )
-    counts = np.array([sensor.step(f, float(n)) for f, n in zip(flex, noise, strict=True)])
+    counts = recorded(config.antenna.sensor, flex, noise)
     bend = way / rig.depth
     inside = (bend >= 0) & (bend <= 1)
     n = int(inside.sum())

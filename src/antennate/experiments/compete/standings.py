@@ -231,7 +231,7 @@ def profiles(rows: Rows) -> tuple[Floats, dict[str, Floats]]:
     ranked = [row for row in rows if not row.given]
     best: dict[Key, float] = {}
     for row in ranked:
-        key = (row.scene, row.seed, row.trial)
+        key = _key(row)
         time = row.time_s if row.outcome == "success" else np.inf
         best[key] = min(best.get(key, np.inf), time)
     factors = np.linspace(1.0, 10.0, 181)
@@ -239,9 +239,7 @@ def profiles(rows: Rows) -> tuple[Floats, dict[str, Floats]]:
     for name in names_of(ranked):
         ratios = np.array(
             [
-                row.time_s / best[row.scene, row.seed, row.trial]
-                if row.outcome == "success"
-                else np.inf
+                row.time_s / best[_key(row)] if row.outcome == "success" else np.inf
                 for row in ranked
                 if row.controller == name
             ]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from antennate.antenna.sensor import counts as readings_at
+from antennate.experiments.bench import running_mean
 from antennate.experiments.dataset.columns import Windows
 from antennate.experiments.dataset.config import DatasetConfig, Kind
 from antennate.robots.antenna import SensorParams
@@ -28,14 +29,6 @@ def flex_from(sensor: SensorParams, counts: Floats) -> Floats:
     curve = readings_at(sensor, _FLEX)
     order = np.argsort(curve, kind="stable")
     return np.interp(counts, curve[order], _FLEX[order])
-
-
-def running_mean(values: Floats, length: int) -> Floats:
-    """Mean of the last values along the last axis, same shape; fewer where there are fewer."""
-    total = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
-    end = np.arange(1, values.shape[-1] + 1)
-    begin = np.maximum(end - length, 0)
-    return (total[..., end] - total[..., begin]) / (end - begin)
 
 
 @dataclass(frozen=True, slots=True)
