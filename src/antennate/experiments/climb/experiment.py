@@ -18,13 +18,11 @@ from antennate.experiments.climb.measures import (
     step_tables,
 )
 from antennate.experiments.climb.physics import ClimbPath, ClimbRow, carry_out, lost_row
-from antennate.experiments.tunnel.batch import BATCH
-from antennate.sim.world import World
+from antennate.experiments.tunnel.batch import BATCH, watched
 from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
 from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.telemetry.view.simulation import SimulationView
-from antennate.types import AntennaFrame, Controller
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
@@ -64,16 +62,9 @@ def every(config: ClimbConfig) -> list[Trial]:
     ]
 
 
-def _watched(view: SimulationView) -> dict[str, Any]:
-    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
-        return view.tick(world.model, world.data, frame, control)
-
-    return {"watch": watch, "make": view.controller}
-
-
 TRIALS = Trials[ClimbConfig](
     *("cell", every, carry_out, ClimbRow, lost_row, BATCH),
-    watched=_watched,
+    watched=watched,
     interruptible=True,
 )
 

@@ -37,6 +37,7 @@ from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand
 
 if TYPE_CHECKING:
     from antennate.sim.warp.robot import WarpRobot
+    from antennate.telemetry.view.simulation import SimulationView
 
 BATCH = 24
 """Trials of one process stepped in lockstep. Each pays its share of what all cost together."""
@@ -171,6 +172,15 @@ def cpu_bodies(config: TunnelConfig) -> MakeBodies:
         return scene, SimRobot(batch, robot, period, config.physics.timestep)
 
     return make
+
+
+def watched(view: SimulationView) -> dict[str, Any]:
+    """What `run_trials` is given to show its trials on a page."""
+
+    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
+        return view.tick(world.model, world.data, frame, control)
+
+    return {"watch": watch, "make": view.controller}
 
 
 def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> TrialResult:

@@ -12,7 +12,7 @@ from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of, short_names
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials
+from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials, watched
 from antennate.experiments.tunnel.measures import (
     COLUMNS,
     limit_of,
@@ -118,16 +118,9 @@ def _check_batch(config: TunnelConfig, logs: Path | None) -> None:
         raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
 
 
-def _watched(view: SimulationView) -> dict[str, Any]:
-    def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
-        return view.tick(world.model, world.data, frame, control)
-
-    return {"watch": watch, "make": view.controller}
-
-
 TRIALS = Trials[TunnelConfig](
     *("controller", every, run_trials, TrialResult, lost_row, BATCH, _on_warp, _check_batch),
-    watched=_watched,
+    watched=watched,
     interruptible=True,
 )
 
