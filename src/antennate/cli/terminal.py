@@ -16,14 +16,13 @@ import os
 import shutil
 import signal
 import sys
-import threading
 import time
 import unicodedata
 from collections.abc import Callable, Iterator
 from textwrap import fill
 from typing import Any, TextIO
 
-from antennate.hardware.driving.stopping import STOPS
+from antennate.hardware.driving.stopping import STOPS, StopOnce
 from antennate.messages import one_line
 
 _ASCII = {"·": ".", "×": "x", "–": "-", "−": "-", "±": "+-", "²": "^2", "→": "->", "…": "..."}
@@ -328,22 +327,6 @@ def stop_signals(last: bool = False) -> Iterator[None]:
     Args:
         last: Whether all after the first are ignored, even when the block has ended.
     """
-    if threading.current_thread() is not threading.main_thread():
+    heeded = [number for number in STOPS if signal.getsignal(number) is not signal.SIG_IGN]
+    with StopOnce(last, heeded):
         yield
-        return
-    before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) is not signal.SIG_IGN}
-    stopped = False
-
-    def stop(number: int, frame: Any) -> None:
-        nonlocal stopped
-        if not (stopped and last):
-            stopped = True
-            raise KeyboardInterrupt
-
-    for number in before:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_IGN if stopped and last else handler)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
@@ -40,6 +40,7 @@ class StopOnce:
     Args:
         last: The program ends after the block: once a signal came, later ones are ignored, so that
             the report is written and shown.
+        numbers: The signals.
 
     Attributes:
         received: A signal came, even if its exception was swallowed.
@@ -49,16 +50,16 @@ class StopOnce:
         closed: Signals do not raise any more; set by the code that owns the block.
     """
 
-    def __init__(self, last: bool = False) -> None:
+    def __init__(self, last: bool = False, numbers: Sequence[int] = STOPS) -> None:
         self.received = self.closed = False
         self.insists = not last
-        self._last = last
+        self._last, self._numbers = last, numbers
         self.within: Callable[..., object] | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> StopOnce:
         if threading.current_thread() is threading.main_thread():
-            self._before = {number: signal.signal(number, self.receive) for number in STOPS}
+            self._before = {number: signal.signal(number, self.receive) for number in self._numbers}
         return self
 
     def __exit__(self, *_: object) -> None:
