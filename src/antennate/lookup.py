@@ -15,14 +15,33 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
-from antennate.errors import ConfigError, WorkerError, raised
-from antennate.messages import nearest, shown
+from antennate.errors import ConfigError, MissingPackageError, WorkerError, raised
+from antennate.messages import extra, nearest, shown
 
 T = TypeVar("T")
 
 
 ADDED: dict[str, dict[str, Any]] = {}
 """Objects given to `Registry.add`, by group and name; worker processes get them too."""
+
+
+def require_package(module: str, name: str, what: str = "", package: str = "") -> None:
+    """Find out whether a package is there that an extra of ours installs.
+
+    Args:
+        module: The module that is imported of it.
+        name: The extra.
+        what: What needs it, the extra if not given; for the message.
+        package: Its name, that of the module if not given.
+
+    Raises:
+        MissingPackageError: It is not installed.
+    """
+    if importlib.util.find_spec(module) is None:
+        raise MissingPackageError(
+            f"{what or name}: expected the package {package or module}, found none; "
+            f"install it with {extra(name)}"
+        )
 
 
 def installed(group: str) -> Iterable[EntryPoint]:

@@ -18,15 +18,9 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
+from antennate.lookup import require_package
 from antennate.studies.processes import Processes
-from antennate.studies.submitted import (
-    NO_PLACE,
-    Submitted,
-    folder_of,
-    require_package,
-    require_same,
-    work_apart,
-)
+from antennate.studies.submitted import NO_PLACE, Submitted, folder_of, require_same, work_apart
 from antennate.studies.work import Emit, Fail, Packed, Part, Processor, Work
 
 CONNECT = 10.0
@@ -64,7 +58,7 @@ class Dask:
 
     def __init__(self, address: str | None = None) -> None:
         self._address = address
-        require_package("distributed", "dask")
+        require_package("distributed", "dask", "engine")
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail

@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from antennate.errors import ConfigError, OutputError, WorkerError, in_one_line
+from antennate.lookup import require_package
 from antennate.messages import shortened
 from antennate.studies.formats import decoded, encoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
 from antennate.studies.store import Store, parsed
-from antennate.studies.submitted import require_package, require_same, work_apart
+from antennate.studies.submitted import require_same, work_apart
 from antennate.studies.work import Emit, Fail, Failure, Packed, Part, Waiting, Work, added_objects
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
@@ -127,7 +128,7 @@ class Slurm:
     name = "slurm"
 
     def __init__(self, cluster: str, options: Sequence[str]) -> None:
-        require_package("submitit", "slurm")
+        require_package("submitit", "slurm", "engine")
         self._cluster, self._options = cluster, dict(_setting(option) for option in options)
 
     def run(

@@ -14,12 +14,10 @@ import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from antennate.errors import MissingPackageError, WorkerError, in_one_line
-from antennate.messages import extra
+from antennate.errors import WorkerError, in_one_line
 from antennate.studies.identity import differences, environment, environment_here
 from antennate.studies.work import (
     Emit,
@@ -225,16 +223,4 @@ def require_same(theirs: Mapping[str, Any], folder: Path) -> None:
         raise WorkerError(
             f"expected workers with the driver's versions and code, found {changes} "
             f"(worker {os.getpid()} of {platform.node()})"
-        )
-
-
-def require_package(package: str, name: str) -> None:
-    """Find out whether the package of an engine is there.
-
-    Raises:
-        MissingPackageError: It is not installed.
-    """
-    if find_spec(package) is None:
-        raise MissingPackageError(
-            f"engine: expected the package {package}, found none; install it with {extra(name)}"
         )

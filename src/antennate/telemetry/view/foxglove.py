@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from antennate.errors import BadInputError, MissingPackageError
-from antennate.messages import extra
+from antennate.errors import BadInputError
+from antennate.lookup import require_package
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes, picture
 from antennate.telemetry.header import Header
@@ -56,7 +55,7 @@ class FoxgloveSink:
     """
 
     def __init__(self, port: int) -> None:
-        require_foxglove()
+        require_package("foxglove", "foxglove", package="foxglove-sdk")
         sdk = import_module("foxglove")
         self._messages: Any = import_module("foxglove.messages")
         self._context = context = sdk.Context()  # channels close with it
@@ -157,19 +156,6 @@ class FoxgloveSink:
 
 _PRIMITIVES = {"cubes": "CubePrimitive", "spheres": "SpherePrimitive"}
 _PRIMITIVES |= {"cylinders": "CylinderPrimitive"}
-
-
-def require_foxglove() -> None:
-    """Find out whether topics can be served live.
-
-    Raises:
-        MissingPackageError: foxglove-sdk is not installed.
-    """
-    if find_spec("foxglove") is None:
-        raise MissingPackageError(
-            "foxglove: expected the package foxglove-sdk, found none; install it with "
-            f"{extra('foxglove')}"
-        )
 
 
 def _primitive(kind: int, size: list[float]) -> tuple[str, list[float]]:

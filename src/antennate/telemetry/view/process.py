@@ -9,12 +9,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from importlib.util import find_spec
 
-from antennate.errors import BadInputError, MissingPackageError, WorkerError, reason
-from antennate.messages import extra
+from antennate.errors import BadInputError, WorkerError, reason
+from antennate.lookup import require_package
 from antennate.telemetry.view.channel import END, FAILED, IDLE, READY, Channel
-from antennate.telemetry.view.foxglove import require_foxglove
 
 HOST = "127.0.0.1"
 _STARTING = 60.0
@@ -53,9 +51,9 @@ class ViewProcess:
         idle: bool = False,
     ) -> None:
         if port is not None:
-            require_viser()
+            require_package("viser", "view")
         if foxglove is not None:
-            require_foxglove()
+            require_package("foxglove", "foxglove", package="foxglove-sdk")
         if port is not None and port == foxglove != 0:
             raise BadInputError(
                 f"view: expected different ports for the page and for Foxglove, found "
@@ -139,18 +137,6 @@ class ViewProcess:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def require_viser() -> None:
-    """Find out whether the page can be served.
-
-    Raises:
-        MissingPackageError: viser is not installed.
-    """
-    if find_spec("viser") is None:
-        raise MissingPackageError(
-            f"view: expected the package viser, found none; install it with {extra('view')}"
-        )
 
 
 def _listener(port: int, flag: str) -> socket.socket:
