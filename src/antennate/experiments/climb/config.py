@@ -176,10 +176,7 @@ class ClimbConfig(Params):
     @field_validator("start")
     @classmethod
     def _in_front(cls, start: tuple[float, float]) -> tuple[float, float]:
-        try:
-            return from_values(GroundParams, {"start": start}).start
-        except ConfigError as error:
-            raise ValueError(str(error)) from None
+        return from_values(GroundParams, {"start": start}).start
 
     @field_validator("robot", mode="before")
     @classmethod

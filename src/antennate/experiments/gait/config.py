@@ -177,16 +177,10 @@ class GaitStudyConfig(Params):
         if not self.unknown:
             require_default(self, "all is known", *_OF_UNKNOWN)
         if self.optimise != "none":
-            try:
-                require_wave(self.robot, self.gait)
-            except ConfigError as error:
-                raise ValueError(str(error)) from None
+            require_wave(self.robot, self.gait)
         unknowns = self.unknowns
         require_different("unknown", [one.name for one in unknowns])
         for one in unknowns:
             for value in (one.low, one.high):
-                try:
-                    self.at({one.name: value})
-                except ConfigError as error:
-                    raise ValueError(str(error)) from None
+                self.at({one.name: value})
         return self

@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
-from antennate.errors import ConfigError
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.physics import measure, walk_flat
 from antennate.mechanics.twist import TwistMap, Wave
@@ -108,12 +107,9 @@ class GeometryConfig(Params):
     @model_validator(mode="after")
     def _agree(self) -> GeometryConfig:
         require_whole_steps("rate", self.rate, self.physics.timestep)
-        try:
-            require_wave(self.robot, self.gait)
-            widest = self.gait.model_copy(update={"amplitude": self.largest})
-            require_wave(self.robot, widest)
-        except ConfigError as error:
-            raise ValueError(str(error)) from None
+        require_wave(self.robot, self.gait)
+        widest = self.gait.model_copy(update={"amplitude": self.largest})
+        require_wave(self.robot, widest)
         return self
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from antennate.antenna.statics import Profile, with_profile
-from antennate.errors import SceneError, SimulationError
+from antennate.errors import SimulationError
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.bench import TouchWallsParams
 from antennate.params.control import ConditioningParams, RuleParams
@@ -149,12 +149,8 @@ class TouchConfig(Params):
                     f"to the side, found {high:.3g} m"
                 )
             for overlap in (low, high):
-                try:
-                    touch_wall.outline(
-                        self.wall, kind, site(self.antenna, overlap, self.wall_length, 0.0)
-                    )
-                except SceneError as error:
-                    raise ValueError(str(error)) from None
+                place = site(self.antenna, overlap, self.wall_length, 0.0)
+                touch_wall.outline(self.wall, kind, place)
 
 
 RUN_UP = 0.5
