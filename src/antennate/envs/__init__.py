@@ -41,7 +41,8 @@ def ids() -> dict[str, str]:
     """
     scenes: dict[str, str] = {}
     for scene in SCENES.names:
-        full = f"{NAMESPACE}/{_NAMES.get(scene, _capitals(scene))}-v{VERSION}"
+        own = "".join(part[:1].upper() + part[1:] for part in scene.replace("_", "-").split("-"))
+        full = f"{NAMESPACE}/{_NAMES.get(scene, own)}-v{VERSION}"
         if (other := scenes.setdefault(full, scene)) != scene:
             raise ConfigError(f"{full}: expected one scene of that id, found {other} and {scene}")
     return scenes
@@ -64,10 +65,6 @@ def register() -> tuple[str, ...]:
                     kwargs={"scene": scene},
                 )
     return tuple(known)
-
-
-def _capitals(name: str) -> str:
-    return "".join(part[:1].upper() + part[1:] for part in name.replace("_", "-").split("-"))
 
 
 register()

@@ -123,7 +123,7 @@ class ClimbRule:
         body.advance(self._one(row))
         if body.head_is_up[row]:
             self._pose(row, self._feel.tread, self._feel.inwards)
-            if self._since[row] > self._feel.settle_time and self._misses(flex):
+            if self._since[row] > self._feel.settle_time and (flex < self._feel.missing).all():
                 body.sink(self._one(row), least=self._p.least)
             return Maneuver.FORWARD
         self._pose(row, self._feel.elevation)
@@ -145,10 +145,6 @@ class ClimbRule:
             self._missing[row] = self._missed[row] > 0.0
             self._to(row, Stage.PROBE_DOWN)
         return Maneuver.FORWARD if self.stage[row] == Stage.WALK else Maneuver.HOLD
-
-    def _misses(self, flex: Floats) -> bool:
-        """Whether neither antenna feels anything."""
-        return bool((flex < self._feel.missing).all())
 
     def _misses_ground(self, row: int) -> bool:
         """Both antennae for a while, or one of them, as at an edge that is met aslant."""

@@ -6,7 +6,6 @@ A file may be `like` another model and then holds only what is different.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -96,12 +95,7 @@ def _over(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _shipped() -> Iterator[tuple[str, ServoModel]]:
-    for path in sorted(_FOLDER.glob("*.toml")):
-        yield path.stem, _read(path)
-
-
-MODELS: dict[str, ServoModel] = dict(_shipped())
+MODELS: dict[str, ServoModel] = {path.stem: _read(path) for path in sorted(_FOLDER.glob("*.toml"))}
 """The models that we ship, by the name of their file."""
 MODELS_BY_NUMBER = {model.number: model for model in MODELS.values()}
 XC430_W240, XL330_M288 = MODELS["xc430-w240"], MODELS["xl330-m288"]

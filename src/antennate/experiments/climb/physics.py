@@ -162,7 +162,9 @@ class ClimbMonitor:
         body, rule = getattr(control, "body", None), getattr(control, "rule", None)
         head = world.link_places()[:, 0]
         if body is not None:
-            self._count(bool(np.isfinite(body.progress[self._row]).any()))
+            climbing = bool(np.isfinite(body.progress[self._row]).any())
+            self._climbs += climbing and not self._climbing
+            self._climbing = climbing
         if rule is not None and hasattr(rule, "stage"):
             self._feel(world, rule)
         if self._edge is None:
@@ -173,10 +175,6 @@ class ClimbMonitor:
         if self._began is not None and world.robot.pitch_count:
             self._load = self._load or PitchLoad(world)
             self._load.add(world)
-
-    def _count(self, climbing: bool) -> None:
-        self._climbs += climbing and not self._climbing
-        self._climbing = climbing
 
     def _feel(self, world: World, rule: Any) -> None:
         """Follow the first thing that is felt."""

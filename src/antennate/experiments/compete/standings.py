@@ -150,10 +150,6 @@ def _key(row: Episode) -> Key:
     return row.scene, row.seed, row.trial
 
 
-def _keyed(rows: Rows) -> dict[Key, Episode]:
-    return {_key(row): row for row in rows}
-
-
 def _draws(keys: Sequence[Key]) -> Ints:
     """The number of the draw that each of these is of, from 0, shape (n,)."""
     numbers: dict[tuple[int, int], int] = {}
@@ -168,7 +164,7 @@ def _by_draw(draw: Ints, values: Floats) -> Floats:
 
 def _pairs(by_name: Mapping[str, Rows], tie: float) -> dict[tuple[str, str], dict[str, Any]]:
     """Every two controllers on the draws that both have, with Holm's correction over all pairs."""
-    keyed, pairs = {name: _keyed(rows) for name, rows in by_name.items()}, {}
+    keyed, pairs = {name: {_key(row): row for row in rows} for name, rows in by_name.items()}, {}
     for first, second in combinations(by_name, 2):
         both = [key for key in keyed[first] if key in keyed[second]]
         times = np.array([restricted(keyed[n][k] for k in both) for n in (first, second)])

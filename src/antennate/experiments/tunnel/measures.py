@@ -36,12 +36,6 @@ SHARES = {
     "reverse": "reverse",
     "hold": "hold",
 }
-
-
-def _share(label: str, name: str) -> Measure:
-    return Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0, least=0.0, most=1.0)
-
-
 _SECONDS = Measure(
     *("restricted_mean_time_s", "restricted mean time", "s"),
     form=".1f",
@@ -70,7 +64,10 @@ CONTROLLER = (
     _SECONDS,
     Measure("stuck", "stuck episodes", of=total, form="d", least=0.0),
     Measure("recovered", "  recovered", of=total, form="d", least=0.0),
-    *(_share(label, name) for name, label in SHARES.items()),
+    *(
+        Measure(f"share.{name}", label, of=mean, form=".1f", scale=100.0, least=0.0, most=1.0)
+        for name, label in SHARES.items()
+    ),
     Measure("force_mean_n", "contact force, mean", "N", of=mean, least=0.0),
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
     Measure("offset_m", "off the middle", "m", form=".3f", least=0.0, interval="offset_95"),

@@ -235,7 +235,9 @@ def findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, st
     if not bus.registers.keys() & set(robot.ids):
         return
     yield from register_findings(bus, config)
-    yield tick_finding(bus, config), "tick on the wire", _shorter(config)
+    period = config.control.period
+    within = f"at most {1e3 * (period - ADAPTER):g} of {1e3 * period:g} ms"
+    yield tick_finding(bus, config), "tick on the wire", within
     if bus.ping_times:
         yield _answer_time(bus, config), "answer time", f"at most {1e3 * good.answer_time:g} ms"
     if bus.read_time is not None:
@@ -341,12 +343,6 @@ def _answer_time(bus: BusSurvey, config: DoctorConfig) -> Finding:
 
 
 _BAUDS: tuple[int, ...] = get_args(RobotSpec.model_fields["baud"].annotation)
-
-
-def _shorter(config: DoctorConfig) -> str:
-    return (
-        f"at most {1e3 * (config.control.period - ADAPTER):g} of {1e3 * config.control.period:g} ms"
-    )
 
 
 def tick_finding(bus: BusSurvey, config: DoctorConfig) -> Finding:
