@@ -8,6 +8,7 @@ from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from antennate.control.registry import CONTROLLERS
@@ -15,17 +16,19 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.compete.config import require_free
 from antennate.experiments.compete.episodes import Episode, restricted
 from antennate.files import decoded, read_limited
+from antennate.jackknife import ENOUGH
 from antennate.messages import nearest
 from antennate.params.faults import describe
 from antennate.studies.formats import from_csv
+from antennate.studies.statistics import sign_flips
 
 LARGEST = 100_000_000
 """Most bytes of such a table."""
 CLOSE = 5e-7
 """Times [s] and ways [m] that differ by less are the same: tables have six decimals."""
-BIAS, SPREAD = 0.01, 0.1
-"""Shares of the limit by which times differ on another processor: the largest mean of 200 draws was
-0.94 of 100 s, and the spread of a row 9.5 s (docs/performance.md)."""
+BIAS, ERRORS, CHANCE = 0.01, 3.0, 0.01
+"""What another processor may change: mean times by a share of the limit (0.94 of 100 s in 200
+draws, docs/performance.md) and so many standard errors, and successes by as much as has this p."""
 _ROW = TypeAdapter(Episode)
 _TEXTS = [field.name for field in fields(Episode) if field.type == "str"]
 
@@ -140,23 +143,35 @@ def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, An
         "same": len(pairs) - len(differ),
         "other_outcome": sum(row.outcome != again.outcome for row, again in differ),
         "broken": sum(_must_repeat(row, again) for row, again in differ),
-        "mean_share_difference": _mean_difference(pairs),
+        **_elsewhere(pairs),
         **places,
         "differ": [_compared_row(row, again) for row, again in differ],
     }
 
 
-def refused(check: Mapping[str, Any], tie: float) -> bool:
-    """Whether a table does not repeat.
+def refusal(check: Mapping[str, Any]) -> str:
+    """Why a table does not repeat; empty if it does.
 
-    It has a row that differs and must not, or, as on another processor, fewer than a share of
-    1 - `tie` of its rows end alike, or the mean times are further apart than chance makes them.
+    It has a row that differs and must not; or, as on another processor, its successes differ by
+    more than chance makes them, or its mean time.
     """
-    rows = check["rows"]
-    if not rows:
-        return False
-    far = abs(check["mean_share_difference"]) > BIAS + 2.0 * SPREAD / sqrt(rows)
-    return check["broken"] > 0 or check["other_outcome"] > tie * rows or far
+    if check["broken"]:
+        return (
+            f"Expected no difference in {check['broken']} of them: on one version, engine and "
+            "processor every row repeats, and limits and what is given are the same everywhere."
+        )
+    if (p := check["successes_p"]) < CHANCE:
+        return (
+            f"Expected as many successes as here but for chance, found {check['more_successes']:+d}"
+            f" (p {p:.1g}, at least {CHANCE:g} is chance)."
+        )
+    far, most = check["mean_share_difference"], check["largest_share_difference"]
+    if most is not None and abs(far) > most:
+        return (
+            f"Expected mean times that differ by at most {100 * most:.1f} % of the limit, "
+            f"found {100 * far:+.1f} %."
+        )
+    return ""
 
 
 def _alike(row: Episode, again: Episode) -> bool:
@@ -175,10 +190,28 @@ def _must_repeat(row: Episode, again: Episode) -> bool:
     return row.given != again.given or (ran and abs(row.limit_s - again.limit_s) > CLOSE)
 
 
-def _mean_difference(pairs: Sequence[tuple[Episode, Episode]]) -> float:
-    """Mean restricted time of the table less that of here, as a share of the limit; 0 of none."""
-    theirs, ours = (sum(restricted(pair[k] for pair in pairs)) for k in (0, 1))
-    return (theirs - ours) / max(len(pairs), 1)
+def _elsewhere(pairs: Sequence[tuple[Episode, Episode]]) -> dict[str, Any]:
+    """How successes and restricted times differ in sum, and by how much both may by chance.
+
+    Conditions of a scene are often the same walk, so a draw of it counts once.
+    """
+    walks: dict[tuple[str, str, int, int], list[tuple[float, float]]] = {}
+    for row, again in pairs:
+        won = (row.outcome == "success") - (again.outcome == "success")
+        theirs, ours = restricted([row, again])
+        key = (row.controller, row.scene.partition("+")[0], row.seed, row.trial)
+        walks.setdefault(key, []).append((won, theirs - ours))
+    won = np.array([sum(won for won, _ in walk) for walk in walks.values()], int)
+    far = np.array([np.mean([far for _, far in walk]) for walk in walks.values()])
+    mean, most = float(far.mean()) if len(far) else 0.0, None
+    if len(far) >= ENOUGH:
+        most = BIAS + ERRORS * float(far.std(ddof=1)) / sqrt(len(far))
+    return {
+        "more_successes": int(won.sum()),
+        "successes_p": sign_flips(won),
+        "mean_share_difference": mean,
+        "largest_share_difference": most,
+    }
 
 
 def _compared_row(row: Episode, again: Episode) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
-from antennate.experiments.compete.checking import compared, read_rows, refused
+from antennate.experiments.compete.checking import compared, read_rows, refusal
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import (
     Draw,
@@ -190,7 +190,7 @@ def run(
 def failed(result: Mapping[str, Any]) -> bool:
     """Whether a table that was checked does not repeat, or there is no valid episode at all."""
     if (check := result["check"]) is not None:
-        return refused(check, result["tie"])
+        return bool(refusal(check))
     return len(none_valid(result)) == len(result["controllers"])
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from antennate.control.readings import short_names
 from antennate.control.registry import about
+from antennate.experiments.compete.checking import refusal
 from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
@@ -132,16 +133,11 @@ def _differing(rows: Sequence[Mapping[str, Any]]) -> str:
 def sentence(result: Result) -> str:
     """Who stands first and how sure that is; or how many rows of a table repeat."""
     if (check := result["check"]) is not None:
-        broken = (
-            f" Expected no difference in {check['broken']} of them: on one version, engine and "
-            "processor every row repeats, and limits and what is given are the same everywhere."
-            if check["broken"]
-            else ""
-        )
-        return (
+        text = (
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
-            f"{check['other_outcome']} of them in how they end.{broken}"
+            f"{check['other_outcome']} of them in how they end."
         )
+        return " ".join(filter(None, [text, refusal(check)]))
     rows, names = result["controllers"], ordered(result)
     short = short_names(names)
     ranked = [name for name in names if rows[name]["rank"] is not None]
