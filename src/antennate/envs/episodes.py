@@ -18,13 +18,14 @@ from antennate.control.policy.observer import Observer, Vector
 from antennate.control.readings import make_readings
 from antennate.envs.config import EnvConfig, Randomisation, varied
 from antennate.envs.reward import terms_of
-from antennate.envs.truth import OUTCOMES, Outcome, Truth, replace_rows
+from antennate.envs.truth import OUTCOMES, Truth, replace_rows
 from antennate.errors import SceneError
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
     LOOK_EVERY,
     Judge,
+    Outcome,
     Trial,
     draw_trial,
     mishap,

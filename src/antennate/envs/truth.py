@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, get_args
 
 import numpy as np
 
 from antennate.envs.reward import TERMS
+from antennate.sim.trial import Outcome
 from antennate.types import Bools, Floats, Ints
 
-Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
-OUTCOMES: tuple[Outcome, ...] = ("success", "timeout", "left", "overturned", "fell", "invalid")
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
 @dataclass(slots=True)

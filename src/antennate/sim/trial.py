@@ -36,6 +36,8 @@ from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
 from antennate.types import Floats
 
+Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
+"""How a trial ends."""
 LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005

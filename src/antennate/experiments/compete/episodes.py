@@ -29,11 +29,11 @@ from antennate.control.registry import make_controller
 from antennate.errors import ControllerError
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.physics import Outcome, TrialResult
+from antennate.experiments.tunnel.physics import TrialResult
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import TIME_LIMIT
-from antennate.sim.trial import draw_scene, scene_of, time_limit_of
+from antennate.sim.trial import Outcome, draw_scene, scene_of, time_limit_of
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand

@@ -11,7 +11,7 @@ import math
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, ClassVar, Union
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -37,7 +37,7 @@ from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
-from antennate.sim.trial import Judge, TrialConfig, mishap, progress_of, require_own_curves
+from antennate.sim.trial import Judge, Outcome, TrialConfig, mishap, progress_of, require_own_curves
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -122,8 +122,6 @@ class TunnelConfig(TrialConfig):
         require_own_curves(self.robot, self.control)
         return self
 
-
-Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
 
 STUCK_GAIN = 0.02
 """Gain of progress that counts as getting on [m]."""
