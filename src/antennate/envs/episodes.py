@@ -287,16 +287,18 @@ class Episodes:
                 if not begins:
                     out = truth.outcome[row] == OUTCOMES.index("success")
                     gain = episode.progress - before
-                    left = 0 if out or truth.outcome[row] < 0 else self._left(row, episode)
-                    truth.terms[row] = terms_of(scene, gain, head, out, left)
+                    failed = not out and truth.outcome[row] >= 0
+                    remaining = self._remaining(row, episode) if failed else 0
+                    truth.terms[row] = terms_of(scene, gain, head, out, remaining)
             truth.progress[row] = episode.progress
 
-    def _left(self, row: int, episode: Episode) -> int:
-        """Decisions that an episode has left until its limit."""
+    def _remaining(self, row: int, episode: Episode) -> int:
+        """Whole decisions that remain until the limit of an episode."""
         seconds = self.config.interface.ticks * self.config.control.period
-        left = math.floor((self._limits[row] - self._t[row]) / seconds + 1e-6)
-        most = self.config.max_episode_steps
-        return max(0, left if most is None else min(left, most - episode.decisions))
+        remaining = math.floor((self._limits[row] - self._t[row]) / seconds + 1e-6)
+        if (most := self.config.max_episode_steps) is not None:
+            remaining = min(remaining, most - episode.decisions)
+        return max(0, remaining)
 
     def _begun(self, rows: Bools) -> Truth:
         """The truth about rows that have just begun."""

@@ -36,13 +36,13 @@ EARLY = Term(
     "early",
     TIME.weight,
     "decision",
-    "an end before the time limit that is not the exit: every decision that was left",
+    "an end before the time limit that is not the exit: every decision that remained",
 )
 HOLD = Term("hold", -0.2, "m", f"scene `wall` alone: how far the gap to the wall is from {GAP:g} m")
 TERMS = (PROGRESS, TIME, EXIT, EARLY, HOLD)
 
 
-def terms_of(scene: Any, gain: float, head: Floats, out: bool, left: int = 0) -> tuple[float, ...]:
+def terms_of(scene: Any, gain: float, head: Floats, out: bool, remaining: int) -> tuple[float, ...]:
     """The terms of one decision in the order of `TERMS`.
 
     Args:
@@ -50,8 +50,8 @@ def terms_of(scene: Any, gain: float, head: Floats, out: bool, left: int = 0) ->
         gain: Progress since the decision before [m].
         head: Position of the head, shape (2,) [m].
         out: Whether the head has gone out by the exit.
-        left: Decisions that were left until the limit, where the episode ends without the exit.
+        remaining: Decisions until the limit, where the episode ends without the exit, else 0.
     """
     error = abs(scene.gap(head) - GAP) if isinstance(scene, Wall) else 0.0
-    counts = (gain, 1.0, out, left, error)
+    counts = (gain, 1.0, out, remaining, error)
     return tuple(term.weight * count for term, count in zip(TERMS, counts, strict=True))
