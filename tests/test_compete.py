@@ -30,6 +30,7 @@ from antennate.experiments.compete.config import (
 )
 from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
 from antennate.experiments.compete.experiment import run
+from antennate.experiments.compete.page import sentence
 from antennate.experiments.compete.scenes import label, tunnel_config
 from antennate.experiments.compete.standings import standings
 from antennate.studies.formats import to_csv
@@ -86,6 +87,11 @@ class Begins(Entry):
     """It lets another program work for it."""
     def fault(self, command):
         subprocess.run([sys.executable, "-S", "-c", "sum(range(20_000_000))"], check=True)
+class Asks(Entry):
+    """A program beside it works for it, and does not end."""
+    def fault(self, command):
+        if not hasattr(self, "helper"):
+            self.helper = subprocess.Popen(["sleep", "9"])
 class SlowReset(Entry):
     def reset(self, rows, phase=0.0):
         super().reset(rows, phase)
@@ -343,6 +349,7 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
         ("--engine dask", "--engine"),
         ("--hidden --seed 5", "seed: expected none beside hidden"),
         ("--seed 700000", "expected no seed of 700000 to 799999"),
+        ("--seed 9999999999999999999", "--seed: expected a number of at most 4.61169e+18"),
         ("--hidden --seed 799999", "expected no seed of 700000 to 799999"),
     ],
 )
@@ -379,14 +386,15 @@ def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
 def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
-    names = [entries("Breaks"), entries("Ends"), "open"]
+    names = [entries("Breaks"), entries("Ends"), entries("Asks"), "open"]
     words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
     assert main(["compete", *words, "--workers", "1", "--out", "run"]) == 0
     rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["invalid", "invalid", "timeout"]
+    assert [row.outcome for row in rows] == ["invalid", "invalid", "invalid", "timeout"]
     assert {row.limit_s for row in rows} == {0.3}
     assert {row.time_s for row in rows} == {0.3}
     assert "NoneType" in rows[0].reason
+    assert "a program that it began runs on" in rows[2].reason
 
 
 def test_what_a_broken_process_held_is_run_again_in_another(
@@ -636,7 +644,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,-1,success,9.0\n",
-            "line 2: trial: expected at least 0, found -1",
+            "line 2: trial: expected 0 to 4611686018427387904, found -1",
         ),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",
@@ -699,6 +707,7 @@ def test_processors_of_one_name_differ_by_their_numbers(theirs: str, same: bool)
     rows = [replace(row, processor=theirs) for row in ours]
     check = compared([replace(rows[0], time_s=19.99), *rows[1:]], ours)
     assert check["broken"] == same
+    assert ("200 are of another version, engine or" in sentence({"check": check})) == (not same)
 
 
 def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean() -> None:

@@ -83,6 +83,17 @@ def test_scenes_whose_ids_are_the_same_are_named() -> None:
         envs.register()
 
 
+def test_an_id_that_another_package_has_taken_stays_and_a_warning_says_so() -> None:
+    ours = gym.registry.pop("Tunnel-v1")
+    try:
+        gym.register("Tunnel-v1", entry_point="elsewhere:Env")
+        with pytest.warns(UserWarning, match="Tunnel-v1: .* elsewhere:Env; take antennate/Tunnel"):
+            envs.register()
+        assert gym.spec("Tunnel-v1").entry_point == "elsewhere:Env"
+    finally:
+        gym.registry["Tunnel-v1"] = ours
+
+
 def test_gymnasium_finds_them_by_the_package_which_stays_free_of_it() -> None:
     code = (
         "import sys, antennate; assert 'gymnasium' not in sys.modules; "
@@ -333,7 +344,7 @@ def test_the_three_ways_to_reset_give_the_same_episodes() -> None:
 def episodes_of(mode: AutoresetMode, steps: int) -> list[tuple[Any, ...]]:
     """Number, decisions, sum of rewards and last observation of each episode that ended."""
     env = vector(2, autoreset_mode=mode, **SHORT)
-    assert env.metadata["autoreset_mode"] is mode
+    assert (env.metadata["autoreset_mode"], env.metadata["reward_version"]) == (mode, 1)
     _, info = env.reset(seed=3)
     number, count, total = info["episode_number"].copy(), np.zeros(2, int), np.zeros(2)
     over, ends = np.zeros(2, bool), list[tuple[Any, ...]]()

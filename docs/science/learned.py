@@ -10,6 +10,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import wilcoxon
 
 from antennate.experiments.compete.checking import read_rows
 from antennate.sim.scenes.scene import TIME_LIMIT
@@ -62,14 +63,17 @@ def main() -> None:
 
 
 def elsewhere() -> None:
-    """Print the entry beside each family of rivals in scenes in which it did not learn."""
+    """Print the entry beside each family of rivals in scenes in which it did not learn.
+
+    Beside Pratt's p is that of Wilcoxon's own way, without the draws that both fail.
+    """
     trials: dict[tuple[str, str], dict[tuple[int, int], tuple[bool, float]]] = {}
     for row in read_rows(ELSEWHERE):
         out = row.outcome == "success"
         draws = trials.setdefault((row.scene, row.controller), {})
         draws[row.seed, row.trial] = out, row.time_s if out else row.limit_s
     for family in FAMILIES:
-        cells, p = [], []
+        cells, p, without = [], [], []
         for (scene, name), draws in trials.items():
             if name in family:
                 own = np.array([trials[scene, ENTRY][draw] for draw in draws])
@@ -78,8 +82,11 @@ def elsewhere() -> None:
                 crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
                 cell = f"{shown(scene, own)}{shown(name, other)}| {less(own, other)} "
                 cells.append((cell, f"{crossed.mcnemar_p:.2g}"))
-        for (cell, crossed), times in zip(cells, holm(p), strict=True):
-            print(f"{cell}| {times:.2g} | {crossed} |")
+                _, alone = wilcoxon(own[:, 1] - other[:, 1])
+                without.append(alone)
+        columns = zip(cells, holm(p), holm(without), strict=True)
+        for (cell, crossed), times, other in columns:
+            print(f"{cell}| {times:.2g} | {other:.2g} | {crossed} |")
 
 
 def compared(pairs: list[tuple[str, np.ndarray, np.ndarray]]) -> None:

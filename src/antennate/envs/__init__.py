@@ -5,6 +5,8 @@ Importing this registers them; see docs/envs.md.
 
 from __future__ import annotations
 
+import warnings
+
 from antennate.errors import ConfigError, MissingPackageError
 
 try:
@@ -29,6 +31,7 @@ __all__ = ["AntennaEnv", "AntennaVectorEnv", "EnvConfig", "Randomisation", "ids"
 NAMESPACE = "antennate"
 VERSION = 1
 """Version of all environments: it rises when a scene, an observation or a reward changes."""
+_ENTRY_POINT = "antennate.envs.single:AntennaEnv"
 _NAMES = {"uturn": "UTurn", "corner": "Corner120", "deadend": "DeadEnd"}
 """Scenes whose name in an id is not their own with a capital letter."""
 
@@ -52,17 +55,23 @@ def register() -> tuple[str, ...]:
     """Register an environment for every scene that has a name; the ids. Raises what `ids` does.
 
     Importing this module does so; call it again after a scene was added. Each has a second id
-    without the namespace, for `gymnasium.make("antennate:Tunnel-v1")`.
+    without the namespace, for `gymnasium.make("antennate:Tunnel-v1")`; if another package has taken
+    that, it stays, and a warning says so.
     """
     known = ids()
     for full, scene in known.items():
         for name in (full, full.partition("/")[2]):
-            if name not in registration.registry:
+            if (taken := registration.registry.get(name)) is None:
                 registration.register(
                     name,
-                    entry_point="antennate.envs.single:AntennaEnv",
+                    entry_point=_ENTRY_POINT,
                     vector_entry_point="antennate.envs.vector:AntennaVectorEnv",
                     kwargs={"scene": scene},
+                )
+            elif taken.entry_point != _ENTRY_POINT:
+                warnings.warn(
+                    f"{name}: expected a free id, found that of {taken.entry_point}; take {full}",
+                    stacklevel=2,
                 )
     return tuple(known)
 

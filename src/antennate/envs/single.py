@@ -9,16 +9,11 @@ from gymnasium import Env
 from gymnasium.error import ResetNeeded
 
 from antennate.envs.episodes import Episodes
-from antennate.envs.reward import TERMS
+from antennate.envs.reward import REWARD_VERSION, TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
 from antennate.envs.truth import OUTCOMES, Truth
-from antennate.envs.vector import (
-    LARGEST_SEED,
-    config_of,
-    known_options,
-    require_no_pictures,
-    whole,
-)
+from antennate.envs.vector import config_of, known_options, require_no_pictures, whole
+from antennate.params.base import LARGEST_SEED
 from antennate.sim.world import World
 
 
@@ -41,7 +36,7 @@ class AntennaEnv(Env[Any, Any]):
     def __init__(self, scene: str = "tunnel", render_mode: None = None, **values: Any) -> None:
         require_no_pictures(render_mode)
         self.config = config_of(scene, values)
-        self.metadata = {"render_modes": []}
+        self.metadata = {"render_modes": [], "reward_version": REWARD_VERSION}
         self.render_mode = render_mode
         self.observation_space = observation_space(self.config)
         self.action_space = action_space(self.config)

@@ -13,15 +13,13 @@ from gymnasium.vector.utils import batch_space
 from antennate.control.policy.interface import PolicyInterface
 from antennate.envs.config import EnvConfig
 from antennate.envs.episodes import Episodes
-from antennate.envs.reward import TERMS
+from antennate.envs.reward import REWARD_VERSION, TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
 from antennate.envs.truth import OUTCOMES, Truth
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import from_values
+from antennate.params.base import LARGEST_SEED, from_values
 from antennate.types import Bools
-
-LARGEST_SEED = 2**62
 
 
 def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
@@ -94,7 +92,11 @@ class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
             raise ConfigError(f"num_envs: expected at least 1, found {num_envs}")
         self.num_envs, self.render_mode = num_envs, render_mode
         self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.metadata = {
+            "render_modes": [],
+            "reward_version": REWARD_VERSION,
+            "autoreset_mode": self.autoreset_mode,
+        }
         self.single_observation_space = observation_space(self.config)
         self.single_action_space = action_space(self.config)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

@@ -26,6 +26,8 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.files import TOO_LONG, read_toml
 from antennate.params.faults import Unread, describe, group_of
 
+LARGEST_SEED = 2**62
+"""Other programs read seeds as numbers of 64 bits."""
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
 ALLOWED = "allowed"

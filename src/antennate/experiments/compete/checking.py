@@ -13,17 +13,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import BadInputError, ConfigError
-from antennate.experiments.compete.config import require_free
+from antennate.experiments.compete.config import LARGEST_TABLE, require_free
 from antennate.experiments.compete.episodes import Episode, restricted
 from antennate.files import decoded, read_limited
 from antennate.jackknife import ENOUGH
 from antennate.messages import nearest
+from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
 from antennate.studies.formats import from_csv
 from antennate.studies.statistics import sign_flips
 
-LARGEST = 100_000_000
-"""Most bytes of such a table."""
 CLOSE = 5e-7
 """Times [s] and ways [m] that differ by less are the same: tables have six decimals."""
 BIAS, ERRORS, CHANCE = 0.01, 3.0, 0.01
@@ -43,7 +42,7 @@ def read_rows(path: Path) -> list[Episode]:
         raise ConfigError(
             f"{path}: expected a table of trials, found a folder; name its trials.csv"
         )
-    data = read_limited(path, LARGEST, ConfigError)
+    data = read_limited(path, LARGEST_TABLE, ConfigError)
     try:
         lines = from_csv(decoded(path, data, ConfigError))
     except ConfigError:
@@ -112,8 +111,8 @@ def _require_sound(row: Episode) -> None:
     """
     CONTROLLERS.check(row.controller)
     for name in ("seed", "trial"):
-        if getattr(row, name) < 0:
-            raise ValueError(f"{name}: expected at least 0, found {getattr(row, name)}")
+        if not 0 <= (value := getattr(row, name)) <= LARGEST_SEED:
+            raise ValueError(f"{name}: expected 0 to {LARGEST_SEED}, found {value}")
     for name in ("time_s", "limit_s", "progress_m"):
         if not isfinite(value := getattr(row, name)) or (name == "limit_s" and value <= 0):
             least = " above 0" if name == "limit_s" else ""
@@ -143,6 +142,7 @@ def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> dict[str, An
         "same": len(pairs) - len(differ),
         "other_outcome": sum(row.outcome != again.outcome for row, again in differ),
         "broken": sum(_must_repeat(row, again) for row, again in differ),
+        "elsewhere": sum(not _in_one_place(row, again) for row, again in pairs),
         **_elsewhere(pairs),
         **places,
         "differ": [_compared_row(row, again) for row, again in differ],
@@ -180,11 +180,16 @@ def _alike(row: Episode, again: Episode) -> bool:
     return exact and all(abs(one - other) <= CLOSE for one, other in numbers)
 
 
-def _must_repeat(row: Episode, again: Episode) -> bool:
-    """Whether rows that differ are of one version, engine and processor, or differ in a rule."""
+def _in_one_place(row: Episode, again: Episode) -> bool:
+    """Whether both are of one version, engine and processor."""
     alike = (row.version, row.engine) == (again.version, again.engine)
     named = again.processor.startswith(f"{row.processor} (")  # by former tables, without numbers
-    if alike and (named or row.processor == again.processor):
+    return alike and (named or row.processor == again.processor)
+
+
+def _must_repeat(row: Episode, again: Episode) -> bool:
+    """Whether rows that differ are of one place, or differ in a rule."""
+    if _in_one_place(row, again):
         return True
     ran = "invalid" not in (row.outcome, again.outcome)
     return row.given != again.given or (ran and abs(row.limit_s - again.limit_s) > CLOSE)

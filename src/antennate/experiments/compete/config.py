@@ -11,7 +11,8 @@ from pydantic import field_validator, model_validator
 
 from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED
 from antennate.errors import BadInputError, ConfigError
-from antennate.params.base import Params, number, read_file, require_different
+from antennate.files import decoded, read_limited
+from antennate.params.base import LARGEST_SEED, Params, number, read_file, require_different
 from antennate.sim.scenes.registry import SHIPPED, check_name
 from antennate.studies.formats import from_csv
 from antennate.studies.run_files import CONFIG
@@ -22,6 +23,8 @@ RESERVED = range(700_000, 800_000)
 """Seeds that are kept for evaluations by others; no run may have one of them."""
 _SEEDS = 2**31
 """Hidden seeds lie below that."""
+LARGEST_TABLE = 100_000_000
+"""Most bytes of a table of trials."""
 CONTROLLERS_OF_BOARD = (
     *("open", "timed", "schedule", "paper", "closed", "geometric", "follow", "centre"),
     "map",
@@ -60,7 +63,11 @@ class CompeteConfig(Params):
     trials: int = number(10, "1", "assumed: to look; a board takes 100", ge=1, le=100_000)
     """Trials of every controller in every scene."""
     seed: int = number(
-        DEVELOPMENT.start, "1", "assumed: the first of the public seeds, 600000 to 600099", ge=0
+        DEVELOPMENT.start,
+        "1",
+        "assumed: the first of the public seeds, 600000 to 600099",
+        ge=0,
+        le=LARGEST_SEED,
     )
     """Seed of all chance, not one of 700000 to 799999; with `hidden` the one that was drawn."""
     hidden: bool = number(False, "1", "assumed: to develop on public seeds")
@@ -70,9 +77,9 @@ class CompeteConfig(Params):
     )
     """Processor time that a decision may take; waiting is given 20 times as long."""
     tie: float = number(
-        0.01,
+        0.015,
         "1",
-        "measured: two processors, 200 and 198 successes of the same 200 draws",
+        "measured: two instruction sets, 193 and 196 of the same 200 draws (docs/performance.md)",
         ge=0,
         le=1,
     )
@@ -88,7 +95,9 @@ class CompeteConfig(Params):
     def names_in_files(self) -> Iterable[str]:
         """Controllers and scenes of the table that is checked."""
         with contextlib.suppress(OSError, ValueError, BadInputError):  # told where it is read
-            lines = from_csv(Path(self.check).read_text(encoding="utf-8")) if self.check else []
+            path = Path(self.check or "")
+            data = read_limited(path, LARGEST_TABLE, ConfigError) if self.check else b""
+            lines = from_csv(decoded(path, data, ConfigError)) if data else []
             columns = ("controller", "scene")
             return dict.fromkeys(str(line.get(name)) for line in lines for name in columns)
         return ()

@@ -1,18 +1,20 @@
 """One episode: a controller in one draw of a scene, with a time limit for each decision.
 
 A decision has to be there before the readings are stale. Its time is that of the processor, with
-that of processes that it began and that have ended, so that a machine with other work to do judges
-alike; who waits or sleeps in a decision is stopped by the clock, after `WAITING` times as long. The
-first decision, in which libraries are loaded, and a reset may take so long on the processor, too.
-Episodes run in lockstep, and a step of all that stays within the limit of one is within it for
-each. After one that does not, each episode runs alone, and is INVALID where its own decision takes
-too long.
+that of programs that it began and that have ended, so that a machine with other work to do judges
+alike; none may run on after it. Who waits or sleeps in a decision is stopped by the clock, after
+`WAITING` times as long. The first decision, in which libraries are loaded, and a reset may take so
+long on the processor, too. Episodes run in lockstep, and a step of all that stays within the limit
+of one is within it for each. After one that does not, each episode runs alone, and is INVALID where
+its own decision takes too long.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import multiprocessing
+import os
 import resource
 import signal
 import threading
@@ -105,7 +107,7 @@ class Timed(Wrapped):
         limit: Processor time of a step [s].
 
     Raises:
-        ControllerError: In a step or reset that took longer.
+        ControllerError: In a step or reset that took longer, or that left a program running.
     """
 
     def __init__(self, made: Controller, limit: float) -> None:
@@ -148,9 +150,22 @@ class Timed(Wrapped):
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
         if used > limit or waited > most:
             self._give_up()
+        if _leaves_programs():
+            raise ControllerError("a program that it began runs on after a decision")
 
     def _give_up(self, *_: object) -> None:
         raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
+
+
+def _leaves_programs() -> bool:
+    """Whether this worker has begun a program whose end it has not waited for."""
+    if multiprocessing.parent_process() is None:
+        return False  # no worker: who calls may have programs of its own
+    try:
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    except ChildProcessError:
+        return False
+    return True
 
 
 def _processor_time() -> float:

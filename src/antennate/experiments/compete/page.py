@@ -137,7 +137,12 @@ def sentence(result: Result) -> str:
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
             f"{check['other_outcome']} of them in how they end."
         )
-        return " ".join(filter(None, [text, refusal(check)]))
+        few = " They are too few to tell." if check["largest_share_difference"] is None else ""
+        sums = (
+            f"{check['elsewhere']} are of another version, engine or processor, where chance ends "
+            f"rows in another way: they are judged by their sums alone.{few}"
+        )
+        return " ".join(filter(None, [text, sums if check["elsewhere"] else "", refusal(check)]))
     rows, names = result["controllers"], ordered(result)
     short = short_names(names)
     ranked = [name for name in names if rows[name]["rank"] is not None]
