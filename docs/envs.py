@@ -47,7 +47,9 @@ uv run --extra onnx antennate tunnel --scene uturn \\
 uv run --no-sync python examples/train_ppo.py --out other_policy
 ```
 
-Either is one file on PyTorch, to be read and changed.
+Either is one file on PyTorch, to be read and changed. `uv sync` removes what it did not install,
+such as PyTorch; `uv sync --inexact` does not. `apprentice` on the [board](leaderboard.md) is that
+`entries/apprentice/policy.onnx`.
 
 ## Use one
 
@@ -68,9 +70,9 @@ before `gymnasium`. After `SCENES.add("mine", ...)`, `antennate.envs.register()`
 environment for your [own scene](scenes.md).
 
 `scuttle`, the robot if none is named, climbs no step of 8 cm. For ground with edges take a robot
-that leaves the plane, `robot=RobotSpec.named("scuttle3d"), action="joints"` beside
-`"antennate/StepUp-v1"`: the action then has its pitch joints and the elevation of its antennae. Its
-inertial sensor is not observed.
+that leaves the plane: `gym.make("antennate/StepUp-v1", robot=RobotSpec.named("scuttle3d"),
+action="joints")`, with `from antennate.robots.spec import RobotSpec`. The action then has its pitch
+joints and the elevation of its antennae. Its inertial sensor is not observed.
 
 {ids}
 
@@ -151,6 +153,78 @@ each range, uniformly.
 
 What differs between the trials of a scene, such as its cylinders, the start and slipping legs, is
 drawn anyway (`variation`).
+
+## Policy files
+
+An ONNX file whose metadata `antennate` holds one JSON value, the contract: version, interface,
+rate, averaging time, gait, joints, robot with its hash, and every number of observation and action
+with name, unit, scale and clip. `FILE.onnx` is then a controller:
+
+```bash
+uv run antennate tunnel --controllers my_policy/policy.onnx
+uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
+    --controller my_policy/policy.onnx
+```
+
+- Input `observation`, shape (1, n); output `action`, shape (1, k). Of maneuvers it is their
+  scores, of which the largest is done.
+- The normaliser is in the graph. Recurrent states are inputs and outputs that the contract names;
+  they are zeros at a start. A policy starts at the first reading that can be used; until then the
+  robot holds, and nothing enters its history.
+- A policy made for another robot, rate, gait, observation or action is refused before the first
+  trial, with what was expected and what was found. Ids, directions and zeros of servos may differ,
+  and so may the calibration of the antennae: one that is given `counts` is right for the sensor it
+  was trained with alone, `flex` and `level` are made of any sensor by its own calibration.
+- An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind
+  every controller.
+
+`add_contract` puts a contract into the file of another exporter. This trains with
+Stable-Baselines3 for a moment, and writes such a policy, which answers with the scores of the
+maneuvers, or the means of continuous actions (`uv pip install stable-baselines3 onnxscript`):
+
+```python
+import gymnasium as gym
+import torch
+from stable_baselines3 import PPO
+
+import antennate.envs
+from antennate.control.policy.contract import contract_of
+from antennate.control.policy.writer import add_contract
+
+env = gym.make("antennate/UTurn-v1")
+model = PPO("MlpPolicy", env, n_steps=64, device="cpu").learn(64)
+
+
+class Actor(torch.nn.Module):
+    def __init__(self, policy):
+        super().__init__()
+        self.policy = policy
+
+    def forward(self, observation):
+        return self.policy.action_net(self.policy.mlp_extractor.forward_actor(observation))
+
+
+given = torch.zeros(1, *env.observation_space.shape)
+names = dict(input_names=["observation"], output_names=["action"], external_data=False)
+torch.onnx.export(Actor(model.policy.cpu()), given, "mine.onnx", **names)
+
+config = env.unwrapped.config
+contract = contract_of(config.interface, config.control, config.robot, about="my PPO, seed 3")
+add_contract("mine.onnx", contract)
+```
+
+`write_policy` of the same module needs neither: it writes dense layers from their weights, behind a
+gated recurrent unit if the network has a memory. Here is one layer of chance:
+
+```python
+import numpy as np
+
+from antennate.control.policy.writer import write_policy
+
+inputs, outputs = env.observation_space.shape[0], env.action_space.n
+layer = np.random.default_rng(0).normal(size=(outputs, inputs)), np.zeros(outputs)
+write_policy("chance.onnx", contract, [layer], np.zeros(inputs), np.ones(inputs), clip=5.0)
+```
 
 ## What was learned so far
 
@@ -284,63 +358,6 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   --limits.silent-answers 50 --limits.longest-pause 1`; the tenth ended with WATCHDOG, as the servos
   had got nothing for 0.1 s. With the limits as they are, nine of ten drives of a former student
   ended with faults of late answers, and eight of 13 of `closed`.
-
-## Policy files
-
-An ONNX file whose metadata `antennate` holds one JSON value, the contract: version, interface,
-rate, averaging time, gait, joints, robot with its hash, and every number of observation and action
-with name, unit, scale and clip. `FILE.onnx` is then a controller:
-
-```bash
-uv run antennate tunnel --controllers my_policy/policy.onnx
-uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
-    --controller my_policy/policy.onnx
-```
-
-- Input `observation`, shape (1, n); output `action`, shape (1, k). Of maneuvers it is their
-  scores, of which the largest is done.
-- The normaliser is in the graph. Recurrent states are inputs and outputs that the contract names;
-  they are zeros at a start. A policy starts at the first reading that can be used; until then the
-  robot holds, and nothing enters its history.
-- A policy made for another robot, rate, gait, observation or action is refused before the first
-  trial, with what was expected and what was found. Ids, directions and zeros of servos may differ,
-  and so may the calibration of the antennae: one that is given `counts` is right for the sensor it
-  was trained with alone, `flex` and `level` are made of any sensor by its own calibration.
-- An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind
-  every controller.
-
-`write_policy` writes a network of dense layers, behind a gated recurrent unit if it has a memory;
-`add_contract` puts a contract into the file of another exporter:
-
-```python
-from antennate.control.policy.contract import contract_of
-from antennate.control.policy.writer import add_contract
-
-config = env.unwrapped.config
-contract = contract_of(config.interface, config.control, config.robot, about="my PPO, seed 3")
-add_contract("mine.onnx", contract)
-```
-
-Of a `model` of Stable-Baselines3 (PPO or A2C with `MlpPolicy`) this writes such a file before that,
-with the scores of the maneuvers, or the means of continuous actions:
-
-```python
-import torch
-
-
-class Actor(torch.nn.Module):
-    def __init__(self, policy):
-        super().__init__()
-        self.policy = policy
-
-    def forward(self, observation):
-        return self.policy.action_net(self.policy.mlp_extractor.forward_actor(observation))
-
-
-given = torch.zeros(1, *env.observation_space.shape)
-names = dict(input_names=["observation"], output_names=["action"])
-torch.onnx.export(Actor(model.policy.cpu()), given, "mine.onnx", **names)
-```
 
 ## What is measured
 

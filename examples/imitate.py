@@ -317,9 +317,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument("--scene", nargs="+", default=["uturn", "room"], choices=[*SCENES])
-    parser.add_argument("--readings", default="own", choices=["own", "none"])
-    parser.add_argument("--decisions", type=int, default=60_000)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--readings", default="own", choices=["own", "none"], help="what it feels")
+    parser.add_argument("--decisions", type=int, default=60_000, help="600 a scene and round")
+    parser.add_argument("--seed", type=int, default=1, help="of all chance")
     options = parser.parse_args()
     if options.decisions < 1:
         parser.error(f"--decisions: expected at least 1, found {options.decisions}")

@@ -1,6 +1,7 @@
 """A small network in NumPy that learns from a data set of touch: `touch_network.py RUN [TASK]`."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -54,8 +55,9 @@ def train(x, y, split, decay, rng):
 
 
 def main(folder, tasks):
-    """Train and test a network for each task."""
-    for task in tasks:
+    """Train and test a network for each task, of those of which there is data if none is named."""
+    there = [task for task in TASKS if (folder / f"{TASKS[task][0]}.parquet").exists()]
+    for task in tasks or there:
         kind, label = TASKS[task]
         x, y, split, episode = read(folder, kind, label)
         known = split == "train"
@@ -70,4 +72,4 @@ def main(folder, tasks):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:] or TASKS)
+    main(Path(*sys.argv[1:2] or sys.exit(__doc__)), sys.argv[2:])

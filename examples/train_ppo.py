@@ -241,7 +241,8 @@ def train(options: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    words = {"formatter_class": argparse.ArgumentDefaultsHelpFormatter}
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], **words)
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument(
         "--scene",
@@ -254,11 +255,11 @@ def main() -> None:
         "--readings", default="own", choices=["own", "none"], help="what it feels while it learns"
     )
     parser.add_argument("--workers", type=int, default=1, help="processes that step robots")
-    parser.add_argument("--minutes", type=float, default=20.0)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=20.0, help="how long it learns")
+    parser.add_argument("--seed", type=int, default=1, help="of all chance but the load")
     parser.add_argument("--begin", type=Path, help="folder whose weights it begins with")
     parser.add_argument(
-        "--export", action="store_true", help="write the ONNX file of saved weights"
+        "--export", action="store_true", help="only write the ONNX file of the weights in --out"
     )
     options = parser.parse_args()
     if len(options.scene) > options.workers:
@@ -270,6 +271,8 @@ def main() -> None:
     for folder in filter(None, needed):
         if not (folder / "weights.npz").is_file():
             parser.error(f"expected saved weights, found no {folder / 'weights.npz'}")
+    if not options.export and (options.out / "progress.csv").exists():
+        parser.error(f"expected a new folder, found one of another training, {options.out}")
     if not options.export:
         train(options)
     try:

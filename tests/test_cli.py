@@ -206,6 +206,12 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         assert not {*_HEAVY, *unneeded} & set(loaded), said
 
 
+@pytest.mark.parametrize("words", ["one --out two", "--out two one"])
+def test_a_folder_given_in_two_ways_is_refused(words: str, capsys) -> None:
+    line = refusal(capsys, "robot", *words.split())
+    assert "--out: expected it once, found also FOLDER without" in line
+
+
 @pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])
 def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
     line = refusal(capsys, "antenna", "springs", flag)

@@ -52,6 +52,21 @@ def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -
     assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
 
 
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        ("policy.onnx", "expected a file under entries/NAME/, found policy.onnx"),
+        ("entries/nobody/policy.onnx", "expected a file, found no entries/nobody/policy.onnx"),
+        ("--help", "# Usage: .ci/judge CONTROLLER"),
+    ],
+)
+def test_a_judge_without_an_entry_says_what_is_missing(entry: str, why: str) -> None:
+    words = ["bash", str(DOCS.parent / ".ci/judge"), entry]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert why in done.stdout + done.stderr
+
+
 def test_a_page_without_its_marks_is_left_as_it_is(page: Path) -> None:
     page.write_text(page.read_text().replace("<!-- end of board -->", ""))
     before = page.read_text()

@@ -423,15 +423,19 @@ def test_a_policy_of_other_numbers_is_refused_by_what_it_takes(
 
 
 def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second block of Python puts a contract into a file that another exporter wrote."""
-    pytest.importorskip("gymnasium")
+    """The second block trains, which a slow test does; here its end stands behind a given file."""
+    gym = pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
-    code = [block.text for block in blocks("envs.md") if block.kind == "python"]
+    first, trains, writes = (b.text for b in blocks("envs.md") if b.kind == "python")
     known: dict[str, Any] = {}
-    exec(code[0], known)
-    constant(Path("mine.onnx"), (0.0,) * 4, contract(action="gait"))
-    exec(code[1], known)
+    exec(first, known)
+    known["env"] = gym.make("antennate/UTurn-v1")
+    constant(Path("mine.onnx"), FORWARD)
+    imports = [line for line in trains.splitlines() if line.startswith("from antennate")]
+    exec("\n".join([*imports, trains[trains.index("config = ") :]]), known)
     assert Policy(Path("mine.onnx")).contract.about == "my PPO, seed 3"
+    exec(writes, known)
+    assert len(Policy(Path("chance.onnx")).contract.observations) > 1
 
 
 def test_without_onnxruntime_the_way_to_get_it_is_told(

@@ -13,6 +13,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from pages import blocks
 
 from antennate import envs
 from antennate.experiments.tunnel.batch import run_trials
@@ -112,6 +113,20 @@ def test_stable_baselines_trains() -> None:
     assert model.num_timesteps >= steps
     observation, _ = env.reset(seed=3)
     assert env.action_space.contains(model.predict(observation, deterministic=True)[0])
+
+
+def test_the_page_writes_a_policy_of_stable_baselines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("onnxscript")
+    monkeypatch.chdir(tmp_path)
+    (code,) = (b.text for b in blocks("envs.md") if b.kind == "python" and "PPO(" in b.text)
+    exec(code, {})
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.onnx"]
+    config, rows = TunnelConfig(time_limit=1.0, scene="flat"), list[TrialResult]()
+    run_trials(config, "mine.onnx", [0], lambda r: rows.append(r[0]))
+    assert rows[0].outcome != "invalid"
 
 
 def test_skrl_trains() -> None:

@@ -228,13 +228,16 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
     flags given twice the last one counts.
 
     Raises:
-        ConfigError: A flag is unknown, or has too few or too many values.
+        ConfigError: A flag is unknown, has too few or too many values, or is also given without
+            its name.
     """
     by_flag = {flag: option for option in options for flag in option.flags}
     values: dict[tuple[str, ...], Any] = {}
     free = [option for option in options if option.positional]
+    named, placed = set[tuple[str, ...]](), set[tuple[str, ...]]()
     for flag, words in flags_and_words(argv):
         option, rest = by_flag.get(flag), words
+        named |= {option.path} if option else set()
         if option is None:
             _require_none(flag, by_flag)
         elif not option.metavar:
@@ -254,10 +257,13 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
                 meant = nearest(word, by_flag) if word.startswith("-") else ""
                 raise ConfigError(f"expected flags only{meant}, found {shown(word)}")
             value = free[0].value(word)
+            placed.add(free[0].path)
             if free[0].many:
                 values[free[0].path] = (*values.get(free[0].path, ()), value)
             else:
                 values[free.pop(0).path] = value
+    if twice := [option for option in options if option.path in named & placed]:
+        raise ConfigError(f"{twice[0].flag}: expected it once, found also {twice[0].free} without")
     return values
 
 

@@ -122,7 +122,7 @@ def check(config: CompeteConfig) -> None:
         fresh=True,
     )
     for trouble in filter(None, troubles):
-        raise ConfigError(f"--controllers: {trouble}")
+        raise ConfigError(f"{config.check or '--controllers'}: {trouble}")
 
 
 def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> str:

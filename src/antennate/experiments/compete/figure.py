@@ -121,5 +121,5 @@ def profile(rows: Rows, names: Sequence[str]) -> Figure:
     panel.set(xlim=(1, 10), ylim=(-2, 102))
     panel.set(xlabel="time over that of the fastest", ylabel="draws crossed [%]")
     if shares:
-        figure.legend(loc="outside upper center", ncols=4, handlelength=2.6)
+        figure.legend(loc="outside upper center", ncols=3, handlelength=2.6)
     return figure
