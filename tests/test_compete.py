@@ -614,12 +614,19 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("", "expected a table of trials, found no row"),
+        ("", "expected a header with controller, found an empty file"),
+        (
+            "controller,scene,seed,trial,outcome,time_s\n",
+            "expected a table of trials, found no row",
+        ),
         ("controller,scene\nopen,flat\n", "with the columns controller, .*, found none named seed"),
-        ("controller;scene\nopen;flat\n", "found none named controller"),
+        (
+            "controller;scene\nopen;flat\n",
+            "expected columns separated by commas.* found semicolons",
+        ),
         (
             "controller,scene,seed,trial,trial,outcome\nopen,flat,1,0,1,timeout\n",
-            "expected a table of trials, found the column 'trial' twice",
+            "expected each column once, found 'trial' twice",
         ),
         (
             "controller,scene,seed,trial,outcome,time_s,engin\nopen,flat,1,0,timeout,1.0,3\n",
@@ -637,7 +644,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
             "controller,scene,seed,trial,outcome,time_s\nopne,flat,1,0,timeout,1.0\n",
             r"line 2: expected one of open, .* \(did you mean open\?\)",
         ),
-        ("\0\n", "expected a table of trials"),
+        ("\0\n", "expected UTF-8 text, found a zero byte"),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
             "line 2: expected no seed of 700000",
@@ -664,10 +671,11 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
 
 
 def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: Path) -> None:
-    """Spreadsheets write such a mark."""
-    text = "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,timeout,1.0\n"
-    (tmp_path / "a.csv").write_text(text, encoding="utf-8-sig")
-    assert read_rows(tmp_path / "a.csv")[0].controller == "open"
+    """Spreadsheets write such a mark, and R writes NA where nothing is."""
+    text = "controller,scene,seed,trial,outcome,time_s,given\nopen,flat,1,0,timeout,1.0,NA\n"
+    (tmp_path / "a.csv").write_text(f"sep=,\n{text}", encoding="utf-8-sig")
+    (row,) = read_rows(tmp_path / "a.csv")
+    assert (row.controller, row.given) == ("open", "")
     with pytest.raises(ConfigError, match=r"found a folder; name its trials\.csv"):
         read_rows(tmp_path)
 

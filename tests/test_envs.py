@@ -76,11 +76,25 @@ def test_a_scene_that_is_added_gets_one(monkeypatch: pytest.MonkeyPatch) -> None
             del gym.registry[name]
 
 
-def test_scenes_whose_ids_are_the_same_are_named() -> None:
-    for name in ("my-floor", "my_floor"):
-        SCENES.add(name, lambda: FlatScene(0.5))
-    with pytest.raises(ConfigError, match=r"MyFloor-v1: .* found my-floor and my_floor"):
-        envs.register()
+def test_scenes_without_an_id_of_their_own_are_named_and_the_others_have_theirs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("my-floor", "my_floor", "my floor"):
+        monkeypatch.setitem(SCENES.added, name, lambda: FlatScene(0.5))
+    with pytest.warns(UserWarning, match="expected") as found:
+        ids = envs.ids()
+    assert ids == {**IDS, "antennate/MyFloor-v1": "my-floor"}
+    first, second = (str(one.message) for one in found)
+    assert first.startswith("antennate/MyFloor-v1: ")
+    assert first.endswith(" found my-floor and my_floor")
+    assert second.startswith("my floor: expected letters")
+
+
+def test_a_render_mode_is_refused_as_libraries_that_try_one_expect() -> None:
+    """Stable-Baselines3 2.9 asks for pictures, and after a TypeError for none."""
+    with pytest.raises(TypeError, match="render_mode: expected None") as error:
+        envs.AntennaEnv("flat", render_mode="rgb_array")
+    assert isinstance(error.value, ConfigError)
 
 
 def test_an_id_that_another_package_has_taken_stays_and_a_warning_says_so() -> None:

@@ -1,10 +1,14 @@
 """Figures: what they show, their units, and bytes that repeat."""
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import phone
 import pytest
@@ -15,6 +19,8 @@ from PIL import Image
 
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN, USUAL
+from antennate.experiments.compete import figure as compete
+from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.taper import experiment as taper
 from antennate.experiments.taper.experiment import TaperConfig
@@ -176,11 +182,37 @@ def test_rendering_twice_changes_nothing():
 
 
 def test_rendering_leaves_the_users_settings_alone():
-    import matplotlib as mpl
-
     before = dict(mpl.rcParams)
     style.render(style.canvas(3.0, 3.0))
     assert dict(mpl.rcParams) == before
+
+
+def test_the_users_settings_change_no_figure(monkeypatch):
+    """As of a matplotlibrc: TeX where there is none, another cut of the margins, other lines."""
+    plain = style.render(study())
+    own = {"text.usetex": True, "savefig.bbox": "tight", "lines.linestyle": "--"}
+    own |= {"axes.prop_cycle": mpl.cycler(color=["r"]), "axes.xmargin": 0.3}
+    for name, value in own.items():
+        monkeypatch.setitem(mpl.rcParams, name, value)
+    assert style.render(study()) == plain
+
+
+def test_a_command_draws_though_its_terminal_belongs_to_a_notebook(tmp_path):
+    words = [sys.executable, "-m", "antennate", "robot", "--out", tmp_path / "run", "--no-config"]
+    own = os.environ | {"MPLBACKEND": "module://a_package_that_is_elsewhere"}
+    subprocess.run(words, check=True, env=own, stdout=subprocess.DEVNULL)
+    assert [*(tmp_path / "run/figures").glob("*.png")]
+
+
+def test_names_are_written_as_they_are():
+    """Matplotlib reads a formula between dollar signs, and leaves `_name` out of a legend."""
+    names = ["_mine.onnx", "a$x$.onnx", "$\\frac{$.onnx"]
+    rows = [Episode(name, "flat", 1, 0, "success", 2.0, engine="e") for name in names]
+    figure = compete.profile(rows, names)
+    style.render(figure)
+    (legend,) = figure.legends
+    texts = [text.get_text().strip().replace(r"\$", "$") for text in legend.get_texts()]
+    assert texts == names
 
 
 def test_axes_have_units():

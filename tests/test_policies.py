@@ -401,6 +401,31 @@ def test_weights_in_another_file_are_joined_by_the_contract(
     assert joined.answer(zeros, {})[0] == pytest.approx(Policy(path).answer(zeros, {})[0])
 
 
+def test_a_contract_makes_no_file_that_is_too_large_to_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    before = path.read_bytes()
+    monkeypatch.setattr("antennate.control.policy.writer.LARGEST", len(before))
+    with pytest.raises(BadInputError, match=f"expected at most {len(before)} bytes in all, found"):
+        add_contract(path, contract().model_copy(update={"about": 200 * "a"}))
+    assert path.read_bytes() == before
+
+
+def test_a_policy_that_answers_with_words_is_refused_by_that(tmp_path: Path) -> None:
+    """Also exporters of classifiers give other things than numbers by default."""
+    path = constant(tmp_path / "p.onnx", FORWARD)
+    model = onnx.load(str(path))
+    word = onnx.helper.make_tensor("word", onnx.TensorProto.STRING, [1, 1], [b"left"])
+    del model.graph.node[:], model.graph.output[:]
+    model.graph.node.append(onnx.helper.make_node("Constant", [], ["action"], value=word))
+    text = onnx.TensorProto.STRING
+    model.graph.output.append(onnx.helper.make_tensor_value_info("action", text, [1, 1]))
+    path.write_bytes(model.SerializeToString())
+    with pytest.raises(ConfigError, match=r"expected an answer to .* could not convert string"):
+        Policy(path)
+
+
 def test_a_policy_of_other_numbers_is_refused_by_what_it_takes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

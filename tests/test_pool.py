@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,20 @@ def test_a_failing_task_is_named() -> None:
         gather(halves, [(1, 0), (2, 0)], 2, no_step)
     with pytest.raises(ZeroDivisionError):
         gather(halves, [(1, 0), (2, 0)], 1, no_step)
+
+
+def test_a_process_that_may_begin_no_other_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(current_process(), "daemon", True)  # as in a pool of multiprocessing
+    with pytest.raises(WorkerError, match="found a daemonic one"):
+        gather(halves, [(1, 2)], Workers(1, timeout=9.0), no_step)
+    monkeypatch.undo()
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(WorkerError, match="expected a working directory, found: No such file"):
+        gather(halves, [(1, 2)], Workers(1, timeout=9.0), no_step)
 
 
 def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:

@@ -117,6 +117,8 @@ _RC: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "antennate",
 }
+_THEIRS = frozenset({"backend", "backend_fallback", "interactive", "toolbar", "webagg.port"})
+"""Settings that say where figures are shown, not how."""
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
@@ -126,10 +128,24 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
         import matplotlib as mpl
 
-        with mpl.rc_context(_RC):
+        with mpl.rc_context({**_changed(), **_RC}):
             return draw(*args, **kwargs)
 
     return inside
+
+
+def _changed() -> dict[Any, Any]:
+    """What the user's own settings of matplotlib have changed, as it is by default."""
+    import matplotlib as mpl
+
+    now, default = dict(dict.items(mpl.rcParams)), dict.items(mpl.rcParamsDefault)
+    return {key: v for key, v in default if key not in _THEIRS and now[key] != v}
+
+
+def plain(names: Mapping[str, str]) -> dict[str, str]:
+    """Names as matplotlib writes them: `$` begins a formula there, `_` what no legend shows."""
+    escaped = {key: name.replace("$", r"\$") for key, name in names.items()}
+    return {key: f" {name}" if name[:1] == "_" else name for key, name in escaped.items()}
 
 
 def series(count: int) -> list[str]:

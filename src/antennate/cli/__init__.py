@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -76,6 +77,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     from antennate.sim.engine_setup import describe_only, dropped, keep_wish
 
     keep_wish()
+    if (
+        argv is None
+    ):  # a program of its own, which draws into files: a notebook's backend is not here
+        os.environ["MPLBACKEND"] = "agg"
     words = list(sys.argv[1:] if argv is None else argv)
     describe_only(not _HELP.isdisjoint(words))
     name, words = _divided(words)

@@ -15,6 +15,7 @@ import numpy as np
 
 from antennate.control.knowledge import Kind, Knowing, Knowledge
 from antennate.errors import ControllerError, is_ctrl_c, raised
+from antennate.messages import shortened
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import (
@@ -197,7 +198,9 @@ class CheckedController:
         for name in self._shapes:
             angles: Floats = getattr(command, name)
             for row in np.flatnonzero(~np.isfinite(angles.reshape(len(angles), -1)).all(axis=1)):
-                self.faults[int(row)] = f"expected finite angles in {name}, found {angles[row]}"
+                self.faults[int(row)] = (
+                    f"expected finite angles in {name}, found {shortened(str(angles[row]))}"
+                )
         for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
             self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"
         contact = self._controller.contact

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 
-from antennate.errors import ConfigError, MissingPackageError
+from antennate.errors import MissingPackageError
 
 try:
     from gymnasium.envs import registration
@@ -39,20 +39,21 @@ _NAMES = {"uturn": "UTurn", "corner": "Corner120", "deadend": "DeadEnd"}
 def ids() -> dict[str, str]:
     """The scene of each environment, by its id.
 
-    Raises:
-        ConfigError: Two scenes have names that make the same id.
+    A scene whose name makes no id, or the same one as another, has none, and a warning says so.
     """
     scenes: dict[str, str] = {}
     for scene in SCENES.names:
         own = "".join(part[:1].upper() + part[1:] for part in scene.replace("_", "-").split("-"))
         full = f"{NAMESPACE}/{_NAMES.get(scene, own)}-v{VERSION}"
-        if (other := scenes.setdefault(full, scene)) != scene:
-            raise ConfigError(f"{full}: expected one scene of that id, found {other} and {scene}")
+        if not registration.ENV_ID_RE.fullmatch(full):
+            _warn(f"{scene}: expected letters, digits, _ or - in a scene's name, so it has no id")
+        elif (other := scenes.setdefault(full, scene)) != scene:
+            _warn(f"{full}: expected one scene of that id, found {other} and {scene}")
     return scenes
 
 
 def register() -> tuple[str, ...]:
-    """Register an environment for every scene that has a name; the ids. Raises what `ids` does.
+    """Register an environment for every scene that has a name; the ids.
 
     Importing this module does so; call it again after a scene was added. Each has a second id
     without the namespace, for `gymnasium.make("antennate:Tunnel-v1")`; if another package has taken
@@ -69,11 +70,12 @@ def register() -> tuple[str, ...]:
                     kwargs={"scene": scene},
                 )
             elif taken.entry_point != _ENTRY_POINT:
-                warnings.warn(
-                    f"{name}: expected a free id, found that of {taken.entry_point}; take {full}",
-                    stacklevel=2,
-                )
+                _warn(f"{name}: expected a free id, found that of {taken.entry_point}; take {full}")
     return tuple(known)
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, stacklevel=3)
 
 
 register()

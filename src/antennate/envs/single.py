@@ -84,7 +84,7 @@ class AntennaEnv(Env[Any, Any]):
         """
         if not self._episodes.running.all():
             raise ResetNeeded("expected a reset before a step")
-        answers = answers_of(self.config, [action], 1)
+        answers = answers_of(self.config, action, None)
         decision = self._episodes.step(answers, ~self._every, again=False)
         truth, ended = decision.truth, bool(decision.ended[0])
         cut = ended and OUTCOMES[truth.outcome[0]] == "timeout"

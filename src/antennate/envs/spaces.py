@@ -30,8 +30,10 @@ def action_space(config: EnvConfig) -> Space[Any]:
     return Box(-1.0, 1.0, (size,), np.float32)
 
 
-def answers_of(config: EnvConfig, given: Any, batch: int) -> Floats:
-    """The answers that actions of a batch stand for, shape (B, k). NaN is HOLD.
+def answers_of(config: EnvConfig, given: Any, batch: int | None) -> Floats:
+    """The answers that actions stand for, shape (B, k): of a batch, or of one robot if it is None.
+
+    NaN is HOLD.
 
     Raises:
         ConfigError: The actions have another shape, or there is no such maneuver.
@@ -40,16 +42,18 @@ def answers_of(config: EnvConfig, given: Any, batch: int) -> Floats:
         given = np.asarray(given)
     except ValueError:  # lists of several lengths
         raise ConfigError(f"action: expected numbers of one shape, found {shown(given)}") from None
+    rows = () if batch is None else (batch,)
     if config.interface.action == "maneuver":
-        if given.shape != (batch,) or given.dtype.kind not in "iu":
-            raise _refused(f"whole numbers of shape ({batch},)", given)
+        if given.shape != rows or given.dtype.kind not in "iu":
+            what = "a whole number" if batch is None else f"whole numbers of shape ({batch},)"
+            raise _refused(what, given)
         if given.min() < 0 or given.max() >= len(CHOICES):
             raise _refused(f"maneuvers of 0 to {len(CHOICES) - 1}", given)
-        return np.eye(len(CHOICES))[given]
-    shape = (batch, len(actions(config.interface, config.robot)))
+        return np.eye(len(CHOICES))[np.atleast_1d(given)]
+    shape = (*rows, len(actions(config.interface, config.robot)))
     if given.shape != shape or given.dtype.kind not in "fiu":
         raise _refused(f"real numbers of shape {shape}", given)
-    return given.astype(float)
+    return np.atleast_2d(given).astype(float)
 
 
 def _refused(expected: str, given: np.ndarray) -> ConfigError:

@@ -22,6 +22,10 @@ from antennate.params.base import LARGEST_SEED, from_values
 from antennate.types import Bools
 
 
+class RenderModeError(ConfigError, TypeError):
+    """There are no pictures. Stable-Baselines3 asks for some, and for none after a TypeError."""
+
+
 def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
     """The configuration of keyword arguments; `action` alone stands for `interface.action`.
 
@@ -50,10 +54,10 @@ def require_no_pictures(render_mode: object) -> None:
     """Refuse a render mode.
 
     Raises:
-        ConfigError: One is given.
+        RenderModeError: One is given.
     """
     if render_mode is not None:
-        raise ConfigError(
+        raise RenderModeError(
             f"render_mode: expected None, as environments draw nothing, found {render_mode!r}; "
             "`antennate tunnel --controllers FILE.onnx --video` makes a film"
         )

@@ -73,7 +73,7 @@ class Processes:
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
     ) -> None:
         """Run the tasks on `count` processes; see `Engine`."""
-        _require_file()
+        _require_children()
         tasks = sendable(work.tasks)
         if isinstance(tasks, NotSent):
             raise WorkerError(tasks.reason)
@@ -233,9 +233,23 @@ class _Worker:
         self.connection.close()
 
 
-def _require_file() -> None:
-    """Check that workers can import the program, as each begins with that."""
-    program = get_preparation_data("").get("init_main_from_path")
+def _require_children() -> None:
+    """Check that this process may begin workers, and that they can import the program.
+
+    Raises:
+        WorkerError: They cannot.
+    """
+    if multiprocessing.current_process().daemon:
+        raise WorkerError(
+            "expected a process that may begin others, found a daemonic one, as of a pool of "
+            "multiprocessing; call it in the main process"
+        )
+    try:
+        program = get_preparation_data("").get("init_main_from_path")
+    except OSError as error:
+        raise WorkerError(
+            f"expected a working directory, found: {error.strerror}; change to one that exists"
+        ) from None
     if program is not None and not Path(program).exists():
         raise WorkerError(
             f"expected a program in a file, which workers import, found {Path(program).name}; save "

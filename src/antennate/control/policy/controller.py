@@ -126,10 +126,11 @@ class Policy:
         outputs = [ACTION, *(s.output for s in self.contract.states)]
         try:
             answer, *after = self._session.run(outputs, {OBSERVATION: observation, **states})
+            answer = np.asarray(answer, float)  # others than tensors come out, too
         except Exception as error:
             raise ControllerError(f"the policy failed: {in_one_line(error)}") from error
         names = [s.input for s in self.contract.states]
-        return np.asarray(answer, float), dict(zip(names, after, strict=True))
+        return answer, dict(zip(names, after, strict=True))
 
 
 class PolicyController:

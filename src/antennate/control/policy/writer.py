@@ -130,7 +130,8 @@ def add_contract(path: Path | str, contract: Contract) -> Path:
     those of the states. Weights that lie in files beside it are joined with it.
 
     Raises:
-        BadInputError: It cannot be read, is no ONNX model, or has other inputs or outputs.
+        BadInputError: It cannot be read, is no ONNX model, has other inputs or outputs, or is too
+            large with its weights.
         MissingPackageError: The package onnx is not installed.
         OutputError: It cannot be written; the file is as it was.
     """
@@ -164,8 +165,11 @@ def _save(model: Any, contract: Contract, path: Path) -> Path:
         raise BadInputError(
             f"{path}: expected a sound ONNX model, found {in_one_line(error)}"
         ) from error
+    data = model.SerializeToString()
+    if len(data) > LARGEST:
+        raise BadInputError(f"{path}: expected at most {LARGEST} bytes in all, found {len(data)}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, model.SerializeToString(), overwrite=True)
+    write_whole(path, data, overwrite=True)
     return path
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING as NO_DEFAULT
+from dataclasses import fields
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,15 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from antennate.control.registry import CONTROLLERS
-from antennate.errors import BadInputError, ConfigError
+from antennate.csv_files import MISSING, csv_rows, wrong_count
+from antennate.errors import ConfigError
 from antennate.experiments.compete.config import LARGEST_TABLE, require_free
 from antennate.experiments.compete.episodes import Episode, restricted
-from antennate.files import decoded, read_limited
+from antennate.files import read_limited
 from antennate.jackknife import ENOUGH
 from antennate.messages import nearest
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
-from antennate.studies.formats import from_csv
 from antennate.studies.statistics import sign_flips
 
 CLOSE = 5e-7
@@ -29,7 +30,8 @@ BIAS, ERRORS, CHANCE = 0.01, 3.0, 0.01
 """What another processor may change: mean times by a share of the limit (0.94 of 100 s in 200
 draws, docs/performance.md) and so many standard errors, and successes by as much as has this p."""
 _ROW = TypeAdapter(Episode)
-_TEXTS = [field.name for field in fields(Episode) if field.type == "str"]
+_WORDS = ("given", "reason")
+"""Columns that are mostly empty, for which some programs write NA."""
 
 
 def read_rows(path: Path) -> list[Episode]:
@@ -43,16 +45,14 @@ def read_rows(path: Path) -> list[Episode]:
             f"{path}: expected a table of trials, found a folder; name its trials.csv"
         )
     data = read_limited(path, LARGEST_TABLE, ConfigError)
-    try:
-        lines = from_csv(decoded(path, data, ConfigError))
-    except ConfigError:
-        raise
-    except (ValueError, BadInputError) as error:
-        raise ConfigError(f"{path}: expected a table of trials, found {error}") from None
-    _require_columns(path, list(lines[0]))
-    rows, places = [], dict[tuple[str, str, int, int], int]()
-    for number, line in enumerate(lines, start=2):
-        row = _row(path, number, line)
+    lines = csv_rows(path, data, ["controller"], ConfigError)
+    _, names = next(lines)
+    _require_columns(path, names)
+    rows, places = list[Episode](), dict[tuple[str, str, int, int], int]()
+    for number, cells in lines:
+        if why := wrong_count(names, cells, ""):
+            raise ConfigError(f"{path}: line {number}: {why}")
+        row = _row(path, number, dict(zip(names, cells, strict=True)))
         key = (row.controller, row.scene, row.seed, row.trial)
         if (first := places.setdefault(key, number)) != number:
             raise ConfigError(
@@ -60,6 +60,8 @@ def read_rows(path: Path) -> list[Episode]:
                 f"{first} again"
             )
         rows.append(row)
+    if not rows:
+        raise ConfigError(f"{path}: expected a table of trials, found no row")
     return rows
 
 
@@ -70,7 +72,10 @@ def _require_columns(path: Path, names: Sequence[str]) -> None:
         ConfigError: A column is missing, or is none of `antennate compete`.
     """
     known = [field.name for field in fields(Episode)]
-    needed = [field.name for field in fields(Episode) if field.default is MISSING]
+    needed = [field.name for field in fields(Episode) if field.default is NO_DEFAULT]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise ConfigError(f"{path}: expected each column once, found {name!r} twice")
     for name in needed:
         if name not in names:
             raise ConfigError(
@@ -84,13 +89,12 @@ def _require_columns(path: Path, names: Sequence[str]) -> None:
             )
 
 
-def _row(path: Path, number: int, line: Mapping[str, Any]) -> Episode:
-    texts = {name: "" if line.get(name) is None else str(line[name]) for name in _TEXTS}
-    values = {**line, **texts}
-    if lacking := [name for name in ("controller", "scene", "outcome") if not values[name]]:
+def _row(path: Path, number: int, line: dict[str, str]) -> Episode:
+    if lacking := [name for name in ("controller", "scene", "outcome") if not line[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
+    none = {name: "" for name in _WORDS if line.get(name, "").lower() in MISSING}
     try:
-        row = _ROW.validate_python(values)
+        row = _ROW.validate_python(line | none)
         require_free(row.seed)
         _require_sound(row)
     except ValidationError as error:

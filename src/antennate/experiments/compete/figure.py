@@ -38,7 +38,7 @@ def drawn(result: Mapping[str, Any], rows: Rows) -> dict[str, Figure]:
 def ranks(result: Mapping[str, Any]) -> Figure:
     """Rank and success of each controller with their intervals, a line each."""
     names = ordered(result)
-    colours, short = style.controller_colours(names), short_names(names)
+    colours, short = style.controller_colours(names), style.plain(short_names(names))
     figure = style.canvas(style.WIDTH, 2 * (0.9 + 0.27 * len(names)))
     rank, success = figure.subplots(2, 1)
     for i, name in enumerate(names):
@@ -71,7 +71,7 @@ def _interval(panel: Axes, at: int, value: float, ends: Any, colour: str) -> Non
 def scenes(result: Mapping[str, Any]) -> Figure:
     """Share of successes, a line a scene and a column a controller."""
     names, places = ordered(result), list(result["scenes"])
-    short = short_names(names)
+    short = style.plain(short_names(names))
     shares = np.array(
         [
             [np.nan if (s := result["scenes"][p][n]["success_share"]) is None else s for n in names]
@@ -101,7 +101,8 @@ def profile(rows: Rows, names: Sequence[str]) -> Figure:
     """Share of the draws crossed within a factor of the fastest, a line for each of these names."""
     factors, by_name = profiles(rows)
     shares = {name: by_name[name] for name in names}
-    colours, short = style.controller_colours(list(shares)), short_names(shares)
+    colours = style.controller_colours(list(shares))
+    short = style.plain(short_names(shares))
     figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()
     for name, share in shares.items():

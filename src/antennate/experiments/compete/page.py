@@ -235,8 +235,8 @@ def readme(result: Result, rows: Sequence[Episode]) -> str:
         f"antennate {', '.join(sorted({row.version for row in rows}))}, MuJoCo "
         f"{', '.join(kinds['engine'])}, {', '.join(kinds['processor'])}. "
         f"A decision may take {1e3 * result['decision_limit_s']:g} ms of processor time.",
-        "Every row is in `trials.csv`; `antennate compete --check` with that file runs them again, in "
-        "the folder from which this was run where a controller is a file.",
+        "Every row is in `trials.csv`; `antennate compete --check` with that file runs them again, "
+        "in the folder from which this was run where a controller is a file.",
     ]
     if result["check"] is not None and (differ := result["check"]["differ"]):
         parts += ["Rows that differ, as the table says and as they ended here:", _differing(differ)]

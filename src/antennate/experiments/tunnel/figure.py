@@ -82,7 +82,7 @@ def trajectories(
     step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, most.max()))[0])
     figure, panels = _panels(len(controllers), sides, step, _handles(list(paths.values())))
     beside = _in_a_line(len(controllers), len(trials))
-    for i, (controller, label) in enumerate(short_names(controllers).items()):
+    for i, (controller, label) in enumerate(style.plain(short_names(controllers)).items()):
         for j, trial in enumerate(trials):
             panel, place, box = panels[j, i], (controller, trial), boxes[trial]
             if box is not None:
@@ -240,7 +240,8 @@ def summary(
     figure = style.canvas(style.WIDTH, 2.6 + 2 * (1.0 + 0.4 * len(controllers)))
     heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
     rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
-    colours, short = style.controller_colours(list(controllers)), short_names(controllers)
+    colours = style.controller_colours(list(controllers))
+    short = style.plain(short_names(controllers))
     for i, (name, row) in enumerate(controllers.items()):
         valid, colour = row["trials"] - row["invalid"], colours[name]
         if not valid:
