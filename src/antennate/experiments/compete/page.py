@@ -195,7 +195,7 @@ def _before(result: Result, p: str, ahead: Callable[[Mapping[str, Any]], float])
 def markdown(result: Result) -> str:
     """The standing and the scenes as tables in Markdown."""
     names = ordered(result)
-    short = short_names(names)
+    short = {key: name.replace("|", r"\|") for key, name in short_names(names).items()}
     lines = [
         "| controller | rank (95 %) | successes | Wilson 95 % by draws [%] | restricted mean time "
         "[% of limit] (95 %) | speed over successes [m/s] | fell | on its back | INVALID |",
