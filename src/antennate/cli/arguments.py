@@ -262,7 +262,7 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
                 values[free[0].path] = (*values.get(free[0].path, ()), value)
             else:
                 values[free.pop(0).path] = value
-    if twice := [option for option in options if option.path in named & placed]:
+    if twice := [o for o in options if o.path in named & placed and not o.many]:
         raise ConfigError(f"{twice[0].flag}: expected it once, found also {twice[0].free} without")
     return values
 
