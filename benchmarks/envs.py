@@ -3,8 +3,6 @@
     uv run python benchmarks/envs.py                  # control ticks per processor second, 2 min
     uv run python benchmarks/envs.py --resets 4096    # first observations, bit for bit, 4 min
 
-With `--write` docs/envs.json takes what is found, and `python docs/envs.py` its page.
-
 Ticks: B rows of the vector environment that walk FORWARD, over B trials of `tunnel` in lockstep
 under `open` and under `closed`, from the same starts, taken in turn in this process. Drawing and
 compiling a tunnel is in neither. Every row must end where the trial under `open` ends, bit for bit.
@@ -19,7 +17,6 @@ import argparse
 import json
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -33,7 +30,6 @@ from antennate.envs import episodes
 from antennate.experiments.tunnel import batch as experiment
 from antennate.experiments.tunnel.physics import TunnelConfig
 
-RESULT = Path(__file__).parents[1] / "docs/envs.json"
 SECONDS = 4.0
 """Time that each trial walks [s]; within it none gets out."""
 BATCHES = (8, 24)
@@ -125,21 +121,16 @@ def main() -> None:
     parser.add_argument("--resets", type=int, help="how many resets to compare")
     parser.add_argument("--scene", default="Tunnel", help="name of the scene in an id")
     parser.add_argument("--repetitions", type=int, default=5)
-    parser.add_argument("--write", action="store_true", help="into docs/envs.json")
     parser.add_argument("--part", type=json.loads, help=argparse.SUPPRESS)
     options = parser.parse_args()
     antennate.envs.register()
     if options.part is not None:
         print(json.dumps(first_observations(options.scene, options.part)))
-        return
-    if options.resets:
-        found = {"resets": resets(options.scene, options.resets)}
+    elif options.resets:
+        print(json.dumps(resets(options.scene, options.resets), indent=2))
     else:
-        found = {f"ticks_{batch}": ticks(batch, options.repetitions) for batch in BATCHES}
-    print(json.dumps(found, indent=2))
-    if options.write:
-        known = json.loads(RESULT.read_text("utf-8")) if RESULT.exists() else {}
-        RESULT.write_text(json.dumps(known | found, indent=2) + "\n", "utf-8")
+        for batch in BATCHES:
+            print(json.dumps(ticks(batch, options.repetitions), indent=2))
 
 
 if __name__ == "__main__":
