@@ -77,9 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from antennate.sim.engine_setup import describe_only, dropped, keep_wish
 
     keep_wish()
-    if (
-        argv is None
-    ):  # a program of its own, which draws into files: a notebook's backend is not here
+    if argv is None:  # a program of its own draws into files; a notebook's backend is elsewhere
         os.environ["MPLBACKEND"] = "agg"
     words = list(sys.argv[1:] if argv is None else argv)
     describe_only(not _HELP.isdisjoint(words))
