@@ -356,7 +356,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert err.endswith("written to deep/run\n")
     assert "1 trial a controller, seed 5" in out
     assert "A failure counts as the time limit, 1 s" in out
-    *shown, _ = out.splitlines()  # the sentence wraps as the terminal does
+    _, *shown = out.splitlines()  # the sentence wraps as the terminal does
     assert max(map(len, shown)) <= 100
     run = tmp_path / "deep" / "run"
     assert sorted(str(p.relative_to(run)) for p in run.rglob("*.*")) == [
@@ -490,8 +490,8 @@ def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch)
 
     monkeypatch.setattr(World, "advance", blow_up)
     assert main([*QUICK, "--trials", "2", "--out", "run"]) == 2
-    last = capsys.readouterr().out.strip().splitlines()[-1]
-    assert last.startswith("No trial of open is valid: simulation invalid at physics step")
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("No trial of open is valid: simulation invalid at physics step")
     open_ = json.loads((tmp_path / "run" / "result.json").read_text())["controllers"]["open"]
     assert (open_["trials"], open_["invalid"], open_["successes"]) == (2, 2, 0)
     assert open_["restricted_mean_time_s"] is None

@@ -229,15 +229,34 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     figure = trajectories()
     titles = [panel.get_title(loc="left") for panel in figure.axes]
     assert len(titles) == len(USUAL) * 4
-    assert titles[:: len(USUAL)] == [
-        "trial 0: out after 10.0 s",
-        "trial 1: out after 20.0 s",
-        "trial 2: out of time, 50 s",
-        "trial 3: left the scene",
-    ]
+    assert titles[:: len(USUAL)] == ["out, 10.0 s", "out, 20.0 s", "out of time", "left the scene"]
     assert len(figure.legends) == 1
-    named = [text.get_text() for panel in figure.axes for text in panel.texts]
-    assert named == [*USUAL] * 4  # in lines of two, above each panel
+    places = np.array([panel.get_position().bounds for panel in figure.axes]).reshape(4, -1, 4)
+    assert (np.ptp(places[..., 0], axis=0) < 1e-9).all()  # a column of panels for each controller
+    assert (np.ptp(places[..., 1], axis=1) < 1e-9).all()  # a row for each trial
+    assert (np.diff(places[0, :, 0]) > 0).all()
+    assert (np.diff(places[:, 0, 1]) < 0).all()
+    named = [[text.get_text() for text in panel.texts] for panel in figure.axes]
+    assert named == [[name] for name in USUAL] + [[]] * (3 * len(USUAL))
+    rows = [panel.get_ylabel() for panel in figure.axes[:: len(USUAL)]]
+    assert rows == [f"trial {k}, y [m]" for k in range(4)]
+
+
+def test_trajectories_of_three_trials_fit_on_a_slide():
+    """Ours are 2 m by 1.2 m; a tunnel with its turn is as high as wide."""
+    figure = trajectories(trials=range(3))
+    assert figure.get_figheight() <= figure.get_figwidth()
+    upright = {(name, t): upright_path() for name in USUAL for t in range(3)}
+    figure = tunnel.trajectories(upright, USUAL, rows(), range(3))
+    assert figure.get_figheight() <= 1.25 * figure.get_figwidth()
+
+
+def upright_path() -> Course:
+    """A course whose scene is as high as wide."""
+    course = path(1.4)
+    course.fixed = [np.array([[0.0, -0.3], [1.4, -0.3], [1.4, 1.0]])]
+    course.exit = np.array([[1.0, 1.0], [1.4, 1.0]])
+    return course
 
 
 @pytest.mark.parametrize(
@@ -313,10 +332,7 @@ def test_trials_without_a_course_leave_an_empty_panel():
         {("open", 0): nothing}, ("open",), [Row("open", 0, "invalid", LIMIT)], range(2)
     )
     style.render(figure)
-    assert [p.get_title(loc="left") for p in figure.axes] == [
-        "trial 0: invalid",
-        "trial 1: not run",
-    ]
+    assert [p.get_title(loc="left") for p in figure.axes] == ["invalid", "not run"]
 
 
 def test_curve_drops_at_exits_and_failures_stay():

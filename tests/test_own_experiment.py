@@ -41,8 +41,8 @@ def test_it_runs_and_leaves_a_directory_like_ours(
     assert sum(bool(line.strip()) for line in DICE.splitlines()) <= 40
     assert main(["dice", "--trials", "3", "--seed", "7", "--out", "run"]) == 0
     out, err = capsys.readouterr()
+    assert out.startswith("Dice show ")  # the sentence first, then the table
     assert "eyes, mean" in out
-    assert out.splitlines()[-1].startswith("Dice show ")
     assert err.endswith("written to run\n")
     run = RunDirectory.open(dice / "run")
     assert [(row["seed"], row["trial"]) for row in run.rows()] == [(7, 0), (7, 1), (7, 2)]

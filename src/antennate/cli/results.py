@@ -124,18 +124,20 @@ def show_result(
     sentence: str,
     explained: str = "",
 ) -> None:
-    """Print the result: as JSON, or as tables, where they are explained, and a closing sentence."""
+    """Print the result: as JSON, or a sentence, then its tables and where they are explained."""
     if options.json:
         write_result(to_json(result))
         return
-    for table in tables:
-        print_table(table)
     from rich.text import Text  # slow to import
 
     output = console()
+    output.print(Text(sentence), soft_wrap=not output.is_terminal)
+    for i, table in enumerate(tables):
+        if i == 0:
+            output.print()
+        print_table(table)
     if explained:
         output.print(Text(f"What the rows mean: {explained}"), soft_wrap=True)
-    output.print(Text(sentence), soft_wrap=not output.is_terminal)
 
 
 def drawn_table(table: Table) -> Any:

@@ -260,14 +260,26 @@ def progress(
 
     Args:
         what: What is counted.
-        table: What a terminal shows below the bar, renewed every second; None for nothing.
+        table: How the run stands, None for nothing: below the bar, and after each quarter of a
+            long run in lines that stay.
     """
-    pace = _Pace()
+    from rich.console import Console, Group  # slow to import
+
+    pace, console = _Pace(), Console(file=sys.stderr)
+
+    def stay(done: int, total: int) -> None:
+        if pace.quarter(done, total) and (stand := table()) is not None:
+            console.print(stand)
+
     if not is_drawable(sys.stderr):
-        yield lambda done, total: pace.report(what, done, total)
+
+        def line(done: int, total: int) -> None:
+            pace.report(what, done, total)
+            stay(done, total)
+
+        yield line
         return
-    from rich import progress as bars  # slow to import
-    from rich.console import Console, Group
+    from rich import progress as bars
     from rich.live import Live
 
     columns = (bars.TextColumn(what), bars.BarColumn(), bars.MofNCompleteColumn())
@@ -281,8 +293,8 @@ def progress(
 
     def step(done: int, total: int) -> None:
         bar.update(task, completed=done, total=total, rate=pace.rate(done))
+        stay(done, total)
 
-    console = Console(file=sys.stderr)
     with Live(console=console, transient=True, get_renderable=drawn, refresh_per_second=2):
         yield step
 
@@ -292,9 +304,16 @@ class _Pace:
 
     _LINES = 10
     """Plain lines over a whole run."""
+    _LONG = 20
+    """Steps from which a run has quarters."""
 
     def __init__(self) -> None:
-        self._start, self._first, self._line = time.monotonic(), -1, 0
+        self._start, self._first, self._line, self._quarter = time.monotonic(), -1, 0, 0
+
+    def quarter(self, done: int, total: int) -> bool:
+        """Whether another quarter of a long run has ended, but for the last."""
+        before, self._quarter = self._quarter, 4 * done // total
+        return total >= self._LONG and before < self._quarter < 4
 
     def rate(self, done: int) -> str:
         """Steps a second or a minute, in words; empty before there is one."""

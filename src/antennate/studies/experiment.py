@@ -157,6 +157,7 @@ class Trials(Generic[Config]):
                     together=True,
                     batched=self._batched if self.batch else None,
                     lost=lost,
+                    group=lambda config, condition, *rest: condition,
                 )
             else:
                 for done, trial in enumerate(trials, start=1):

@@ -178,12 +178,14 @@ class Interim:
 
     def table(self) -> Table | None:
         """A line for each condition; None without any."""
-        outcomes = sorted({outcome for counts in self._counts.values() for outcome in counts})
+        found = {outcome for counts in self._counts.values() for outcome in counts}
+        outcomes = sorted(found, key=lambda outcome: (outcome != "success", outcome))
         rows = [
             (name, [str(counts[outcome]) for outcome in outcomes])
             for name, counts in sorted(self._counts.items())
         ]
-        return Table("So far", outcomes, rows) if rows else None
+        ended = sum(counts.total() for counts in self._counts.values())
+        return Table(f"So far, {ended} trials", outcomes, rows) if rows else None
 
 
 _CONDITIONS = ("controller", "profile")

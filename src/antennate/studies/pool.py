@@ -206,6 +206,7 @@ def gather(
         again: Whether what fails is run again in another process; see `Work`.
         fresh: Whether each chunk has a process of its own; see `Work`.
         group: group(*task) -> what neighbouring tasks have in common if one chunk may hold them.
+            Groups take turns, so that each is known in part before the first is known in full.
 
     Raises:
         WorkerError: A task failed, or its workers died.
@@ -224,7 +225,8 @@ def gather(
             f"expected {len(tasks)} finished trials, found {len(call.results)}: a shard is missing"
         )
     groups = itertools.groupby(todo, lambda i: group(*tasks[i]) if group else None)
-    parts = [part for _, some in groups for part in _divided([*some], chunk)]
+    divided = [_divided([*some], chunk) for _, some in groups]
+    parts = [part for turn in itertools.zip_longest(*divided) for part in turn if part]
     if parts:
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout

@@ -27,17 +27,19 @@ MARGIN = 0.3
 FARTHEST = 1.0
 """Robots farther out than this are cut off [m]; a trial ends before, unless the physics failed."""
 
-_LEFT, _RIGHT, _BETWEEN, _NARROWEST = 0.55, 0.05, 0.36, 1.35
-"""Beside the panels, between two of them, and the least width of one [inches]."""
-_HEAD, _TITLE, _TICKS, _AXIS, _LEGEND_LINE = 0.52, 0.28, 0.24, 0.46, 0.195
-"""Heights [inches]: name and title, title alone, ticks, ticks and label, a line of the legend."""
+_WIDTH = 5.6
+"""Of the figure where its panels fill it: with letters of 8 points a phone shows them [inches]."""
+_LEFT, _RIGHT, _BETWEEN, _NARROWEST, _WIDEST = 0.68, 0.05, 0.12, 1.1, 2.4
+"""Beside the panels, between two of them, and the width of one [inches]."""
+_HEAD, _TITLE, _AXIS, _LEGEND_LINE = 0.5, 0.28, 0.46, 0.175
+"""Heights [inches]: name and title, title alone, ticks and label, a line of the legend."""
 
 _OUTLINE = 0.7
 """Width of lines around the robot [points]: its antennae are thinner than that."""
 
 _OUTCOMES = {
-    "success": "out after {:.1f} s",
-    "timeout": "out of time, {:.0f} s",
+    "success": "out, {:.1f} s",
+    "timeout": "out of time",
     "left": "left the scene",
     "overturned": "overturned",
     "fell": "fell",
@@ -63,10 +65,7 @@ def trajectories(
     rows: Sequence[TrialResult],
     trials: Sequence[int],
 ) -> Figure:
-    """Trials from above: a group of panels for each trial, a panel for each controller.
-
-    Of a single trial the panels are larger and stand below one another. More than three
-    controllers stand in lines of two, or nobody could read their letters on a phone.
+    """Trials from above: a row of panels for each trial, a column for each controller.
 
     Args:
         paths: Courses by controller and trial; a missing one leaves its panel empty.
@@ -79,34 +78,24 @@ def trajectories(
     known = [high - low for low, high in filter(None, boxes.values())] or [np.ones(2)]
     most = np.max(known, axis=0)
     sides = [most if box is None else box[1] - box[0] for box in boxes.values()]
-    step = float(np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0, most.max()))[0])
+    step = float(np.diff(MaxNLocator(3, steps=[1, 2, 5, 10]).tick_values(0, most.max()))[0])
     figure, panels = _panels(len(controllers), sides, step, _handles(list(paths.values())))
-    beside = _in_a_line(len(controllers), len(trials))
     for i, (controller, label) in enumerate(style.plain(short_names(controllers)).items()):
-        for j, trial in enumerate(trials):
-            panel, place, box = panels[j, i], (controller, trial), boxes[trial]
+        for panel, trial in zip(panels[:, i], trials, strict=True):
+            place, box = (controller, trial), boxes[trial]
             if box is not None:
                 panel.set(xlim=(box[0][0], box[1][0]), ylim=(box[0][1], box[1][1]))
             said = "not run"
             if place in paths:
                 _draw_trial(panel, paths[place])
                 said = _OUTCOMES[table[place].outcome].format(table[place].time_s)
-            panel.set_title(f"trial {trial}: {said}", fontsize=8)
-        for panel in panels[:, i] if 1 < beside < len(controllers) else panels[:1, i]:
-            _name_column(panel, label)
-    lowest = -1 if beside == 1 else (len(controllers) - 1) // beside * beside
-    for panel in panels[-1] if len(trials) == 1 else panels[-1, lowest:]:
-        panel.set_xlabel("x [m]")
-    for panel in panels[:, ::beside].flat:
-        panel.set_ylabel("y [m]")
+            panel.set_title(said, fontsize=8)
+        _name_column(panels[0, i], label)
+    for panel, trial in zip(panels[:, 0], trials, strict=True):
+        panel.set_ylabel(f"trial {trial}, y [m]", fontsize=8)
+    for panel in panels[-1]:
+        panel.set_xlabel("x [m]", fontsize=8)
     return figure
-
-
-def _in_a_line(columns: int, trials: int) -> int:
-    """How many panels of one trial stand beside one another."""
-    if trials == 1:
-        return 1
-    return columns if columns <= 3 else 2
 
 
 def _panels(
@@ -117,30 +106,26 @@ def _panels(
     Every place is known, so nothing is left to a layout engine: with panels of a fixed aspect it
     puts titles on the letters above them.
     """
-    beside = _in_a_line(columns, len(sides))
-    lines = math.ceil(columns / beside)
-    room = style.WIDTH - _LEFT - _RIGHT - (beside - 1) * _BETWEEN
-    width = max(_NARROWEST, room / beside)
+    room = _WIDTH - _LEFT - _RIGHT - (columns - 1) * _BETWEEN
+    width = min(max(_NARROWEST, room / columns), _WIDEST)
     sizes = [side * width / max(side[0] for side in sides) for side in sides]
-    across = style.WIDTH - room + beside * width
-    in_line = max(1, int(across // 2))
+    across = _LEFT + _RIGHT + (columns - 1) * _BETWEEN + columns * width
+    in_line = max(1, int(across // 1.8))
     top = _HEAD + _LEGEND_LINE * (1 + math.ceil(len(handles) / in_line))
-    down = [size[1] for size in sizes for _ in range(lines)]
-    gap = _AXIS + _HEAD if len(sides) == 1 else _TICKS + (_HEAD if lines > 1 else _TITLE)
-    high = top + sum(down) + (len(down) - 1) * gap + _AXIS
+    high = top + sum(size[1] for size in sizes) + (len(sizes) - 1) * _TITLE + _AXIS
     figure = Figure(figsize=(across, high))
     panels = np.empty((len(sides), columns), object)
     for j, i in np.ndindex(panels.shape):
-        line = j * lines + i // beside
-        left = _LEFT + i % beside * (width + _BETWEEN)
-        base = high - top - sum(down[: line + 1]) - line * gap
+        left = _LEFT + i * (width + _BETWEEN)
+        base = high - top - sum(size[1] for size in sizes[: j + 1]) - j * _TITLE
         shape = left / across, base / high, sizes[j][0] / across, sizes[j][1] / high
         panels[j, i] = panel = figure.add_axes(shape)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(visible=False)
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MultipleLocator(step))
-    figure.legend(handles=handles, loc="upper center", ncols=in_line)
+        panel.tick_params(labelleft=i == 0, labelbottom=j == len(sides) - 1)
+    figure.legend(handles=handles, loc="upper center", ncols=in_line, fontsize=8)
     return figure, panels
 
 

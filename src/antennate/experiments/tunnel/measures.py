@@ -29,6 +29,9 @@ from antennate.studies.measures import (
     total,
 )
 
+_APART, _MANY = 6, 30
+"""Trials that one alone must succeed in, for McNemar's exact p, 2 / 2**6, to fall below 0.05; and
+trials from which on nobody needs to be told."""
 SHARES = {
     "forward": "forward [% of time]",
     "turn_l": "turn left",
@@ -284,7 +287,7 @@ def sentence(result: Mapping[str, Any]) -> str:
     if known := result.get("knows"):  # results of older versions have none
         what += f", knowing {' and '.join(known)}"
     text = f"{what} (95 % interval): {passed}{test}." if passed else ""
-    text += f" {so_few}" if passed and so_few else ""
+    text += f" {so_few or _undecided(result)}".rstrip() if passed else ""
     for name, reason in without.items():
         text += f" No trial of {name} is valid: {reason}."
     return f"{text}{why}".strip()
@@ -313,6 +316,17 @@ def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:
             f"{pair['mcnemar_p']:.2g}"
         )
     return ""
+
+
+def _undecided(result: Mapping[str, Any]) -> str:
+    """What trials enough for an interval, but not for a decision, can tell; empty of many."""
+    least = min(filter(None, _valid(result)))
+    if least >= _MANY or len(result["controllers"]) < 2:
+        return ""
+    return (
+        f"{least} trials decide little: with 95 % confidence two controllers differ in how many "
+        f"they cross only where one alone crosses at least {_APART}."
+    )
 
 
 def _span(ends: Sequence[float], unit: str) -> str:

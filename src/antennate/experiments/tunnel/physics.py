@@ -52,9 +52,7 @@ class TunnelConfig(TrialConfig):
     unread: ClassVar[tuple[str, ...]] = tuple(
         path for path in HARDWARE_ALONE if path not in KEPT_BY_CLIMBERS
     )
-    trials: int = number(
-        30, "1", "assumed: the paper's ten leave an interval of half the range", ge=1, le=100000
-    )
+    trials: int = number(10, "1", "paper: 10 trials with feedback, 10 without", ge=1, le=100000)
     """Trials of every controller."""
     controllers: tuple[str, ...] = number(
         USUAL,

@@ -1,0 +1,70 @@
+"""How soon a run answers: controllers take turns, each quarter says how it stands, and the result
+begins with its sentence, which says how little a few trials decide."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from scipy.stats import binomtest
+
+from antennate.cli import main
+from antennate.cli.results import drawn_table
+from antennate.cli.terminal import progress
+from antennate.experiments.tunnel.experiment import TunnelOutcome, run
+from antennate.experiments.tunnel.measures import sentence
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.studies.measures import Interim
+from antennate.studies.pool import Workers
+from antennate.studies.work import Here
+
+
+@pytest.mark.parametrize(
+    ("parts", "tables"), [(40, ["10 trials", "20 trials", "30 trials"]), (12, [])]
+)
+def test_a_long_run_says_after_each_quarter_how_it_stands(
+    parts: int, tables: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    interim = Interim()
+    with progress("trials", lambda: drawn_table(interim.table())) as step:
+        for done in range(1, parts + 1):
+            outcome = "success" if done % 2 else "left"
+            interim.add({"controller": "open" if done <= 4 else "timed", "outcome": outcome})
+            step(done, parts)
+    said = capsys.readouterr().err
+    assert re.findall(r"So far, (\d+ trials)", said) == tables
+    if tables:
+        assert re.findall(r"^ *(open|timed) +(\d+) +(\d+) *$", said, re.M) == [
+            *(("open", "2", "2"), ("timed", "3", "3")),
+            *(("open", "2", "2"), ("timed", "8", "8")),
+            *(("open", "2", "2"), ("timed", "13", "13")),
+        ]
+
+
+def test_controllers_take_turns_so_that_half_of_a_run_tells_of_each() -> None:
+    config = TunnelConfig(trials=6, time_limit=0.05)
+    order: list[str] = []
+    run(config, Workers(2, Here()), on_row=lambda row: order.append(row.controller))
+    assert sorted(order[: len(order) // 2]) == sorted([*config.controllers] * 3)
+
+
+@pytest.mark.parametrize(("trials", "says"), [(5, True), (29, True), (30, False)])
+def test_few_trials_say_how_little_they_decide(trials: int, says: bool) -> None:
+    """Of discordant trials all of one side, 6 are the fewest with a two-sided p below 0.05."""
+    assert binomtest(5, 5).pvalue > 0.05 > binomtest(6, 6).pvalue
+    names = TunnelConfig().controllers
+    rows = [
+        TrialResult(0, k, name, "success", 10.0 + k, limit_s=100.0)
+        for name in names
+        for k in range(trials)
+    ]
+    config = TunnelConfig(trials=trials)
+    said = sentence(TunnelOutcome(config, rows, {}, False).result())
+    assert said.endswith("one alone crosses at least 6.") is says
+
+
+def test_the_sentence_comes_before_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tunnel", "--trials", "1", "--time-limit", "0.05", "--no-figures"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("Tunnels crossed")
+    assert out.index("Tunnels crossed") < out.index("Controllers") < out.index("Pairs")
