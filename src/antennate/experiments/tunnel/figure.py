@@ -31,8 +31,8 @@ _WIDTH = 5.6
 """Of the figure where its panels fill it: with letters of 8 points a phone shows them [inches]."""
 _LEFT, _RIGHT, _BETWEEN, _NARROWEST, _WIDEST = 0.68, 0.05, 0.12, 1.1, 2.4
 """Beside the panels, between two of them, and the width of one [inches]."""
-_HEAD, _TITLE, _AXIS, _LEGEND_LINE = 0.5, 0.28, 0.46, 0.175
-"""Heights [inches]: name and title, title alone, ticks and label, a line of the legend."""
+_HEAD, _TITLE, _AXIS, _LEGEND_LINE = 0.5, 0.42, 0.46, 0.175
+"""Heights [inches]: name and title, ticks and title, ticks and label, a line of the legend."""
 
 _OUTLINE = 0.7
 """Width of lines around the robot [points]: its antennae are thinner than that."""
@@ -124,7 +124,7 @@ def _panels(
         panel.grid(visible=False)
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MultipleLocator(step))
-        panel.tick_params(labelleft=i == 0, labelbottom=j == len(sides) - 1)
+        panel.tick_params(labelleft=i == 0)
     figure.legend(handles=handles, loc="upper center", ncols=in_line, fontsize=8)
     return figure, panels
 
