@@ -32,7 +32,7 @@ uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.on
 The third line takes some 35 minutes on one core. The search of `geometric` tells a network with a
 memory what to do, in the scenes `uturn` and `room`; `--scene` names others, `--decisions 30000`
 halves that, and `--readings none` the same network without touch, which is what it has to
-beat. The fourth line compares the policy with two of our controllers in thirty U-turns that it has
+beat. The fourth line compares the policy with two of our controllers in ten U-turns that it has
 not seen. Such a policy is in a clone:
 
 ```bash

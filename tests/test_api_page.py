@@ -1,4 +1,4 @@
-"""docs/api.md: its snippets run as they stand, one after the other."""
+"""Python of docs/api.md and README: its snippets run as they stand, one after the other."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -14,9 +16,13 @@ def snippets(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
 
 
-def test_the_snippets_run(tmp_path: Path) -> None:
-    found = snippets(ROOT / "docs" / "api.md")
-    assert len(found) >= 5
+@pytest.mark.parametrize(
+    ("page", "count"),
+    [("docs/api.md", 5), pytest.param("README.md", 1, marks=pytest.mark.slow)],
+)
+def test_the_snippets_run(page: str, count: int, tmp_path: Path) -> None:
+    found = snippets(ROOT / page)
+    assert len(found) >= count
     script = tmp_path / "page.py"
     script.write_text("\n".join(found))
     run = subprocess.run(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from scipy.stats import binomtest
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -32,3 +35,32 @@ def test_each_row_stands_on_the_page(script: str, page: str, count: int) -> None
     assert len(rows) == count
     for row in rows:
         assert row in there or row[2:] in there, row
+
+
+def test_the_clock_and_closed_on_three_sets_of_draws() -> None:
+    """Pooled by hand: pairs of rows of two files, and the counts that the third set left."""
+    hard = json.loads((DOCS / "science/hard.json").read_text())
+    files = ("leaderboard.csv", "science/learned_elsewhere.csv")
+    rows = [row for name in files for row in csv.DictReader((DOCS / name).read_text().splitlines())]
+    page = (DOCS / "science/corridors.md").read_text(encoding="utf-8")
+    for scene in ("corner", "deadend"):
+        won: dict[str, dict[tuple[str, str], bool]] = {"timed": {}, "closed": {}}
+        for row in rows:
+            if row["scene"] == scene and row["controller"] in won:
+                draw = row["seed"], row["trial"]
+                won[row["controller"]][draw] = row["outcome"] == "success"
+        pairs = [(won["timed"][draw], won["closed"][draw]) for draw in won["closed"]]
+        assert len(pairs) == 200
+        cell = hard[scene]
+        assert cell["best"] == "timed 5 s"
+        timed, closed = cell["controllers"]["timed 5 s"], cell["controllers"]["closed"]
+        alone = pairs.count((True, False)) + cell["pair"]["only_rival"]
+        ours = pairs.count((False, True)) + cell["pair"]["only_ours"]
+        cells = [scene]
+        for at, count in enumerate((timed["successes"], closed["successes"])):
+            both = count + sum(pair[at] for pair in pairs)
+            low, high = binomtest(both, 300).proportion_ci(method="wilson")
+            cells.append(f"{both} of 300 ({low:.2f}–{high:.2f})")
+        p = binomtest(ours, ours + alone).pvalue
+        row = " | ".join([f"| `{cells[0]}`", *cells[1:], str(alone), str(ours)])
+        assert f"{row} | {float(f'{p:.2g}'):.1e}".replace("e-0", "e-") in page
