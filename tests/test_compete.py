@@ -236,7 +236,7 @@ def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     readme = (tmp_path / "run" / "README.md").read_text()
     assert "| `map` | not ranked |" in readme
     assert "expected finite angles in yaw" in readme
-    told = capsys.readouterr().out.splitlines()[-1]
+    told = capsys.readouterr().out.splitlines()[0]
     assert told.startswith("Ranks in 1 scene")
     assert " No episode of NotFinite is valid: " in told
     assert "expected finite angles in yaw" in told

@@ -39,13 +39,20 @@ def result(**times: list[float | None]) -> dict[str, Any]:
     return TunnelOutcome(config, rows, {}, interrupted=False).result()
 
 
+def headline(found: dict[str, Any]) -> str:
+    """The sentence of five trials, without its last: how little they decide."""
+    told, mark, _ = TUNNEL.sentence(found).partition(" 5 trials decide little")
+    assert mark
+    return told
+
+
 def test_the_headline_compares_with_the_rival_alone() -> None:
     """Five pairs that differ by 30, 40, 50, 60, 70 s: 50 s, and the interval of their mean."""
     found = result(
         open=[40.0, 50.0, 60.0, 70.0, 80.0], paper=[30.0] * 5, closed=[10.0, 10.0, 10.0, 10.0, 10.0]
     )
     half = T_4 * math.sqrt(250 / 5)
-    text = TUNNEL.sentence(found)
+    text = headline(found)
     # a failure of open alone would differ by 100 - 10 s, one of closed alone by 60 - 100 s
     low, high = (
         50 - math.hypot(half, UNMET_5 * (50 + 40)),
@@ -55,11 +62,11 @@ def test_the_headline_compares_with_the_rival_alone() -> None:
     told = "50.0 s {0} (95 % interval: {1} {0}; a failure counts as the limit), McNemar p 1."
     assert text.endswith(f"; closed against open: {told.format('faster', ends)}")
     assert text.count("against") == 1
-    turned = TUNNEL.sentence(result(closed=[10.0] * 5, open=[40.0, 50.0, 60.0, 70.0, 80.0]))
+    turned = headline(result(closed=[10.0] * 5, open=[40.0, 50.0, 60.0, 70.0, 80.0]))
     assert turned.endswith(told.format("faster", ends))
-    slower = TUNNEL.sentence(result(open=[10.0] * 5, closed=[40.0, 50.0, 60.0, 70.0, 80.0]))
+    slower = headline(result(open=[10.0] * 5, closed=[40.0, 50.0, 60.0, 70.0, 80.0]))
     assert slower.endswith(told.format("slower", ends))
-    mixed = TUNNEL.sentence(result(open=[30.0] * 5, closed=[1.0, 10.0, 20.0, 30.0, 80.0]))
+    mixed = headline(result(open=[30.0] * 5, closed=[1.0, 10.0, 20.0, 30.0, 80.0]))
     half = T_4 * math.sqrt(956.2 / 5)  # of differences of 29, 20, 10, 0, -50 s
     ends = re.search(
         r"open: 1\.8 s faster \(95 % interval: (\S+) s faster to (\S+) s slower", mixed

@@ -195,9 +195,9 @@ def test_a_controller_without_a_valid_trial_ends_the_command_with_exit_code_2(
     out = tmp_path / "run"
     found = main(["tunnel", "--controllers", "broken", "open", *words, "--out", str(out)])
     assert found == BAD_INPUT
-    last = capsys.readouterr().out.strip().splitlines()[-1]
-    assert "open 0 of 2" in last
-    assert "broken 0 of 0" not in last
-    assert "No trial of broken is valid: controller: expected finite angles in yaw" in last
+    told = capsys.readouterr().out.splitlines()[0]
+    assert "open 0 of 2" in told
+    assert "broken 0 of 0" not in told
+    assert "No trial of broken is valid: controller: expected finite angles in yaw" in told
     assert len((out / "trials.csv").read_text().splitlines()) == 5
     assert (out / "result.json").exists()

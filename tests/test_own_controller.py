@@ -368,7 +368,7 @@ def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_to
     out = capsys.readouterr().out
     assert f"No trial of {name} is valid: controller: step raised ZeroDivisionError" in out
     assert "my file" not in out
-    assert out.endswith("Invalid trials: 1; trials.csv gives the reason of each.\n")
+    assert out.splitlines()[0].endswith("Invalid trials: 1; trials.csv gives the reason of each.")
     assert "ZeroDivisionError" in (tmp_path / "run" / "trials.csv").read_text()
 
 

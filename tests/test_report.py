@@ -77,7 +77,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["antenna", "springs", "--coil-mm", "4", "--out", "run"]) == 0
-    sentence = capsys.readouterr().out.splitlines()[-1]
+    sentence = capsys.readouterr().out.splitlines()[0]
     page = Page(Path("run/report.html"))
     assert page.alone
     assert sentence in page.text

@@ -173,11 +173,11 @@ class Interim:
         columns = row if isinstance(row, Mapping) else asdict(row)
         outcome = columns.get("outcome") or columns.get("status")
         if outcome is not None:
-            condition = next((str(columns[c]) for c in _CONDITIONS if c in columns), "trials")
+            condition = next((str(columns[c]) for c in _CONDITIONS if c in columns), _ANY)
             self._counts.setdefault(condition, Counter())[str(outcome)] += 1
 
     def table(self) -> Table | None:
-        """A line for each condition; None without any."""
+        """A line for each condition; None if it tells no more than how many."""
         found = {outcome for counts in self._counts.values() for outcome in counts}
         outcomes = sorted(found, key=lambda outcome: (outcome != "success", outcome))
         rows = [
@@ -185,11 +185,14 @@ class Interim:
             for name, counts in sorted(self._counts.items())
         ]
         ended = sum(counts.total() for counts in self._counts.values())
-        return Table(f"So far, {ended} trials", outcomes, rows) if rows else None
+        tells = len(outcomes) > 1 or any(name != _ANY for name in self._counts)
+        return Table(f"So far, {ended} trials", outcomes, rows) if tells else None
 
 
 _CONDITIONS = ("controller", "profile")
 """Columns that tell a condition."""
+_ANY = "trials"
+"""Stands for all of them where there are no conditions."""
 
 
 @dataclass(frozen=True, slots=True)
