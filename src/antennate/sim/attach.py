@@ -20,6 +20,16 @@ _MOST_BITS = 2**31 - 1
 _TOUCH_MARGIN = 1.5
 """Radius of a touch sensor's volume over that of its link: contacts lie inside it."""
 
+_PARTS = {
+    "spring": mujoco.mjtDisableBit.mjDSBL_SPRING,
+    "damper": mujoco.mjtDisableBit.mjDSBL_DAMPER,
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    "limit": mujoco.mjtDisableBit.mjDSBL_LIMIT,
+    "actuation": mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+    "sensor": mujoco.mjtDisableBit.mjDSBL_SENSOR,
+}
+"""What an antenna is made of, by the attribute of `<flag>` that switches it off."""
+
 
 def attach_antenna(
     spec: mujoco.MjSpec,
@@ -57,10 +67,12 @@ def attach_antenna(
     Raises:
         ConfigError: There is no such body, the name is taken or is no text, the side is unknown,
             the position or the angle is not finite, collision bits are no whole numbers of 0 to
-            2**31 - 1, or the model or the antenna is none. The model is left as it was.
+            2**31 - 1, the model sets the total mass or switches springs, dampers, limits, actuators
+            or sensors off, or the model or the antenna is none. The model is left as it was.
     """
     checks.instance("spec", spec, mujoco.MjSpec)
     checks.instance("antenna", antenna, AntennaSpec)
+    _require_whole(spec)
     outwards = antenna.base_angle if angle is None else checks.real("angle", angle, "rad")
     quaternion = mounting_quaternion(outwards, side)
     name = checks.text("name", f"antenna_{side}" if name is None else name)
@@ -78,6 +90,22 @@ def attach_antenna(
     for link in [b.name for b in spec.bodies if b.name.startswith(f"{name}/")]:
         spec.add_exclude(name=f"{link}-{body}", bodyname1=body, bodyname2=link)
     return name
+
+
+def _require_whole(spec: mujoco.MjSpec) -> None:
+    """Refuse a model in which an antenna would have another mass, or lack what it is made of."""
+    if spec.compiler.settotalmass > 0:
+        raise ConfigError(
+            f"spec: expected a <compiler> without settotalmass, which scales the antenna too, "
+            f"found {spec.compiler.settotalmass:g}"
+        )
+    off = [name for name, bit in _PARTS.items() if spec.option.disableflags & int(bit)]
+    off += ["actuatorgroupdisable=0"] if spec.option.disableactuator & 1 else []
+    if off:
+        raise ConfigError(
+            f"spec: expected an <option> with {', '.join(_PARTS)} enabled, of which the antenna is "
+            f"made, found {', '.join(off)} disabled"
+        )
 
 
 def _carrier(spec: mujoco.MjSpec, body: str, name: str) -> mujoco.MjsBody:

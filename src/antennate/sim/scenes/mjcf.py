@@ -47,9 +47,15 @@ _MOST_MEMORY = 2 << 30
 """Most memory of that process [bytes]."""
 _NO_MODEL = 3
 """Its exit code if the file is refused with a reason, which is found again and said later."""
-_REFUSED = ("include", "extension", "plugin", "model", "size")
+_REFUSED = ("include", "extension", "plugin", "model", "size", "lengthrange")
 _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
+_OBEYED = (
+    *("angle", "eulerseq", "autolimits", "coordinate", "usethread"),
+    *("inertiafromgeom", "inertiagrouprange", "fitaabb", "alignfree", "discardvisual"),
+    *("fusestatic", *_DIRECTORIES),
+)
+"""Attributes of `<compiler>` that mean the same in a scene, in its export, and alone."""
 _LARGEST_SIDE = 4096
 """Most rows or columns of a height field or texture."""
 _PREFIX = re.compile(r"^(XML )?Error: (Schema violation: )?")
@@ -166,6 +172,12 @@ def _check(root: ElementTree.Element) -> None:
             raise SceneError(
                 f"expected no <{element.tag}> with values in a scene, found "
                 f"{', '.join(element.attrib)}; the parameters `physics` set the numerics"
+            )
+        if element.tag == "compiler" and (more := [k for k in element.attrib if k not in _OBEYED]):
+            raise SceneError(
+                f"expected no {', '.join(more)} of <compiler> in a scene, found "
+                f"{', '.join(f'{k}={element.attrib[k]!r:.60}' for k in more)}; masses and "
+                f"inertias are to be written out; obeyed are {', '.join(_OBEYED)}"
             )
         _check_numbers(element)
         if element.tag in _COUNTED:
