@@ -27,7 +27,7 @@ from antennate.errors import (
     WorkerError,
     raised,
 )
-from antennate.experiments.running import keep, require_films, write_films
+from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import shortened, typed
 from antennate.params.base import Params
 from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
@@ -177,7 +177,9 @@ def carry_out(
     ):
         if view is not None:
             view.results = str(run.path)
-        run.keeps_store = experiment.continued or experiment.grows is not None
+        films = options.video_trial if options.video else None
+        run.require_free(names_of(experiment, config, not options.no_figures, films))
+        run.keeps_store = experiment.on_workers
         workers = replace(workers, store=run.store, shared=environment(kind, config))
         try:
             if shards and run.store is not None:

@@ -85,6 +85,8 @@ def folder_for(
             require_text(flag or view.name, word)
     place = (view.name, options.out, options.overwrite, identity, resume, retry)
     with RunDirectory.create(*place, tasks=tasks) as folder:
+        if identity is None:  # no experiment, which knows more names
+            folder.require_free(view.figures)
         folder.describe(config, ["antennate", *command_words(command or view.name).split(), *argv])
         yield folder
         write_report(folder, view)

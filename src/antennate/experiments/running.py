@@ -166,7 +166,8 @@ def run(
         resume or experiment.continued,
     )
     with RunDirectory.create(*place, tasks=experiment.grows) as directory:
-        directory.keeps_store = experiment.continued or experiment.grows is not None
+        directory.require_free(names_of(experiment, config, films=video))
+        directory.keeps_store = experiment.on_workers
         directory.describe(config)
         pool = replace(pool, store=directory.store)
         outcome = experiment.run(config, pool, on_step, directory.append)
@@ -175,6 +176,27 @@ def run(
             write_films(experiment, config, video, directory)
         write_report(directory, experiment.view)
         return Result(experiment, config, outcome, directory.path)
+
+
+def names_of(
+    experiment: Experiment[Any, Any], config: Params, figures: bool = True, films: int | None = None
+) -> list[str]:
+    """Names of what a run writes at its end, as far as they are known before: files, figures, films.
+
+    Args:
+        experiment: The experiment.
+        config: Its configuration.
+        figures: Whether figures are drawn.
+        films: Trial that is filmed, None for no film.
+    """
+    drawn = experiment.view.figures if figures else []
+    shot = experiment.films(config, films) if experiment.films and films is not None else {}
+    return [*experiment.names(config), *drawn, *map(_film, shot)]
+
+
+def _film(name: str) -> str:
+    """The file of a film."""
+    return f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4"
 
 
 def keep(
@@ -241,7 +263,7 @@ def write_films(
             on_step(before + _PARTS * part // total, _PARTS * len(records))
 
         data = encoded(record().seen_from(view), step)
-        directory.write(f"{FILMS}/{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.mp4", data)
+        directory.write(_film(name), data)
 
 
 def study(

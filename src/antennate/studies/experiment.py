@@ -264,6 +264,8 @@ class Experiment(Generic[Config, Found]):
         sentence: One plain sentence: what came out, and how sure it is.
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
+        names: names(config) -> the names of those files, so that one that is somebody else's is
+            refused before the run.
         settled: settled(config, folder) -> the configuration with what chance decides before a run,
             as of the run that goes on in a folder; None where none does.
         check: Raises if a configuration cannot be run; called before anything is written.
@@ -295,6 +297,7 @@ class Experiment(Generic[Config, Found]):
     sentence: Callable[[Mapping[str, Any]], str]
     figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
     files: Callable[[Found], Mapping[str, str | bytes]] = lambda outcome: {}
+    names: Callable[[Config], Sequence[str]] = lambda config: ()
     settled: Callable[[Config, Path | None], Config] = lambda config, folder: config
     check: Callable[[Config], None] = lambda config: None
     failed: Callable[[Mapping[str, Any]], bool] = lambda result: False

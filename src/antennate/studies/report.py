@@ -71,6 +71,11 @@ class View:
         """The command as it is typed."""
         return f"antennate {messages.command_words(self.name)}"
 
+    @property
+    def figures(self) -> list[str]:
+        """Names of the files of its figures."""
+        return [f"{FIGURES}/{name}.{kind}" for name in self.captions for kind in ("svg", "png")]
+
     def ordered(self, figures: Iterable[str]) -> list[str]:
         """Names of figures in the order of the captions, others behind: the first is the picture.
 

@@ -49,6 +49,7 @@ from antennate.studies.run_files import (
     read_as,
     remove_described,
     remove_run,
+    trim_list,
     with_end,
     writing,
 )
@@ -295,16 +296,24 @@ class RunDirectory:
             OutputError: There is such a file, which this run has not made.
         """
         new = [name for name in names if name not in self._listed]
-        for name in new:
-            if os.path.lexists(self.path / name):
-                raise OutputError(
-                    f"{self.path}: expected no file {name} but of this run, found one of somebody "
-                    "else; move it, or choose another folder"
-                )
+        self.require_free(new)
         if new:
             with writing(self.path / FILES):
                 add_to_list(self.path, new)
             self._listed.update(new)
+
+    def require_free(self, names: Iterable[str]) -> None:
+        """Find out, before a run, whether names that it will write are those of somebody else.
+
+        Raises:
+            OutputError: There is such a file, which this run has not made.
+        """
+        for name in names:
+            if name not in self._listed and os.path.lexists(self.path / name):
+                raise OutputError(
+                    f"{self.path}: expected no file {name} but of this run, found one of somebody "
+                    "else; move it, or choose another folder"
+                )
 
     def folder(self, name: str) -> Path:
         """A folder in the directory for files of the run, made if it is not there.
@@ -368,5 +377,8 @@ class RunDirectory:
                 (remove_described if self.old is None else remove_run)(self.path)
                 give_back(self.path, self._created, self.old)
         if self._lock is not None:
+            if stays:
+                with contextlib.suppress(OSError):
+                    trim_list(self.path, self._lock)
             os.close(self._lock)
             self._lock = None

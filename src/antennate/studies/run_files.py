@@ -87,6 +87,22 @@ def add_to_list(place: Path, names: Iterable[str]) -> None:
         file.write(lines)
 
 
+def trim_list(place: Path, handle: int) -> None:
+    """Leave in the list of a run that ends the files that are there; the lock on it stays.
+
+    Args:
+        place: The directory.
+        handle: The list, open for writing.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    names = [name for name in listed(place) or () if os.path.lexists(place / name)]
+    text = "".join(f"{line}\n" for line in (_TITLE, *names)).encode()
+    os.pwrite(handle, text, 0)
+    os.ftruncate(handle, len(text))
+
+
 def files_of(place: Path) -> list[Path]:
     """Files of its run that a directory holds, by their list, which comes last."""
     names = listed(place)

@@ -206,6 +206,7 @@ EXPERIMENT = Experiment.of_folder(
     *(__name__, CompeteConfig, run, tables, sentence),
     settled=settled,
     check=check,
+    names=lambda config: ["README.md"],
     files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
     failed=failed,
     undivided=undivided,

@@ -235,6 +235,7 @@ EXPERIMENT = Experiment.of_folder(
     *(__name__, DatasetConfig, run, tables, sentence),
     trials=TRIALS,
     measures=KIND,
+    names=lambda config: ["README.md", *(f"{kind}.parquet" for kind in config.kinds)],
     files=lambda outcome: files(outcome.config, outcome.by_kind),
     check=lambda config: require_parquet("dataset") and None,
     failed=lambda result: any(

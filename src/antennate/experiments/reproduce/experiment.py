@@ -305,5 +305,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     figures=figures,
     body=body,
+    captions={claim.name: claim.claim for claim in CLAIMS},
     parts="parts of 9 experiments",
 )
