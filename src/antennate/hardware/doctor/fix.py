@@ -47,6 +47,12 @@ class Change:
         text = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
         return f"{text}; {_AFTER[self.register]}" if self.register in _AFTER else text
 
+    @property
+    def unmeasured(self) -> int | None:
+        """Id of the servo whose zero and direction are not known after it, None if they are."""
+        servo = self.after if self.register == _ID else self.servo
+        return servo if self.register in (*_MOVED, *_AFTER) else None
+
 
 def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
     """Changes that would put right what can be; those that move a servo come alone, first."""

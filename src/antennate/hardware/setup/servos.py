@@ -217,8 +217,8 @@ class ServoSetup:
         return values
 
 
-Keep = Callable[[tuple[str, ...]], None]
-"""Keeps the names of the joints that are done."""
+Keep = Callable[[tuple[str, ...], Iterable[str]], None]
+"""Keeps the names of the joints that are done, and of those whose servo is not the one before."""
 
 
 class JointState(NamedTuple):
@@ -245,12 +245,14 @@ class Assembly:
 
     Attributes:
         done: Names of the joints that are done, in the order of the robot.
+        changed: Names of those that were given a servo, or lost theirs: no zero of them is known.
     """
 
     def __init__(self, servos: ServoSetup, done: Iterable[str], keep: Keep) -> None:
         known = set(done)
         self._servos, self._keep = servos, keep
         self.done = [joint.name for joint in servos.joints if joint.name in known]
+        self.changed: list[str] = []
 
     def look(self) -> list[JointState]:
         """All joints; those whose servo answers as it has to are done.
@@ -295,6 +297,7 @@ class Assembly:
             for change in changes:
                 person.say(f"  {change}")
             person.say(f"  {joint.name} is set up, read back" if changes else "  set up before")
+            self.changed.append(joint.name)
             self._add({joint.name})
             return
 
@@ -312,13 +315,14 @@ class Assembly:
                 raise SetupError(f"nothing was changed; connect the servo of {joint}") from None
             person.say(f"  {other} is not set up, until a servo answers as that of {other}")
             self.done.remove(other)
-            self._keep(tuple(self.done))
+            self.changed.append(other)
+            self._keep(tuple(self.done), self.changed)
             return self._servos.set_up(joint, self.done)
 
     def _add(self, names: set[str]) -> None:
         known = {*self.done, *names}
         self.done = [joint.name for joint in self._servos.joints if joint.name in known]
-        self._keep(tuple(self.done))
+        self._keep(tuple(self.done), self.changed)
 
     def _state(self, joint: Joint, lacks: str | None) -> JointState:
         if lacks:

@@ -8,7 +8,7 @@ its positive sense. Nothing here moves anything.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
 from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
-from antennate.params.hardware import SetupParams
+from antennate.params.hardware import SetupParams, ZerosParams
 from antennate.robots.joints import QUARTER, STRAIGHT
 from antennate.robots.spec import GroupName, RobotSpec
 from antennate.types import Ints
@@ -264,3 +264,19 @@ def by_group(
         for name, _, count in robot.groups
         if count
     }
+
+
+def measured(
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int]
+) -> dict[tuple[str, ...], list[int]]:
+    """Keys of a robot's file that say where its joints are; the ids, as they were seen to move."""
+    values = {"ids": robot.ids, "zeros": zeros, "directions": directions}
+    return {
+        key: at for what, all_ in values.items() for key, at in by_group(robot, what, all_).items()
+    }
+
+
+def missing_after(robot: RobotSpec, zeros: ZerosParams, changed: Iterable[str]) -> tuple[str, ...]:
+    """`zeros.missing` once these joints have other servos; one without a zero needs no name."""
+    known = (name for name in changed if name not in robot.unstated("zeros"))
+    return tuple(dict.fromkeys((*zeros.missing, *known)))
