@@ -21,8 +21,7 @@ from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.host import HostClock
-from antennate.hardware.setup.robot_toml import change as keep
-from antennate.hardware.setup.zeros import missing_after
+from antennate.hardware.setup.zeros import forgotten
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
@@ -110,10 +109,7 @@ def _fix(
     checkup: Checkup,
     file: Path | None,
 ) -> tuple[DoctorConfig, list[str]]:
-    """What was changed, by rounds, as a servo with another id or speed is examined anew.
-
-    The robot is then one whose file knows no zero of a changed servo.
-    """
+    """The robot after changes, and these; a servo with another id or speed is examined anew."""
     made: list[str] = []
     refused: set[Change] = set()
     for _ in range(_ROUNDS):
@@ -126,23 +122,14 @@ def _fix(
             if not _agreed(change, yes):
                 refused.add(change)
                 continue
-            robot = _without_zero(robot, change, file)
+            if change.unmeasured is not None:  # before a servo is changed, as by `setup`
+                zeros = forgotten(robot.robot, robot.zeros, change.unmeasured, file)
+                robot = robot.model_copy(update={"zeros": zeros})
             apply(bus[1], change, now)
             made.append(str(change))
             sys.stderr.write(f"changed, read back: {change}\n")
         checkup = examine(robot, bus, None, now)
     return robot, made
-
-
-def _without_zero(robot: DoctorConfig, change: Change, file: Path | None) -> DoctorConfig:
-    """The robot after a change of one of its servos, kept in its file if there is one."""
-    joints = dict(zip(robot.robot.ids, robot.robot.joint_names, strict=True))
-    names = [joints[i] for i in joints if i == change.unmeasured]
-    missing = missing_after(robot.robot, robot.zeros, names)
-    if missing != robot.zeros.missing and file is not None:
-        keep(file, {("zeros", "missing"): missing})
-    zeros = robot.zeros.model_copy(update={"missing": missing})
-    return robot.model_copy(update={"zeros": zeros})
 
 
 def _agreed(change: Change, yes: bool) -> bool:

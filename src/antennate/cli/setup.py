@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-import time
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
@@ -32,8 +31,8 @@ from antennate.hardware.safety.deadlines import JOG_PERIOD
 from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port, ports_like
 from antennate.hardware.setup.robot_toml import change, require_changeable
-from antennate.hardware.setup.servos import Assembly, JointState, ServoSetup, joints_of
-from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, measured, missing_after
+from antennate.hardware.setup.servos import Assembly, Joint, JointState, ServoSetup, joints_of
+from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, forgotten, measured
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.measures import Table
@@ -134,14 +133,17 @@ def _servos(
     person: TerminalPerson, config: SetupConfig, options: SetupOptions, path: Path, bus: str
 ) -> int:
     robot = config.robot
-    ids = by_group(robot, "ids", robot.ids)
+    ids, zeros = by_group(robot, "ids", robot.ids), config.zeros
     servos = ServoSetup(opener_of(bus, "--bus"), robot, config.setup.scan, HostClock().now)
 
-    def keep(done: tuple[str, ...], changed: Iterable[str]) -> None:
-        missing = missing_after(robot, config.zeros, changed)
-        change(path, {**ids, ("setup", "done"): done, ("zeros", "missing"): missing})
+    def keep(done: tuple[str, ...]) -> None:
+        change(path, {**ids, ("setup", "done"): done})
 
-    assembly = Assembly(servos, config.setup.done, keep)
+    def forget(joint: Joint) -> None:
+        nonlocal zeros
+        zeros = forgotten(robot, zeros, joint.servo, path)
+
+    assembly = Assembly(servos, config.setup.done, keep, forget)
     states = assembly.look()
     _show_servos(states)
     try:
@@ -215,8 +217,7 @@ def zero(argv: Sequence[str]) -> int:
 def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, path: Path) -> int:
     robot, clock = config.robot, HostClock()
     unknown = {*robot.unstated("directions"), *config.zeros.missing}
-    dated = {("zeros", "measured"): time.strftime("%Y-%m-%d"), ("zeros", "missing"): ()}
-    require_changeable(path, measured(robot, robot.zeros, robot.directions) | dated)
+    require_changeable(path, measured(robot, robot.zeros, robot.directions, ()))
     with master(opener_of(options.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
         if left := torque.disable(bus, robot.ids):
@@ -229,31 +230,23 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
         keep = options.keep_directions
         directions = list(robot.directions) if keep else zeroing.directions(person)
     missing = [name for name in robot.joint_names if name in unknown - zeroing.measured]
-    dated[("zeros", "missing")] = missing
-    change(path, measured(robot, zeros, directions) | dated)
+    change(path, measured(robot, zeros, directions, missing))
     person.close()
-    _show_zeros(robot, zeros, directions, zeroing.measured, missing)
+    _show_zeros(robot, zeros, directions, zeroing.measured)
     named = () if path == USUAL else ("--config", str(path))
-    lack = f" Directions to measure: {', '.join(missing)}." if missing else ""
-    following = typed("zero" if missing else "doctor", *named)
-    sys.stderr.write(f"{path} is written.{lack} Next: {following}\n")
+    sys.stderr.write(f"{path} is written. Next: {typed('zero' if missing else 'doctor', *named)}\n")
     return OK
 
 
 def _show_zeros(
-    robot: RobotSpec,
-    zeros: Sequence[int],
-    directions: Sequence[int],
-    moved: Collection[str],
-    missing: Collection[str],
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], moved: Collection[str]
 ) -> None:
     before = zip(robot.zeros, robot.directions, strict=True)
     after = zip(zeros, directions, strict=True)
     rows: list[tuple[str, list[str]]] = []
     for name, (old, sense), (zero, sign) in zip(robot.joint_names, before, after, strict=True):
         note = "reversed" if sign != sense else ""
-        note = note if name in moved else "direction kept"
-        note = "direction not measured" if name in missing else note
+        note = note if name in moved else "direction not measured"
         rows.append((name, [str(zero), f"{zero - old:+d}", f"{sign:+d}", note]))
     print_table(Table("Joints", ["zero", "change", "direction", "note"], rows, ""))
 

@@ -196,7 +196,7 @@ def _write_robot(path: Path, robot: RobotSpec, paths: dict[str, str]) -> None:
         )
     own = robot.model_dump(mode="json", exclude_defaults=True)
     known = {("ports", name): port for name, port in paths.items()}
-    known |= measured(robot, robot.zeros, robot.directions)
+    known |= measured(robot, robot.zeros, robot.directions, ())
     text = edited(_HEAD + tomlkit.dumps({"robot": own}), known)
     write_whole(path, text.encode(), overwrite=True)
 

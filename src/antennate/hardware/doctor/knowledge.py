@@ -6,81 +6,62 @@ import math
 from collections.abc import Iterator
 
 from antennate.hardware.config import DoctorConfig
-from antennate.hardware.doctor.check import Finding, Row, ids_text
+from antennate.hardware.doctor.check import Finding, Grade, Row, ids_text
 from antennate.hardware.joints import unmeasured
 from antennate.messages import typed
 from antennate.params.base import changes
-from antennate.params.control import ConditioningParams
-from antennate.robots.spec import RobotSpec
+from antennate.params.control import CurveParams
 
 _SUPPLY = ("limits.supply_warn", "limits.supply_hold", "limits.supply_off")
 
 
 def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
-    """A row for each number that a command would assume, of the ports that are looked at."""
+    """A row for each number that would be assumed, of the ports that are looked at."""
     robot = config.robot
     if bus:
-        yield _zeros(config).row("robot", "zeros and directions", "measured")
-        yield _ids(robot).row("robot", "ids", "in its file")
-        yield _limits(robot).row("robot", "joint limits", "in its file")
-        yield _supply(config).row("robot", "limits of the supply", "in its file")
+        yield _zeros(config)
+        ids = f"{ids_text(robot.ids)} in the order of the joints" if robot.unstated("ids") else ""
+        yield _row("ids", ids, f"`{typed('setup')}` and `{typed('zero')}` write them", "warn")
+        cure = "set robot.*.limit to where these joints meet their stops"
+        yield _row("joint limits", _limits(config), cure)
+        levels = ", ".join(f"{getattr(config.limits, name.split('.')[1]):g}" for name in _SUPPLY)
+        cells = "" if any(changes(config, _SUPPLY)) else f"three lithium cells, {levels} V"
+        yield _row("supply limits", cells, f"set {', '.join(_SUPPLY)} to what your supply needs")
     if esp32 and robot.antenna_count:
-        for side in ("left", "right"):
-            yield _curve(config, side).row("robot", f"{side} calibration", "of this antenna")
+        yield from _curves(config)
     if esp32 and robot.has_imu:
         cure = "see IMU_AXES in firmware/config.py, robot.imu.gyro_step and accel_step"
-        axes = Finding("assumed: x, y and steps; at rest only z is seen", "note", cure)
-        yield axes.row("robot", "inertial axes", "as mounted")
+        yield _row("inertial axes", "x, y and steps; at rest only z is seen", cure)
 
 
-def _zeros(config: DoctorConfig) -> Finding:
-    names = unmeasured(config.robot, config.zeros)
+def _row(check: str, assumed: str, cure: str, grade: Grade = "note") -> Row:
+    """What is assumed of a number, nothing if its file has it."""
+    finding = Finding(f"assumed: {assumed}", grade, cure) if assumed else Finding("in its file")
+    return finding.row("robot", check, "in its file")
+
+
+def _zeros(config: DoctorConfig) -> Row:
+    names, date = unmeasured(config.robot, config.zeros), config.zeros.measured
+    finding = Finding(f"measured on {date}" if date else "in its file, without a date")
     if names:
         some = f": {', '.join(names)}" if len(names) < len(config.robot.ids) else ""
-        return Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`; nothing walks before")
-    date = config.zeros.measured
-    return Finding(f"measured on {date}" if date else "stated in its file, without a date")
+        finding = Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`")
+    return finding.row("robot", "zeros and directions", "measured")
 
 
-def _ids(robot: RobotSpec) -> Finding:
-    if not (names := robot.unstated("ids")):
-        return Finding("in its file")
-    ids = ids_text(i for i, n in zip(robot.ids, robot.joint_names, strict=True) if n in names)
-    cure = f"`{typed('setup')}` and `{typed('zero')}` write them"
-    return Finding(f"assumed: {ids}, in the order of the joints", "warn", cure)
+def _limits(config: DoctorConfig) -> str:
+    """Limits that no file has, in words."""
+    robot = config.robot
+    return ", ".join(
+        f"{name} {math.degrees(robot.limits[robot.places(name).start]):.0f} deg"
+        for name, group, count in robot.groups
+        if count and math.isfinite(group.largest) and not any(changes(group, ["limit"]))
+    )
 
 
-def _limits(robot: RobotSpec) -> Finding:
-    assumed: list[str] = []
-    for name, group, count in robot.groups:
-        if count and not math.isinf(group.largest) and not any(changes(group, ["limit"])):
-            limit = robot.limits[robot.places(name).start]
-            assumed.append(f"{name} {math.degrees(limit):.0f} deg")
-    text = f"assumed: {', '.join(assumed)}" if assumed else "in its file"
-    cure = "set robot.*.limit to where these joints meet their stops"
-    return Finding(text, "note" if assumed else "ok", cure)
-
-
-def _supply(config: DoctorConfig) -> Finding:
-    levels = config.limits
-    text = f"{levels.supply_warn:g}, {levels.supply_hold:g} and {levels.supply_off:g} V"
-    if any(changes(config, _SUPPLY)):
-        return Finding(text)
-    cure = f"set {', '.join(_SUPPLY)} to what your supply needs"
-    return Finding(f"assumed: three lithium cells, {text}", "note", cure)
-
-
-def _curve(config: DoctorConfig, side: str) -> Finding:
-    control = config.control
-    if side == "right" and control.conditioning_right is not None:
-        return Finding("its own curve")
-    if not any(changes(control.conditioning, set(ConditioningParams.model_fields) - _NO_CURVE)):
-        cure = f"`{typed('record')}` and `{typed('calibrate')}`, then calibration = FILE"
-        return Finding("assumed: the curve of the simulated antenna", "warn", cure)
-    if side == "left":
-        return Finding("its own curve")
-    cure = "set calibration_right to the file of the right antenna, or to that of the left"
-    return Finding("assumed: the curve of the left antenna", "note", cure)
-
-
-_NO_CURVE = {"averaging_time"}
+def _curves(config: DoctorConfig) -> Iterator[Row]:
+    control, cure = config.control, f"`{typed('record')}`, `{typed('calibrate')}`, then calibration"
+    left = "" if any(changes(control.conditioning, CurveParams.model_fields)) else "a simulated one"
+    yield _row("left calibration", left, f"{cure} = FILE", "warn" if left else "ok")
+    right = "" if control.conditioning_right else left or "that of the left antenna"
+    yield _row("right calibration", right, f"{cure}_right = FILE", "warn" if left else "note")

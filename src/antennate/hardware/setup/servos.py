@@ -217,8 +217,8 @@ class ServoSetup:
         return values
 
 
-Keep = Callable[[tuple[str, ...], Iterable[str]], None]
-"""Keeps the names of the joints that are done, and of those whose servo is not the one before."""
+Keep = Callable[[tuple[str, ...]], None]
+"""Keeps the names of the joints that are done."""
 
 
 class JointState(NamedTuple):
@@ -242,17 +242,18 @@ class Assembly:
         servos: What sets them up.
         done: Names of the joints that were done before.
         keep: Called with all that is done after each.
+        forget: Called with a joint that may get another servo, whose zero nobody knows.
 
     Attributes:
         done: Names of the joints that are done, in the order of the robot.
-        changed: Names of those that were given a servo, or lost theirs: no zero of them is known.
     """
 
-    def __init__(self, servos: ServoSetup, done: Iterable[str], keep: Keep) -> None:
+    def __init__(
+        self, servos: ServoSetup, done: Iterable[str], keep: Keep, forget: Callable[[Joint], object]
+    ) -> None:
         known = set(done)
-        self._servos, self._keep = servos, keep
+        self._servos, self._keep, self._forget = servos, keep, forget
         self.done = [joint.name for joint in servos.joints if joint.name in known]
-        self.changed: list[str] = []
 
     def look(self) -> list[JointState]:
         """All joints; those whose servo answers as it has to are done.
@@ -289,6 +290,7 @@ class Assembly:
     def _one(self, person: Person, joint: Joint, where: str) -> None:
         """One joint, until it is done or left out."""
         while confirm(person, f"{where}: connect the servo of {joint} alone"):
+            self._forget(joint)  # before a servo is changed, and the program may end
             try:
                 changes = self._set_up(person, joint)
             except (SetupError, BringUpError, PortError) as error:
@@ -297,7 +299,6 @@ class Assembly:
             for change in changes:
                 person.say(f"  {change}")
             person.say(f"  {joint.name} is set up, read back" if changes else "  set up before")
-            self.changed.append(joint.name)
             self._add({joint.name})
             return
 
@@ -315,14 +316,14 @@ class Assembly:
                 raise SetupError(f"nothing was changed; connect the servo of {joint}") from None
             person.say(f"  {other} is not set up, until a servo answers as that of {other}")
             self.done.remove(other)
-            self.changed.append(other)
-            self._keep(tuple(self.done), self.changed)
+            self._forget(error.owner)
+            self._keep(tuple(self.done))
             return self._servos.set_up(joint, self.done)
 
     def _add(self, names: set[str]) -> None:
         known = {*self.done, *names}
         self.done = [joint.name for joint in self._servos.joints if joint.name in known]
-        self._keep(tuple(self.done), self.changed)
+        self._keep(tuple(self.done))
 
     def _state(self, joint: Joint, lacks: str | None) -> JointState:
         if lacks:

@@ -8,8 +8,10 @@ its positive sense. Nothing here moves anything.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
 from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
+from antennate.hardware.setup.robot_toml import change
 from antennate.params.hardware import SetupParams, ZerosParams
 from antennate.robots.joints import QUARTER, STRAIGHT
 from antennate.robots.spec import GroupName, RobotSpec
@@ -267,16 +270,24 @@ def by_group(
 
 
 def measured(
-    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int]
-) -> dict[tuple[str, ...], list[int]]:
-    """Keys of a robot's file that say where its joints are; the ids, as they were seen to move."""
-    values = {"ids": robot.ids, "zeros": zeros, "directions": directions}
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], missing: Sequence[str]
+) -> dict[tuple[str, ...], Any]:
+    """Keys of a robot's file that say where its joints are, from today on."""
     return {
-        key: at for what, all_ in values.items() for key, at in by_group(robot, what, all_).items()
+        **by_group(robot, "ids", robot.ids),
+        **by_group(robot, "zeros", zeros),
+        **by_group(robot, "directions", directions),
+        ("zeros", "measured"): time.strftime("%Y-%m-%d"),
+        ("zeros", "missing"): missing,
     }
 
 
-def missing_after(robot: RobotSpec, zeros: ZerosParams, changed: Iterable[str]) -> tuple[str, ...]:
-    """`zeros.missing` once these joints have other servos; one without a zero needs no name."""
-    known = (name for name in changed if name not in robot.unstated("zeros"))
-    return tuple(dict.fromkeys((*zeros.missing, *known)))
+def forgotten(robot: RobotSpec, zeros: ZerosParams, servo: int, file: Path | None) -> ZerosParams:
+    """What is known once another servo has this id, kept in the robot's file if there is one."""
+    joint = robot.joint_names[robot.ids.index(servo)]
+    if joint in (*zeros.missing, *robot.unstated("zeros")):
+        return zeros
+    missing = (*zeros.missing, joint)
+    if file is not None:
+        change(file, {("zeros", "missing"): missing})
+    return zeros.model_copy(update={"missing": missing})
