@@ -135,7 +135,8 @@ def _fix(
 def _agreed(change: Change, yes: bool) -> bool:
     if yes:
         return True
-    sys.stderr.write(f"{change}; torque goes off first. Change it? [y/N] ")
+    anew = "" if change.unmeasured is None else "; its zero is to be measured anew"
+    sys.stderr.write(f"{change}{anew}; torque goes off first. Change it? [y/N] ")
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

@@ -41,8 +41,7 @@ class Change:
         values: tuple[object, object] = self.before, self.after
         if self.register == _BAUD:
             values = BAUD_RATES[self.before], BAUD_RATES[self.after]
-        text = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
-        return text if self.unmeasured is None else f"{text}; its zero is to be measured anew"
+        return f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
 
     @property
     def unmeasured(self) -> int | None:

@@ -61,7 +61,8 @@ def _limits(config: DoctorConfig) -> str:
 
 def _curves(config: DoctorConfig) -> Iterator[Row]:
     control, cure = config.control, f"`{typed('record')}`, `{typed('calibrate')}`, then calibration"
-    left = "" if any(changes(control.conditioning, CurveParams.model_fields)) else "a simulated one"
-    yield _row("left calibration", left, f"{cure} = FILE", "warn" if left else "ok")
-    right = "" if control.conditioning_right else left or "that of the left antenna"
+    own = any(changes(control.conditioning, CurveParams.model_fields))
+    left = "" if own else "that of a simulated antenna"
+    yield _row("left calibration", left, f"{cure} = FILE", "warn")
+    right = "" if control.conditioning_right else left or "that of the left one"
     yield _row("right calibration", right, f"{cure}_right = FILE", "warn" if left else "note")
