@@ -43,6 +43,7 @@ DONE = f"[setup]\ndone = {json.dumps(NAMES)}\n"
 YAW = "[robot.yaw]\nids = [1, 2, 3, 4, 5]\n"
 LEGS = "[robot.legs]\nids = [6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]\n"
 ZEROS = {"yaw": [2048] * 5, "legs": [2048] * 12, "antennae": [2048] * 2}
+KNOWN = ("yaw", "legs", "antennae", "pitch", "elevation")
 ONES = {name: [1] * len(zeros) for name, zeros in ZEROS.items()}
 
 
@@ -114,9 +115,10 @@ def twin(monkeypatch: pytest.MonkeyPatch) -> LockstepClock:
     robot = watched(TwinConfig(), 5)[0]
     clock = LockstepClock(robot)
     ports: dict[str, Any] = {"/no/board": BoardPort(robot, clock), "/no/bus": clock}
+    for port in ports.values():
+        monkeypatch.setattr(port, "close", lambda: None, raising=False)
     monkeypatch.setattr(connect, "finder", lambda address, *_: ports[address])
-    monkeypatch.setattr(connect, "Reconnecting", contextlib.nullcontext)
-    monkeypatch.setattr(contextlib, "closing", lambda manager: manager)
+    monkeypatch.setattr(connect, "Reconnecting", lambda port: port)
     monkeypatch.setattr(connect, "HostClock", lambda: clock)
     monkeypatch.setattr(Feed, "watched", property(lambda feed: True))  # its time is invented
     return clock
@@ -169,9 +171,6 @@ def test_the_doctor_names_every_number_that_nobody_has_measured() -> None:
     assert rows["supply limits"].found == "assumed: three lithium cells, 10.8, 10.2, 9.6 V"
     assert "simulated antenna" in rows["left calibration"].found
     assert all(row.cure for row in rows.values())
-
-
-INERTIAL = RobotSpec.model_validate({"imu": {"kind": "head"}})
 
 
 def test_what_is_stated_is_not_named() -> None:
@@ -259,7 +258,7 @@ def test_a_servo_that_is_set_up_anew_has_no_zero_even_if_that_fails(
     pattern = "connect the servo of yaw3"
     steps: list[Any] = [
         (pattern, None, ""),
-        ("expected one servo alone", lambda: seen.append(RobotFile_of(file)), None),
+        ("expected one servo alone", lambda: seen.append(missing(file)), None),
         (pattern, None, "q"),
     ]
     scripted(monkeypatch, Script(steps))
@@ -270,7 +269,8 @@ def test_a_servo_that_is_set_up_anew_has_no_zero_even_if_that_fails(
     assert "found none of yaw3; " in capsys.readouterr().err
 
 
-def RobotFile_of(file: Path) -> tuple[str, ...]:
+def missing(file: Path) -> tuple[str, ...]:
+    """Joints that a file names as not measured."""
     return read_file(file, RobotFile).zeros.missing
 
 
@@ -279,9 +279,8 @@ def zeroed(patch: pytest.MonkeyPatch, moved: tuple[str, ...], *words: str) -> No
     box = boxed(patch, setup, RobotSpec(), ready=True)
     turns = {name: lambda s=s: s.place(s.position - 300) for name, s in box.servos.items()}
     steps: list[Any] = [("straight", None, "")]
-    steps += [
-        (f": {n}: ", turns[n], None) if n in moved else (f": {n}: ", None, "s") for n in NAMES
-    ]
+    for name in NAMES:
+        steps.append((f": {name}: ", *((turns[name], None) if name in moved else (None, "s"))))
     scripted(patch, Script(steps))
     assert main(["setup", "zero", "--bus", "bus", *words]) == 0
 
@@ -308,10 +307,10 @@ def test_directions_that_are_kept_are_those_of_the_file_or_none(
 ) -> None:
     file.write_text(lists(directions=ONES))
     zeroed(monkeypatch, (), "--keep-directions")
-    assert RobotFile_of(file) == ()
+    assert missing(file) == ()
     file.write_text("")
     zeroed(monkeypatch, (), "--keep-directions")
-    assert RobotFile_of(file) == NAMES
+    assert missing(file) == NAMES
 
 
 def test_jog_moves_a_joint_without_a_zero_a_little_from_where_it_stands() -> None:
@@ -346,6 +345,7 @@ def test_the_twin_writes_the_file_of_its_robot(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With what a builder measures on a robot; a file that it has not written is left alone."""
+    robot = RobotSpec.named("scuttle3d")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text("[robot.yaw]\nzeros = [2000, 2001, 2002, 2003, 2004]\n")
     words = ["twin", "--duration", "0.1", "--robot", "scuttle3d", "--robot-toml"]
@@ -354,17 +354,13 @@ def test_the_twin_writes_the_file_of_its_robot(
     paths = json.loads(capfd.readouterr().out.splitlines()[-1])
     found = read_file(tmp_path / "twin.toml", RobotFile)
     assert dict(found.ports) == paths
-    assert found.robot == stated(RobotSpec.named("scuttle3d")).model_copy(
-        update={"yaw": found.robot.yaw, "legs": found.robot.legs, "antennae": found.robot.antennae}
-        | {"pitch": found.robot.pitch, "elevation": found.robot.elevation}
-    )
     assert (found.robot.ids, found.robot.zeros) == (tuple(range(1, 27)), (2048,) * 26)
+    assert found.robot.model_dump(exclude={*KNOWN}) == robot.model_dump(exclude={*KNOWN})
     assert found.robot.unstated("ids", "zeros", "directions") == ()
     mine = (tmp_path / "mine.toml").read_text()
     assert main([*words, "mine.toml"]) == 2
     assert "--robot-toml: expected no file yet, or one of a twin" in capfd.readouterr().err
     assert (tmp_path / "mine.toml").read_text() == mine
-    assert main([*words[:3], "--robot", "mine.toml", "--robot-toml", "again.toml"]) == 2 or True
 
 
 @contextlib.contextmanager
