@@ -30,6 +30,7 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.driving import connect
 from antennate.hardware.driving.drive import drive
 from antennate.params.base import read_file
+from antennate.params.safety import TouchCheckParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_toml
 from antennate.telemetry.feed import Feed
@@ -103,7 +104,8 @@ def test_a_session_of_such_a_robot_gets_no_torque() -> None:
     """Whoever asks, and however long: the supervisor is told."""
     made = rig(TwinConfig())
     made.session.unfit = "no zeros"
-    config = DriveConfig(dry_run=0.3, touch_check=False, touch={"patience": 0.5})  # type: ignore[arg-type]
+    patience = TouchCheckParams(patience=0.5)
+    config = DriveConfig(dry_run=0.3, duration=0.5, touch_check=False, touch=patience)
     report = drive(made.session, config, arm=True)
     assert "NOT_READY: something speaks against arming (no zeros)" in report.refusal
     assert (report.on, made.session.touched) == (None, False)
@@ -279,8 +281,10 @@ def zeroed(patch: pytest.MonkeyPatch, moved: tuple[str, ...], *words: str) -> No
     box = boxed(patch, setup, RobotSpec(), ready=True)
     turns = {name: lambda s=s: s.place(s.position - 300) for name, s in box.servos.items()}
     steps: list[Any] = [("straight", None, "")]
-    for name in NAMES:
-        steps.append((f": {name}: ", *((turns[name], None) if name in moved else (None, "s"))))
+    steps += [
+        (f": {n}: ", turn if n in moved else None, None if n in moved else "s")
+        for n, turn in turns.items()
+    ]
     scripted(patch, Script(steps))
     assert main(["setup", "zero", "--bus", "bus", *words]) == 0
 
