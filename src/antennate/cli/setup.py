@@ -136,14 +136,16 @@ def _servos(
     ids, zeros = by_group(robot, "ids", robot.ids), config.zeros
     servos = ServoSetup(opener_of(bus, "--bus"), robot, config.setup.scan, HostClock().now)
 
-    def keep(done: tuple[str, ...]) -> None:
-        change(path, {**ids, ("setup", "done"): done})
-
     def forget(joint: Joint) -> None:
         nonlocal zeros
         zeros = forgotten(robot, zeros, joint.servo, path)
 
-    assembly = Assembly(servos, config.setup.done, keep, forget)
+    assembly = Assembly(
+        servos,
+        config.setup.done,
+        lambda done: change(path, {**ids, ("setup", "done"): done}),
+        forget,
+    )
     states = assembly.look()
     _show_servos(states)
     try:
