@@ -227,7 +227,7 @@ def test_the_doctor_lets_no_robot_walk_that_was_set_up_and_never_zeroed(
     file.write_text(lists(zeros=ZEROS, directions=ONES))
     assert examined() == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "no check is bad, 3 of 44 warn; 2 numbers are assumed." in said
+    assert "no check is bad, 3 of 44 warn; numbers assumed: 2." in said
 
 
 def test_a_servo_that_the_doctor_gives_an_id_has_no_zero(

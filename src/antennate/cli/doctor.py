@@ -170,7 +170,7 @@ def _show(rows: Sequence[Row]) -> None:
 def _sentence(grades: Sequence[str]) -> str:
     """What came out, in one sentence."""
     checks, bad, warnings, notes = len(grades), *map(grades.count, ("bad", "warn", "note"))
-    assumed = f"; {notes} numbers are assumed" if notes else ""
+    assumed = f"; numbers assumed: {notes}" if notes else ""
     if bad:
         return (
             f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
