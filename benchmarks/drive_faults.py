@@ -34,6 +34,8 @@ EARLY, LATE = 0.3, 3.0
 """When something happens, after the first command was sent [s]."""
 PATIENCE = 90.0
 """Time after which a drive hangs [s]: it waits 30 s for a lost bus, and 10 s after a fault."""
+FILE = "twin.toml"
+"""What the twin writes of its robot, zeros and directions."""
 
 
 class Run:
@@ -57,6 +59,7 @@ class Run:
         ports = ["--esp32", self.paths["esp32"], "--bus", self.paths["bus"]]
         times = ["--dry-run", str(DRY_RUN), "--fault-time", "1"]
         words = ["drive", "--arm", "--no-touch-check", "--bus-return", "5", *ports, *times, *more]
+        words += ["--config", str(self.place / FILE)]
         self.drive = subprocess.Popen(
             [*ANTENNATE, *words, "--out", str(self.folder)],
             stdout=subprocess.PIPE,
@@ -93,12 +96,14 @@ class Run:
 @contextlib.contextmanager
 def twin(tcp: bool) -> Iterator[Run]:
     """A twin, and a place for what a drive before it writes."""
-    words = ["twin", "--orders", "-", *(["--tcp", "0"] if tcp else [])]
     with (
         tempfile.TemporaryDirectory() as place,
         contextlib.ExitStack() as stack,
         subprocess.Popen(
-            [*ANTENNATE, *words],
+            [
+                *[*ANTENNATE, "twin", "--orders", "-", *(["--tcp", "0"] if tcp else [])],
+                *["--robot-toml", str(Path(place) / FILE)],
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=stack.enter_context((Path(place) / "twin").open("w")),

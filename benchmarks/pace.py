@@ -70,19 +70,20 @@ def walk(
     """
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        twin, until = [*PROGRAM, "twin", "--touch", *TOUCH], str(folder / "passed")
+        robot, until = str(folder / "twin.toml"), str(folder / "passed")
+        twin = [*PROGRAM, "twin", "--touch", *TOUCH, "--robot-toml", robot]
         if trial is not None:
             twin += ["--seed", str(trial[0]), "--trial", str(trial[1]), "--passed", until]
         pipe, quiet = subprocess.PIPE, subprocess.DEVNULL
         server = stack.enter_context(running(twin, stdout=pipe, stderr=quiet))
         assert server.stdout is not None
-        paths = json.loads(server.stdout.readline())
+        server.stdout.readline()  # it is ready
         for _ in range(busy):
             stack.enter_context(running(BUSY))
         for _ in range(viewers):
             log = str(folder / "run" / "drive.mcap")
             stack.enter_context(running([sys.executable, "-c", VIEWER, log]))
-        words = [*PROGRAM, "drive", "--esp32", paths["esp32"], "--bus", paths["bus"], "--arm"]
+        words = [*PROGRAM, "drive", "--config", robot, "--arm"]
         words += ["--json", "--out", str(folder / "run")]
         words += ["--dry-run", str(DRY_RUN), "--duration", str(seconds), *more]
         words += [] if trial is None else ["--until", until]

@@ -162,7 +162,7 @@ with name, unit, scale and clip. `FILE.onnx` is then a controller:
 
 ```bash
 uv run antennate tunnel --controllers my_policy/policy.onnx
-uv run antennate drive --esp32 /dev/pts/1 --bus /dev/pts/2 --arm \\
+uv run antennate drive --arm \\
     --controller my_policy/policy.onnx
 ```
 

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 
 from lockstep import BoardPort, LockstepClock
+from stated import stated
 
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Row
@@ -17,14 +18,14 @@ from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 
-ROBOT = DoctorConfig()
+ROBOT = DoctorConfig(robot=stated())
 
 
 class Patient:
     """A robot with faults, and what opens its two ports."""
 
     def __init__(self, *faults: str, robot: RobotSpec | None = None) -> None:
-        self.spec = robot or ROBOT.robot
+        self.spec = stated(robot)
         self.robot: TwinRobot = watched(TwinConfig(robot=self.spec))[0]
         self.clock = LockstepClock(self.robot)
         self.board = BoardPort(self.robot, self.clock)
@@ -62,5 +63,6 @@ class Patient:
 
 
 def wrong(checkup: Checkup) -> dict[str, Row]:
-    """Rows that are not ok, by part and check."""
-    return {f"{row.part}: {row.check}": row for row in checkup.rows if row.grade != "ok"}
+    """Rows of both ports that are not ok, by part and check."""
+    rows = (row for row in checkup.rows if row.part != "robot")
+    return {f"{row.part}: {row.check}": row for row in rows if row.grade != "ok"}

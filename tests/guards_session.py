@@ -20,6 +20,7 @@ import test_release
 import test_session
 import test_signals
 import test_twin_robot
+import test_unmeasured
 from guard_tools import Guard, around, before, constant, put
 
 from antennate.control import loop
@@ -29,8 +30,10 @@ from antennate.hardware.dynamixel import actuators
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.safety import deadlines, session, torque
 from antennate.hardware.safety.controller import StepResult, SupervisedController
-from antennate.hardware.safety.supervisor import Outputs, Supervisor
+from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
+from antennate.hardware.setup.jog import Jog
 from antennate.port import PortError
+from antennate.robots.spec import RobotSpec
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 
@@ -88,7 +91,30 @@ def forget_the_loss(self: Any, time: float) -> None:
     self.lost = False
 
 
+def without_objections(old: Any, self: Any, now: float) -> Inputs:
+    return dataclasses.replace(old(self, now), objections=())
+
+
+def as_if_measured(old: Any, self: Any, *of_joint: Any) -> None:
+    old(self, *of_joint[:-1], True)
+
+
 SESSION = [
+    Guard(
+        "zeros and directions that nobody measured",
+        put(RobotSpec, "unstated", constant(())),
+        test_unmeasured.test_the_doctor_names_every_number_that_nobody_has_measured,
+    ),
+    Guard(
+        "no torque without them, whoever asks",
+        around(session.Session, "_inputs", without_objections),
+        test_unmeasured.test_a_session_of_such_a_robot_gets_no_torque,
+    ),
+    Guard(
+        "way of a joint moved by keys without them",
+        around(Jog, "__init__", as_if_measured),
+        test_unmeasured.test_jog_moves_a_joint_without_a_zero_a_little_from_where_it_stands,
+    ),
     Guard(
         "goals that are NaN",
         around(joints.Joints, "positions", finite_goals),

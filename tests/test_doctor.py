@@ -33,7 +33,7 @@ def test_a_healthy_robot_has_no_row_that_is_not_ok_and_nothing_is_written() -> N
     before = memory(patient)
     checkup = patient.examine()
     assert wrong(checkup) == {}
-    assert len(checkup.rows) == 38
+    assert len([row for row in checkup.rows if row.part != "robot"]) == 38
     assert memory(patient) == before
     assert sum(servo.eeprom_writes for servo in patient.robot.servos) == 0
 
@@ -245,8 +245,8 @@ def test_fix_sets_what_drive_requires_and_says_what_has_to_follow() -> None:
     assert patient.fix() == [
         "servo 3 (at 1000000): max position limit 2200 -> 4095",
         "servo 3 (at 1000000): min position limit 1900 -> 0",
-        "servo 8 (at 1000000): drive mode 9 -> 0; see that its sign in robot.*.directions is right",
-        "servo 9 (at 1000000): homing offset 500 -> 0; measure its place in robot.*.zeros anew",
+        "servo 8 (at 1000000): drive mode 9 -> 0",
+        "servo 9 (at 1000000): homing offset 500 -> 0",
         "servo 19 (at 1000000): velocity limit 100 -> 445",
     ]
     assert wrong(patient.examine()) == {}

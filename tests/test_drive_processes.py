@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from stated import STATED
 
 from antennate.telemetry.reader import count
 
@@ -101,6 +102,7 @@ def drive_with_faults(folder: Path) -> Drive:
     """One such drive, its run in a folder."""
     drive = Drive(folder)
     words = ["drive", "--arm", "--no-touch-check", "--controller", EXAMPLE]
+    words += STATED
     words += ["--dry-run", "3", "--duration", f"{MOST}", "--limits.repeats", "100", *NO_SERVO]
     with (
         twin() as (places, fault),

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lockstep import BoardPort, LockstepClock
+from stated import STATED
 from twin_rig import Rig, rig
 
 from antennate.cli import main
@@ -218,7 +219,7 @@ def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., in
 
         monkeypatch.setattr("antennate.cli.drive.connect", in_process)
         ports = ["--esp32", "board", "--bus", "bus"]
-        return main(["drive", *ports, *words, "--out", str(tmp_path), "--overwrite"])
+        return main(["drive", *ports, *STATED, *words, "--out", str(tmp_path), "--overwrite"])
 
     return run
 

@@ -66,7 +66,9 @@ def test_a_box_of_servos_becomes_a_robot_that_crosses_the_tunnel(tmp_path: Path)
         time.sleep(13.0)  # the touches that the twin plans for whoever began last, `zero`, are over
         doctor = Command(page["doctor"], tmp_path)
         assert doctor.end() == 0, doctor.output
-        assert "all 37 checks are good" in doctor.output, doctor.output
+        said = " ".join(doctor.output.split())
+        assert "no check is bad, 2 of 44 warn; numbers assumed: 2" in said, said
+        assert "measured on 20" in said, said
 
         time.sleep(3.0)  # the twin takes who comes later for a new client
         drive = Command([*page["drive"], "--duration", "120", "--out", "run"], tmp_path)

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from lockstep import BoardPort, LockstepClock
+from stated import STATED
 from test_drive_processes import ANTENNATE, NO_SERVO, Drive, twin
 from test_simulated_logs import HEADER, in_rows, rows, walked
 
@@ -106,6 +107,7 @@ def test_a_run_whose_folder_is_removed_says_what_is_lost(tmp_path: Path) -> None
     """The walk goes on to its end; result and configuration are written again, the log is gone."""
     drive = Drive(tmp_path / "run")
     words = ["drive", "--arm", "--no-touch-check", "--dry-run", "2", "--duration", "4"]
+    words += STATED
     with (
         twin() as (places, _),
         subprocess.Popen(

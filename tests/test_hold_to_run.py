@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from stated import STATED
 from test_drive_processes import ANTENNATE, twin
 from twin_rig import rig
 
@@ -133,6 +134,7 @@ def test_B19_a_key_held_in_a_terminal_is_the_dead_man_of_the_shipped_command(
 ) -> None:
     folder = tmp_path / "run"
     words = ["drive", "--arm", "--no-touch-check", "--dry-run", "1", "--hold-to-run"]
+    words += STATED
     words += ["--dead-man.off", "1", "--out", str(folder)]
     with twin() as (places, _):
         child, terminal = pty.fork()
@@ -163,6 +165,7 @@ def test_B19_a_key_held_in_a_terminal_is_the_dead_man_of_the_shipped_command(
 def test_B19_a_signal_sent_again_and_again_loses_no_report(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     words = ["drive", "--arm", "--no-touch-check", "--dry-run", "1", "--out", str(folder)]
+    words += STATED
     with (
         twin() as (places, _),
         subprocess.Popen(

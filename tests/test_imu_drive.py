@@ -17,6 +17,7 @@ import pytest
 from doctor_rig import Patient, wrong
 from driven_rig import driven, simulated_alike
 from lockstep import BoardPort, LockstepClock
+from stated import words as stated_words
 from test_drive_processes import ANTENNATE, ATTEMPTS, NO_SERVO
 from twin_rig import rig
 
@@ -435,6 +436,7 @@ def drive_by_command(run: Path) -> tuple[int, str, str]:
     """`drive` with a sensor that falls silent in it: exit code, what it said on both streams."""
     words = ["drive", "--arm", "--no-touch-check", "--robot", "scuttle3d", "--controller", "climb"]
     words += ["--dry-run", "3", "--duration", "4", *NO_SERVO, "--out", str(run)]
+    words += stated_words(RobotSpec.named("scuttle3d"))
     pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with (
         wired(run.parent) as (places, orders),

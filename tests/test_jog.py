@@ -21,7 +21,7 @@ TICK = 2 * math.pi / 4096
 class Ready:
     """A servo that is set up, alone on the bus."""
 
-    def __init__(self, joint=YAW1) -> None:
+    def __init__(self, joint=YAW1, measured: bool = True) -> None:
         self.box = Box()
         self.box.plug(joint.name)
         ServoSetup(self.box.opener, ROBOT, 0.02, self.box.wire.now).set_up(joint, ())
@@ -29,10 +29,10 @@ class Ready:
         self.servo = self.box.servos[joint.name]
         self.servo.place(2048.0)
         self.bus = Bus(self.box.wire, clock=self.box.wire.now)
-        self.joint = joint
+        self.joint, self.measured = joint, measured
 
     def jog(self, **params: float) -> Jog:
-        jog = Jog(self.bus, ROBOT, self.joint, JogParams(**params))
+        jog = Jog(self.bus, ROBOT, self.joint, JogParams(**params), self.measured)
         jog.begin()
         return jog
 
@@ -142,7 +142,7 @@ def test_a_servo_that_is_set_otherwise_gets_no_torque(register: str, value: int,
     """Profile velocity is a speed and Goal PWM a limit in position modes alone (manuals)."""
     ready = Ready()
     ready.servo.set(register, value)
-    jog = Jog(ready.bus, ROBOT, YAW1, JogParams())
+    jog = Jog(ready.bus, ROBOT, YAW1, JogParams(), True)
     with pytest.raises(SetupError, match=f"expected {told}; `antennate setup --only yaw1`") as info:
         jog.begin()
     assert "\n" not in str(info.value)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from setup_rig import ROBOT, Box
+from stated import STATED
 from test_jog import Ready
 
 from antennate.cli import main, setup
@@ -45,7 +46,7 @@ class Typist:
             return typed()
 
         self._patch.setattr(setup, "typed_keys", lambda: contextlib.nullcontext(keys))
-        code = main(["setup", "jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud)])
+        code = main(["setup", "jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud), *STATED])
         return code, self._capsys.readouterr().err.strip().splitlines()
 
 

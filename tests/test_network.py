@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from esp32_streams import encoded, hello, made
+from stated import STATED
 
 from antennate.cli import main
 from antennate.dxl.endpoints import TcpEndpoint
@@ -239,8 +240,9 @@ def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
         assert twin.stdout is not None
         places = json.loads(twin.stdout.readline())
         words = ["drive", "--esp32", places["esp32"], "--bus", places["bus"]]
+        dry = [*words, *STATED, "--key", str(path), "--dry-run", "0.3"]
         try:
-            assert main([*words, "--key", str(path), "--dry-run", "0.3"]) == 0
+            assert main(dry) == 0
             board = read_key(path)
             keyed = [*words[1:3], "--key", str(path)]
             assert main(["record", *keyed, "--duration", "0.3", "--out", "both.csv"]) == 0

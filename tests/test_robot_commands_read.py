@@ -19,6 +19,7 @@ from lockstep import BoardPort, LockstepClock, SimulatedWire
 from log_ticks import HEADER
 from recorded import act, leaves, meet_ground, recorded
 from setup_rig import Box, Script
+from stated import stated
 from worlds import recorded as logged
 from worlds import simulated
 
@@ -371,6 +372,9 @@ def test_every_parameter_of_a_command_of_the_robot_is_read_or_refused(
     model, run, settings = RUNS[command]
     found: set[str] = set()
     for at, values in enumerate(settings):
+        if command in ("drive", "teleop", "doctor"):  # else no torque, and no row of a direction
+            robot = RobotSpec.model_validate(values.get("robot", {}))
+            values = values | {"robot": stated(robot).model_dump()}
         config = model.model_validate(values).model_copy(deep=True)
         (folder := tmp_path / str(at)).mkdir()
         with recorded(config) as seen, contextlib.redirect_stdout(io.StringIO()):

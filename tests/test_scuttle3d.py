@@ -173,7 +173,9 @@ def test_a_command_beyond_a_right_angle_is_refused_with_its_servo(name: str, ser
 
 def test_a_box_of_26_new_servos_becomes_the_robot() -> None:
     box = Box(ROBOT)
-    assembly = Assembly(ServoSetup(box.opener, ROBOT, 0.1, box.wire.now), (), lambda names: None)
+    assembly = Assembly(
+        ServoSetup(box.opener, ROBOT, 0.1, box.wire.now), (), lambda names: None, id
+    )
     states = assembly.look()
     steps = [(rf"servo of {name} ", lambda name=name: box.plug(name), "") for name in box.servos]
     assembly.run(Script(steps), states)

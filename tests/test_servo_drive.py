@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stated import STATED
 from test_drive_processes import ANTENNATE, twin
 
 import antennate
@@ -36,6 +37,7 @@ def test_a_log_of_the_twin_is_explained_within_a_tick_and_a_period(tmp_path: Pat
     """
     run = tmp_path / "run"
     words = [*documented("drive"), "--no-touch-check", "--duration", "10"]
+    words += STATED
     words += ["--limits.longest-pause", "5", "--limits.repeats", "100"]  # the machine may be busy
     with twin("flat") as (places, _):
         made = subprocess.run(

@@ -82,6 +82,7 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
     assert robot["legs"]["directions"] == [1, 1, 1, 1]
     assert "yaw 2048  legs" in run.stderr
     assert run.stdout.count("direction not measured") == 7
+    assert len(tomllib.loads(text)["zeros"]["missing"]) == 7
 
 
 def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: OrderedTwin) -> None:

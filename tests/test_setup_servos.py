@@ -27,7 +27,7 @@ def setup(box: Box) -> ServoSetup:
 def test_a_box_of_19_new_servos_becomes_a_robot_that_drive_accepts() -> None:
     box = Box()
     kept: list[tuple[str, ...]] = []
-    assembly = Assembly(setup(box), (), kept.append)
+    assembly = Assembly(setup(box), (), kept.append, id)
     states = assembly.look()
     assert {state.state for state in states} == {"to do"}
     person = Script(
@@ -147,7 +147,7 @@ def test_a_robot_at_the_factory_speed_takes_a_new_servo_for_no_joint_of_its() ->
 def test_it_goes_on_where_it_was_left_and_redoes_what_is_asked() -> None:
     box = Box()
     kept: list[tuple[str, ...]] = []
-    assembly = Assembly(setup(box), (), kept.append)
+    assembly = Assembly(setup(box), (), kept.append, id)
     person = Script(
         [
             ("yaw1", lambda: box.plug("yaw1"), ""),
@@ -160,7 +160,7 @@ def test_it_goes_on_where_it_was_left_and_redoes_what_is_asked() -> None:
         assembly.run(person, assembly.look())
     assert kept[-1] == ("yaw1", "yaw3")
     box.plug()
-    later = Assembly(setup(box), kept[-1], kept.append)
+    later = Assembly(setup(box), kept[-1], kept.append, id)
     states = later.look()
     assert [s.joint.name for s in states if s.state == "set up"] == ["yaw1", "yaw3"]
     box.servos["yaw3"] = new_servo(XC430)  # the old one burnt
@@ -176,14 +176,14 @@ def test_servos_that_are_on_the_bus_already_are_seen_by_pinging() -> None:
         setup(box).set_up(joint, ())
     box.servos["yaw2"].set("return_delay_time", 250)
     box.plug("yaw1", "yaw2")
-    states = Assembly(setup(box), (), lambda _: None).look()
+    states = Assembly(setup(box), (), lambda _: None, id).look()
     assert states[0].state == "set up"
     assert (states[1].state, states[1].note) == ("wrong", "return delay time 250 (expected 0)")
 
 
 def test_a_refusal_is_told_and_the_same_joint_asked_for_again() -> None:
     box = Box()
-    assembly = Assembly(setup(box), (), lambda _: None)
+    assembly = Assembly(setup(box), (), lambda _: None, id)
     person = Script(
         [
             ("yaw1", None, ""),
@@ -204,7 +204,7 @@ def test_a_spare_that_was_set_up_as_another_joint_becomes_this_one_if_the_person
     box.plug("yaw2")
     setup(box).set_up(YAW2, ())
     kept: list[tuple[str, ...]] = []
-    assembly = Assembly(setup(box), ("yaw1", "yaw2"), kept.append)
+    assembly = Assembly(setup(box), ("yaw1", "yaw2"), kept.append, id)
     person = Script(
         [
             ("connect the servo of yaw1", None, ""),

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from stated import STATED
 from terminal import Terminal
 
 
@@ -52,6 +53,7 @@ def test_drive_asks_for_the_antennae_and_walks_once_they_were_touched(
             paths = json.loads(twin.stdout.readline())
             ports = ["--esp32", paths["esp32"], "--bus", paths["bus"]]
             more = ["--arm", "--dry-run", "1", "--duration", "1", "--out", str(tmp_path / "run")]
+            more += STATED
             terminal = Terminal(columns)
             drive = terminal.start([*run, "drive", *ports, *more])
             terminal.until(lambda _: False)

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from stated import STATED
 from terminal import read_all
 
 ANTENNATE = [sys.executable, "-m", "antennate"]
@@ -27,6 +28,7 @@ def test_B19_ctrl_c_at_any_time_ends_it_in_order(tmp_path: Path, moment: float) 
         assert twin.stdout is not None
         ports = json.loads(twin.stdout.readline())
         words = ["drive", "--arm", "--no-touch-check", "--dry-run", "0.5", "--duration", "30"]
+        words += STATED
         words += ["--esp32", ports["esp32"], "--bus", ports["bus"], "--out", str(out)]
         ours, theirs = pty.openpty()
         drive = subprocess.Popen(

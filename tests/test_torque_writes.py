@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 
 import pytest
+from stated import stated
 from test_robot_commands_read import RUNS, SHORT, driven
 from test_turns import Walk
 from torque_writes import GOAL, TORQUE, Written, watch
@@ -33,10 +34,11 @@ def of(command: str, folder: Path, patch: pytest.MonkeyPatch) -> list[Written]:
     with pytest.MonkeyPatch.context() as inner, contextlib.redirect_stdout(io.StringIO()):
         seen = watch(inner)
         if command == "drive":
-            driven(inner, DriveConfig(**SHORT, touch_check=False), folder / "run")
+            driven(inner, DriveConfig(**SHORT, touch_check=False, robot=stated()), folder / "run")
         else:
             model, run, settings = RUNS[command]
-            run(inner, model.model_validate(settings[0]), folder)
+            robot = {"robot": stated()} if command == "teleop" else {}
+            run(inner, model.model_validate(settings[0] | robot), folder)
     return seen
 
 

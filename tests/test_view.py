@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Tab, browser
 from PIL import Image
+from stated import STATED
 from view_rig import PATIENCE, Shown, shown
 
 from antennate import simulate
@@ -291,6 +292,7 @@ def test_X23_a_drive_and_its_twin_are_shown(
         walks = request.config.getoption("--pictures")
         words = ["drive", "--no-touch-check", "--out", "run", "--view", "--view-port", "0"]
         words += ["--arm", "--duration", "600"] if walks else ["--dry-run", "600"]
+        words += STATED
         words += ["--esp32", paths["esp32"], "--bus", paths["bus"]]
         with shown(*words, folder=tmp_path) as driven:
             driven_shown(tab, keep, driven)

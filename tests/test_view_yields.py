@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from stated import STATED
 from view_rig import ANTENNATE, PATIENCE, Shown, shown
 
 from antennate.cli import pages
@@ -78,6 +79,7 @@ def test_a_late_loop_gives_its_view_up_once_servos_have_torque(tmp_path: Path, a
         words = ["drive", "--esp32", ports["esp32"], "--bus", ports["bus"], "--view"]
         words += ["--view-port", "0", "--out", "run", "--no-touch-check"]
         words += ["--arm", "--dry-run", "0"] if armed else ["--dry-run", "600"]
+        words += STATED
         with shown(*words, folder=tmp_path) as driven:
             told(driven, "maneuver=FORWARD" if armed else "missed_ticks=")
             driven.process.send_signal(signal.SIGSTOP)
@@ -126,6 +128,7 @@ def test_a_drive_with_a_view_beside_two_busy_programs_ends_in_no_fault(tmp_path:
             assert twin.stdout is not None
             ports = json.loads(twin.stdout.readline())
             words = ["drive", "--esp32", ports["esp32"], "--bus", ports["bus"], "--arm"]
+            words += STATED
             words += ["--dry-run", "1", "--no-touch-check", "--duration", "10", "--out", name]
             with busy(2):
                 done = subprocess.run(

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for
-from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
+from antennate.cli.robot import USUAL, PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.terminal import console, stop_signals, write_result
 from antennate.errors import ConfigError
 from antennate.hardware.config import DoctorConfig, RobotFile
@@ -21,6 +21,7 @@ from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.host import HostClock
+from antennate.hardware.setup.zeros import forgotten
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table
@@ -32,7 +33,7 @@ check, with the cure for what is not good. Torque never comes on. Either port ma
 
 Nothing is written without --fix, which asks before each change of an id, a speed, an
 operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
-_STYLES = {"ok": "green", "warn": "yellow", "bad": "bold red"}
+_STYLES = {"ok": "green", "note": "cyan", "warn": "yellow", "bad": "bold red"}
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
@@ -91,7 +92,8 @@ def _examine(
         if not options.fix or bus is None:
             return checkup, []
         sys.stderr.write("examined; now what can be put right\n")
-        changes = _fix(robot, bus, options.yes, now, checkup)
+        file = options.config or (USUAL if USUAL.exists() and not options.no_config else None)
+        robot, changes = _fix(robot, bus, options.yes, now, checkup, file)
         if changes:
             checkup = examine(robot, bus, esp32, now)
         else:
@@ -105,8 +107,9 @@ def _fix(
     yes: bool,
     now: Callable[[], float],
     checkup: Checkup,
-) -> list[str]:
-    """What was changed, by rounds, as a servo with another id or speed is examined anew."""
+    file: Path | None,
+) -> tuple[DoctorConfig, list[str]]:
+    """The robot after changes, and these; a servo with another id or speed is examined anew."""
     made: list[str] = []
     refused: set[Change] = set()
     for _ in range(_ROUNDS):
@@ -119,17 +122,21 @@ def _fix(
             if not _agreed(change, yes):
                 refused.add(change)
                 continue
+            if change.unmeasured is not None:  # before a servo is changed, as by `setup`
+                zeros = forgotten(robot.robot, robot.zeros, change.unmeasured, file)
+                robot = robot.model_copy(update={"zeros": zeros})
             apply(bus[1], change, now)
             made.append(str(change))
             sys.stderr.write(f"changed, read back: {change}\n")
         checkup = examine(robot, bus, None, now)
-    return made
+    return robot, made
 
 
 def _agreed(change: Change, yes: bool) -> bool:
     if yes:
         return True
-    sys.stderr.write(f"{change}; torque goes off first. Change it? [y/N] ")
+    anew = "" if change.unmeasured is None else "; its zero is to be measured anew"
+    sys.stderr.write(f"{change}{anew}; torque goes off first. Change it? [y/N] ")
     sys.stderr.flush()
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
@@ -149,27 +156,28 @@ def _show(rows: Sequence[Row]) -> None:
         table.add_row(grade, *(Text(one_line(word)) for word in words))
     output.print(table)
     wrong = [row for row in rows if row.grade != "ok"]
-    for row in sorted(wrong, key=lambda row: row.grade == "warn"):
+    for row in sorted(wrong, key=lambda row: ("bad", "warn", "note").index(row.grade)):
         line = Text.assemble(
             (f"{row.grade:<4} ", _STYLES[row.grade]),
             (f"{row.part}: {row.check}: ", "bold"),
             one_line(row.cure),
         )
         output.print(line, soft_wrap=True)
-    bad = sum(row.grade == "bad" for row in wrong)
-    sentence = Text(_sentence(len(rows), bad, len(wrong) - bad))
+    sentence = Text(_sentence([row.grade for row in rows]))
     output.print(sentence, soft_wrap=not output.is_terminal)
 
 
-def _sentence(checks: int, bad: int, warnings: int) -> str:
+def _sentence(grades: Sequence[str]) -> str:
     """What came out, in one sentence."""
+    checks, bad, warnings, notes = len(grades), *map(grades.count, ("bad", "warn", "note"))
+    assumed = f"; numbers assumed: {notes}" if notes else ""
     if bad:
         return (
             f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
         )
     if warnings:
-        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn."
-    return f"The robot may be driven: all {checks} checks are good."
+        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn{assumed}."
+    return f"The robot may be driven: all {checks} checks are good{assumed}."
 
 
 def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -180,8 +188,7 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentence_of(result: Mapping[str, Any]) -> str:
-    grades = [row["grade"] for row in result["rows"]]
-    return _sentence(len(grades), grades.count("bad"), grades.count("warn"))
+    return _sentence([row["grade"] for row in result["rows"]])
 
 
 VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _sentence_of)

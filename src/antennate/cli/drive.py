@@ -29,6 +29,7 @@ from antennate.hardware.driving.report import MANY, Recent
 from antennate.hardware.driving.stopping import Arrival, StopOnce
 from antennate.hardware.driving.teleop import Gamepad, KeyController
 from antennate.hardware.host import HostClock, urgent
+from antennate.hardware.joints import zeros_lack
 from antennate.hardware.safety.session import Session
 from antennate.messages import typed
 from antennate.robots.spec import require_antennae
@@ -95,7 +96,10 @@ def command(argv: Sequence[str]) -> int:
     return _walk(VIEW, config, options, argv)
 
 
-def _require_ports(options: DriveOptions) -> None:
+def _require_robot(config: DriveConfig, options: DriveOptions) -> None:
+    """Refuse to arm a robot whose zeros are not known, and ports that are none."""
+    if options.arm and (lack := zeros_lack(config.robot, config.zeros)):
+        raise ConfigError(f"--arm: {lack}")
     for name in ("esp32", "bus"):
         if not getattr(options, name):
             raise ConfigError(f"--{name}: expected a serial port, found none{at_hand(options)}")
@@ -118,7 +122,7 @@ def _walk(
         argv: The words of the command.
         controller: Makes the controller once the session is there; None for the one that is named.
     """
-    _require_ports(options)
+    _require_robot(config, options)
     given, config = config, config.calibrated()
     key = key_of(options)
     with (
@@ -235,6 +239,7 @@ def _carry_out(
     operator = dataclasses.replace(operator, watches=lambda: feed.watched)
     with feed, urgent() as priority:
         report = drive(session, config, options.arm, keep, operator)
+    report.refusal = report.refusal or session.unfit
     logs = [file.name for file in parts(log) if file.exists()]
     complete = feed.complete and bool(logs)
     why = feed.failure or ("" if complete else f"{log} is not there any more")
@@ -290,7 +295,7 @@ def teleop(argv: Sequence[str]) -> int:
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
         )
     require_antennae(config.robot, "teleop")
-    _require_ports(options)
+    _require_robot(config, options)
     with _keys(options.gamepad, config.teleop.gamepad_silence) as keys:
 
         def controller(session: Session, calibrated: DriveConfig) -> KeyController:

@@ -25,13 +25,14 @@ from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.stopping import StopOnce
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.host import HostClock
+from antennate.hardware.joints import unmeasured
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_PERIOD
 from antennate.hardware.setup.jog import Jog, JogState
 from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port, ports_like
 from antennate.hardware.setup.robot_toml import change, require_changeable
-from antennate.hardware.setup.servos import Assembly, JointState, ServoSetup, joints_of
-from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
+from antennate.hardware.setup.servos import Assembly, Joint, JointState, ServoSetup, joints_of
+from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, forgotten, measured
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.measures import Table
@@ -132,10 +133,18 @@ def _servos(
     person: TerminalPerson, config: SetupConfig, options: SetupOptions, path: Path, bus: str
 ) -> int:
     robot = config.robot
-    ids = by_group(robot, "ids", robot.ids)
+    ids, zeros = by_group(robot, "ids", robot.ids), config.zeros
     servos = ServoSetup(opener_of(bus, "--bus"), robot, config.setup.scan, HostClock().now)
+
+    def forget(joint: Joint) -> None:
+        nonlocal zeros
+        zeros = forgotten(robot, zeros, joint.servo, path)
+
     assembly = Assembly(
-        servos, config.setup.done, lambda done: change(path, {**ids, ("setup", "done"): done})
+        servos,
+        config.setup.done,
+        lambda done: change(path, {**ids, ("setup", "done"): done}),
+        forget,
     )
     states = assembly.look()
     _show_servos(states)
@@ -209,8 +218,8 @@ def zero(argv: Sequence[str]) -> int:
 
 def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, path: Path) -> int:
     robot, clock = config.robot, HostClock()
-    present = by_group(robot, "zeros", robot.zeros)
-    require_changeable(path, present | by_group(robot, "directions", robot.directions))
+    unknown = {*robot.unstated("directions"), *config.zeros.missing}
+    require_changeable(path, measured(robot, robot.zeros, robot.directions, ()))
     with master(opener_of(options.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
         if left := torque.disable(bus, robot.ids):
@@ -222,23 +231,24 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
             person.say(str(horn))
         keep = options.keep_directions
         directions = list(robot.directions) if keep else zeroing.directions(person)
-    change(path, by_group(robot, "zeros", zeros) | by_group(robot, "directions", directions))
+    missing = [name for name in robot.joint_names if name in unknown - zeroing.measured]
+    change(path, measured(robot, zeros, directions, missing))
     person.close()
     _show_zeros(robot, zeros, directions, zeroing.measured)
     named = () if path == USUAL else ("--config", str(path))
-    sys.stderr.write(f"{path} is written. Next: {typed('doctor', *named)}\n")
+    sys.stderr.write(f"{path} is written. Next: {typed('zero' if missing else 'doctor', *named)}\n")
     return OK
 
 
 def _show_zeros(
-    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], measured: Collection[str]
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], moved: Collection[str]
 ) -> None:
     before = zip(robot.zeros, robot.directions, strict=True)
     after = zip(zeros, directions, strict=True)
     rows: list[tuple[str, list[str]]] = []
     for name, (old, sense), (zero, sign) in zip(robot.joint_names, before, after, strict=True):
         note = "reversed" if sign != sense else ""
-        note = note if name in measured else "direction not measured"
+        note = note if name in moved else "direction not measured"
         rows.append((name, [str(zero), f"{zero - old:+d}", f"{sign:+d}", note]))
     print_table(Table("Joints", ["zero", "change", "direction", "note"], rows, ""))
 
@@ -290,7 +300,12 @@ def _one_joint(
     What became of the torque is written in any case, above the error if there is one.
     """
     status, last, left = StatusLine(), "q", list[int]()
-    joint = Jog(bus, config.robot, joints_of(config.robot)[at], config.jog)
+    robot, one = config.robot, joints_of(config.robot)[at]
+    known = one.name not in unmeasured(robot, config.zeros)
+    if not known:
+        way = f"at most {math.degrees(config.jog.reach):.0f} deg from where it stands, + adds ticks"
+        write(f"{one.name}: its zero or direction is not measured: {way}\n")
+    joint = Jog(bus, robot, one, config.jog, known)
     try:
         last = _move(joint, config.jog.speed, keys, clock, status)
     except KeyboardInterrupt:

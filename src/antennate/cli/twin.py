@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
+import tomlkit
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import as_typed
@@ -28,7 +29,10 @@ from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
 from antennate.hardware.host import LEVEL, urgent
 from antennate.hardware.ports.finder import read_key
+from antennate.hardware.setup.robot_toml import edited
+from antennate.hardware.setup.zeros import measured
 from antennate.params.base import changes, paths_of
+from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.telemetry import FilmView
 from antennate.telemetry.twin_log import TwinLog
@@ -122,6 +126,9 @@ class Places(RobotFileOptions, RecordOptions, PageOptions):
     passed: Path | None = option(
         None, "make this file when the head passes the exit, for `drive --until FILE`", "FILE"
     )
+    robot_toml: Path | None = option(
+        None, "write the robot's file, with ports, zeros and directions, for `--config`", "FILE"
+    )
     pace: Literal["real", "lockstep"] = option(
         "real", "real time, or a control period with each sync write of all goals"
     )
@@ -161,6 +168,8 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
         TwinServer(robot, faults, *_endpoints(places, robot), orders) as server,
     ):
         _watch(robot, passage, faults, recording, places.passed)
+        if places.robot_toml is not None:
+            _write_robot(places.robot_toml, config.robot, server.paths)
         if page is not None:
             recording.watchers.append(_shown(page, robot, config))
         recording.begin(passage, config)
@@ -173,6 +182,23 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
             _say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
     return OK
+
+
+_HEAD = "# Written by `antennate twin`, whose robot this is; it writes it anew.\n"
+
+
+def _write_robot(path: Path, robot: RobotSpec, paths: dict[str, str]) -> None:
+    """Write what a builder measures on a robot and the twin knows of its own."""
+    if path.exists() and not path.read_bytes().startswith(_HEAD.encode()):
+        raise ConfigError(
+            f"--robot-toml: expected no file yet, or one of a twin, found another in {path}; "
+            "name another file"
+        )
+    own = robot.model_dump(mode="json", exclude_defaults=True)
+    known = {("ports", name): port for name, port in paths.items()}
+    known |= measured(robot, robot.zeros, robot.directions, ())
+    text = edited(_HEAD + tomlkit.dumps({"robot": own}), known)
+    write_whole(path, text.encode(), overwrite=True)
 
 
 def _watch(

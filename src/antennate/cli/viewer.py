@@ -310,12 +310,14 @@ def _sentence(result: Mapping[str, Any]) -> str:
     lasted = result.get("worst_s")  # results of older versions have none
     worst = f"worst state {state}{f' for {lasted:.1f} s' if lasted else ''}{why}"
     torque, ended = _torque(result), f"ended by {result['ended']}"
-    if result["refusal"]:
-        more = f"; {worst}" if result["why"] and result["why"] not in result["refusal"] else ""
-        return f"The robot was not armed: {result['refusal']}{more}; {torque}."
+    refusal = result["refusal"]
+    if refusal and result["armed"]:
+        more = f"; {worst}" if result["why"] and result["why"] not in refusal else ""
+        return f"The robot was not armed: {refusal}{more}; {torque}."
     if not result["armed"]:
         dry = "A dry run: nothing was written to the servos"
-        return f"{dry}, {worst}; {ended}; --arm lets the robot walk."
+        arm = f"--arm is refused: {refusal}" if refusal else "--arm lets the robot walk"
+        return f"{dry}, {worst}; {ended}; {arm}."
     if _idle(result):
         return f"The robot never walked, no command was sent; {worst}; {ended}; {torque}."
     sent = f"{result['commands_sent']} commands of `{result['controller']}` were sent"

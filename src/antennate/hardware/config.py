@@ -33,6 +33,7 @@ from antennate.params.hardware import (
     RecordParams,
     SetupParams,
     TeleopParams,
+    ZerosParams,
 )
 from antennate.params.safety import DriftParams, SupervisorParams, TouchCheckParams
 from antennate.robots.imu import ImuParams
@@ -62,6 +63,7 @@ class RobotConfig(Params):
     )
     """The same of the right antenna, where it has its own."""
     robot: RobotSpec = RobotSpec()
+    zeros: ZerosParams = ZerosParams()
     control: ControlParams = ControlParams()
     limits: SupervisorParams = SupervisorParams()
     network: NetworkParams = NetworkParams()
@@ -141,7 +143,7 @@ _EXAMINED = (
     "control.rule.threshold",
     *(
         f"limits.{name}"
-        for name in ("rate", "rate_error", "hum_time", "supply_warn", "supply_hold")
+        for name in ("rate", "rate_error", "hum_time", "supply_warn", "supply_hold", "supply_off")
     ),
 )
 """What the doctor looks at of control and supervisor."""
@@ -152,7 +154,6 @@ class DoctorConfig(RobotConfig):
 
     unread: ClassVar[tuple[str, ...]] = (
         *SIMULATION_ALONE,
-        *(f"robot.{name}.directions" for name in ("yaw", "legs", "antennae", "pitch", "elevation")),
         "robot.release",
         *(path for path in paths_of(ControlParams, "control") if path not in _EXAMINED),
         *(path for path in paths_of(SupervisorParams, "limits") if path not in _EXAMINED),
@@ -183,7 +184,7 @@ class DoctorConfig(RobotConfig):
 class DriveConfig(RobotConfig):
     """The robot, its controller, and how long it runs."""
 
-    unread: ClassVar[tuple[str, ...]] = UNDRIVEN
+    unread: ClassVar[tuple[str, ...]] = (*UNDRIVEN, "zeros.measured")
 
     controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
     """Open, timed, paper, closed, closed-1, geometric, follow, centre, schedule, zigzag, random,
@@ -241,9 +242,8 @@ class DriveConfig(RobotConfig):
         return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot)
 
 
-_UNREAD = tuple(
-    dict.fromkeys((*SIMULATION_ALONE, "robot.release", *paths_of(ImuParams, "robot.imu")))
-)
+_IMU = paths_of(ImuParams, "robot.imu")
+_UNREAD = tuple(dict.fromkeys((*SIMULATION_ALONE, "robot.release", "zeros.measured", *_IMU)))
 
 
 class SetupConfig(Params):
@@ -256,6 +256,7 @@ class SetupConfig(Params):
         *(f"setup.{name}" for name in ("hold", "still", "turn", "horn_teeth")),
     )
     robot: RobotSpec = RobotSpec()
+    zeros: ZerosParams = ZerosParams()
     setup: SetupParams = SetupParams()
 
 
@@ -274,6 +275,7 @@ class JogConfig(Params):
     shared: ClassVar[bool] = True
     unread: ClassVar[tuple[str, ...]] = _UNREAD
     robot: RobotSpec = RobotSpec()
+    zeros: ZerosParams = ZerosParams()
     jog: JogParams = JogParams()
 
 
@@ -287,7 +289,7 @@ class TeleopConfig(DriveConfig):
     """The configuration of `drive`, and the numbers of teleoperation; `controller` is not used."""
 
     unread: ClassVar[tuple[str, ...]] = (
-        *UNDRIVEN,
+        *DriveConfig.unread,
         "controller",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.{path}" for path in UNREAD[TELEOP]),
@@ -331,15 +333,15 @@ class RobotFile(DriveConfig):
 
     def for_setup(self) -> SetupConfig:
         """What `antennate setup` takes: the robot, and its own table."""
-        return SetupConfig(robot=self.robot, setup=self.setup)
+        return SetupConfig(robot=self.robot, zeros=self.zeros, setup=self.setup)
 
     def for_zero(self) -> ZeroConfig:
         """What `antennate setup zero` takes: the same."""
-        return ZeroConfig(robot=self.robot, setup=self.setup)
+        return ZeroConfig(robot=self.robot, zeros=self.zeros, setup=self.setup)
 
     def for_jog(self) -> JogConfig:
         """What `antennate setup jog` takes: the robot, and its own table."""
-        return JogConfig(robot=self.robot, jog=self.jog)
+        return JogConfig(robot=self.robot, zeros=self.zeros, jog=self.jog)
 
     def _part(self, model: type[_Config]) -> _Config:
         return model(**{name: getattr(self, name) for name in model.model_fields})

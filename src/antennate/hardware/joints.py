@@ -25,6 +25,8 @@ from antennate.dxl.model import (
 )
 from antennate.dxl.models import MODELS_BY_NUMBER
 from antennate.errors import AntennateError
+from antennate.messages import typed
+from antennate.params.hardware import ZerosParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Ints, JointCommand
 
@@ -121,6 +123,22 @@ def _position_limits(robot: RobotSpec) -> tuple[dict[int, Setting], dict[int, Se
             low[servo] = Setting(0, max(round(zero - reach), 0), 0)
             high[servo] = Setting(min(round(zero + reach), last), last, last)
     return low, high
+
+
+def unmeasured(robot: RobotSpec, zeros: ZerosParams) -> tuple[str, ...]:
+    """Names of the joints whose zero or direction was neither measured nor stated."""
+    return tuple(dict.fromkeys((*robot.unstated("zeros", "directions"), *zeros.missing)))
+
+
+def zeros_lack(robot: RobotSpec, zeros: ZerosParams) -> str:
+    """Why the robot must not walk, in words: zeros or directions are not known; else empty."""
+    if not (names := unmeasured(robot, zeros)):
+        return ""
+    which = f" of {', '.join(names)}" if len(names) < len(robot.ids) else ""
+    return (
+        f"expected measured zeros and directions of all joints, found none{which}; "
+        f"`{typed('zero')}` measures them"
+    )
 
 
 class CommandError(AntennateError):

@@ -53,6 +53,15 @@ class SetupParams(Params):
     """Places in which a horn can be put on its shaft."""
 
 
+class ZerosParams(Params):
+    """What is known of zeros and directions beside their values under `robot`."""
+
+    measured: str = number("", "1", "assumed: not known; kept by `antennate setup zero`")
+    """Date on which they were measured."""
+    missing: tuple[str, ...] = number((), "1", "assumed: none; kept by `antennate setup`")
+    """Joints of which they are not known: another servo, or a direction that was not measured."""
+
+
 class JogParams(Params):
     """How a single joint is moved by keys."""
 
@@ -64,6 +73,10 @@ class JogParams(Params):
         0.3, "1", "assumed: enough for an unloaded joint, not for a finger", gt=0.05, le=1
     )
     """Share of the full drive."""
+    reach: float = number(
+        0.35, "rad", "assumed: 20 degrees, seen by the eye and short of most stops", gt=0, le=1.6
+    )
+    """Way from where a joint stands, either way, while its zero or direction is not measured."""
 
 
 class TeleopParams(Params):

@@ -270,6 +270,15 @@ class RobotSpec(Params):
         """Position of each joint at the angle 0 [ticks]."""
         return tuple(z for _, group, n in self.groups for z in group.zeros or (STRAIGHT,) * n)
 
+    def unstated(self, *lists: str) -> tuple[str, ...]:
+        """Names of the joints of groups that lack one of these lists: ids, directions, zeros."""
+        return tuple(
+            name
+            for group, params, _ in self.groups
+            if not all(getattr(params, what) for what in lists)
+            for name in self.joint_names[self.places(group)]
+        )
+
     @property
     def clear_bend(self) -> float:
         """Largest angle of a yaw joint at which neighbouring legs stay apart [rad].

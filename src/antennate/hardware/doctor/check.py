@@ -17,7 +17,7 @@ from antennate.hardware.ports.finder import finder
 from antennate.params.hardware import DoctorParams, NetworkParams
 from antennate.port import Port
 
-Grade = Literal["ok", "warn", "bad"]
+Grade = Literal["ok", "note", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]
 """Opens a port at a number of bits per second for as long as the context lasts; PortError."""
 Item = TypeVar("Item")
@@ -28,8 +28,9 @@ class Row:
     """The result of one check.
 
     Attributes:
-        part: "bus" or "esp32".
-        grade: "ok"; "warn", the robot may walk but not well; "bad", it must not.
+        part: "robot", "bus" or "esp32".
+        grade: "ok"; "note", a number is assumed; "warn", the robot may walk but not well; "bad",
+            it must not.
         cure: What to do, empty if all is well.
     """
 
@@ -55,7 +56,7 @@ class Finding(NamedTuple):
 
 
 def worst(grades: Iterable[Grade]) -> Grade:
-    """The worst grade; "ok" of none."""
+    """The worst grade; "ok" of none, and of notes."""
     seen = set(grades)
     return "bad" if "bad" in seen else "warn" if "warn" in seen else "ok"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor import board as board_checks
-from antennate.hardware.doctor import bus_checks
+from antennate.hardware.doctor import bus_checks, knowledge
 from antennate.hardware.doctor.board import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
 from antennate.hardware.doctor.check import Grade, Opener, Row, latency_row, port_row, worst
@@ -70,6 +70,7 @@ def examine(
         for finding, check, expected in board_checks.findings(survey, config):
             yield finding.row("esp32", check, expected)
 
+    checkup.rows += knowledge.rows(config, bus is not None, esp32 is not None)
     if bus is not None:
         checkup.rows += _rows("bus", *bus, config.robot.baud, bus_rows)
     if esp32 is not None:

@@ -22,11 +22,8 @@ from antennate.robots.spec import RobotSpec
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)
 """Registers after whose change a servo is found elsewhere."""
-_AFTER = {
-    "drive_mode": "see that its sign in robot.*.directions is right",
-    "homing_offset": "measure its place in robot.*.zeros anew",
-}
-"""What a person has to do after a change, by register."""
+_UNMEASURED = (*_MOVED, "drive_mode", "homing_offset")
+"""Registers after whose change a zero and a direction measured before need not hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +41,13 @@ class Change:
         values: tuple[object, object] = self.before, self.after
         if self.register == _BAUD:
             values = BAUD_RATES[self.before], BAUD_RATES[self.after]
-        text = f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
-        return f"{text}; {_AFTER[self.register]}" if self.register in _AFTER else text
+        return f"servo {self.servo} (at {self.baud}): {name} {values[0]} -> {values[1]}"
+
+    @property
+    def unmeasured(self) -> int | None:
+        """Id of the servo whose zero and direction are not known after it, None if they are."""
+        servo = self.after if self.register == _ID else self.servo
+        return servo if self.register in _UNMEASURED else None
 
 
 def plan(survey: BusSurvey, robot: RobotSpec) -> list[Change]:

@@ -23,7 +23,7 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
 from antennate.hardware.host import HostClock
-from antennate.hardware.joints import Joints, settings, wrong_settings
+from antennate.hardware.joints import Joints, settings, wrong_settings, zeros_lack
 from antennate.hardware.ports.finder import Reconnecting, finder
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
@@ -88,6 +88,8 @@ def connect(
 ) -> Iterator[Session]:
     """Open both ports, identify board and servos, and close the ports afterwards.
 
+    Without measured zeros and directions the session has no torque.
+
     Args:
         config: The robot.
         esp32: Address of the antenna board, as `finder` takes it.
@@ -110,7 +112,9 @@ def connect(
             )
             for flag, address, baud in ports
         )
-        yield prepare(config, board, servos, HostClock(), bus, controller)
+        session = prepare(config, board, servos, HostClock(), bus, controller)
+        session.unfit = zeros_lack(config.robot, config.zeros)
+        yield session
 
 
 def prepare(

@@ -186,7 +186,8 @@ class Report:
             unless no command follows it. If torque never came on, HOLD if data are missing at the
             end, unless it ended before the first ones could be there.
         why: The causes of the longest time in that state, an operator's key that was let go last.
-        refusal: Why torque did not come on although it was wanted, empty if nothing forbade it.
+        refusal: Why torque did not come on although it was wanted, or would not after a dry run;
+            empty if nothing forbade it.
         on: Servos that did not confirm that their torque is off; None if it never was on.
         held: What was to be held when torque went off, in words; empty if nothing was.
         ended: What ended it.

@@ -9,10 +9,11 @@ of that in every tick: the state, and with it torque. `session` carries the deci
 `hardware.actuators.Actuators`, whose only means to write torque and goals is `torque`.
 
 Torque comes on by an arm event (`drive --arm`, after a dry run that reads everything and moves
-nothing) against which no cause speaks; by nothing else while the robot walks. All servos get it, or
-none. A leg that forgets its turns (after a restart its servo counts from the nearest one) gets back
-what was taken from it for that. `setup jog` gives torque to one joint, slow and weak, without a
-supervisor: a person is there.
+nothing) against which no cause speaks; by nothing else while the robot walks. A zero or a direction
+that nobody has measured speaks against it (`Session.unfit`). All servos get it, or none. A leg that
+forgets its turns (after a restart its servo counts from the nearest one) gets back what was taken
+from it for that. `setup jog` gives torque to one joint, slow and weak, without a supervisor: a
+person is there.
 
 Torque goes off, by a packet whose effect is read back,
 

@@ -74,6 +74,8 @@ class Session:
         touched: Whether anything was written to the actuators.
         approaching: Whether the joints are on their way to the first command since torque came on.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
+        unfit: What of the robot's own description speaks against torque, in words; set by
+            `connect`, empty if nothing does.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class Session:
         self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
         self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
+        self.unfit = ""
 
     @property
     def mute(self) -> bool:
@@ -216,6 +219,7 @@ class Session:
 
     def _inputs(self, now: float) -> Inputs:
         clock, state, control = self.board.clock, self.actuators.state, self.control
+        objections = (self.unfit, *self.quality.objections)
         return Inputs(
             age=clock.age(now),
             valid=self.reader.used,
@@ -242,7 +246,7 @@ class Session:
             modes=state.modes,
             drift=self.quality.drifted,
             imu="" if self.imu is None else self.imu.fault,
-            objections=() if self.actuators.enabled else self.quality.objections,
+            objections=() if self.actuators.enabled else tuple(filter(None, objections)),
             unrecorded=self.unrecorded,
             arm=self.orders.arm,
             stop=self.orders.stop,

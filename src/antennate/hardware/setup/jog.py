@@ -62,16 +62,19 @@ class Jog:
         robot: The robot, for modes, zeros, directions and limits.
         joint: The joint.
         params: How slowly, how strong, how far.
+        measured: Whether zero and direction are known; else angles count from where it stands.
     """
 
-    def __init__(self, bus: Bus, robot: RobotSpec, joint: Joint, params: JogParams) -> None:
+    def __init__(
+        self, bus: Bus, robot: RobotSpec, joint: Joint, params: JogParams, measured: bool
+    ) -> None:
         at = robot.joint_names.index(joint.name)
         self.joint, self._bus, self._params = joint, bus, params
         self._table = MODELS_BY_NUMBER[joint.model]
         self._rules = settings_of(settings(robot), joint.servo)
         self._sign, self._limit = robot.directions[at], robot.limits[at]
         self._zero, self._lost = float(robot.zeros[at]), 0
-        self._full = 0
+        self._full, self._measured = 0, measured
         self._newest = JogState(0.0, 0.0, 0, 0)
 
     def begin(self) -> None:
@@ -94,7 +97,10 @@ class Jog:
         torque.limit_speed(bus, {servo: max(1, round(self._params.speed / VELOCITY_UNIT))})
         torque.limit_pwm(bus, {servo: max(1, round(self._params.pwm * self._full))})
         stands = torque.enable(bus, [servo])[servo]
-        if math.isinf(self._limit):  # a leg counts its turns from where it stands
+        if not self._measured:
+            reach = min(self._params.reach, self._limit)
+            self._zero, self._sign, self._limit = float(stands), 1, reach
+        elif math.isinf(self._limit):  # a leg counts its turns from where it stands
             self._zero += TICKS_A_TURN * round((stands - self._zero) / TICKS_A_TURN)
         angle = self._angle(stands)
         self._newest = JogState(angle, angle, stands, 0)

@@ -242,14 +242,17 @@ class Assembly:
         servos: What sets them up.
         done: Names of the joints that were done before.
         keep: Called with all that is done after each.
+        forget: Called with a joint that may get another servo, whose zero nobody knows.
 
     Attributes:
         done: Names of the joints that are done, in the order of the robot.
     """
 
-    def __init__(self, servos: ServoSetup, done: Iterable[str], keep: Keep) -> None:
+    def __init__(
+        self, servos: ServoSetup, done: Iterable[str], keep: Keep, forget: Callable[[Joint], object]
+    ) -> None:
         known = set(done)
-        self._servos, self._keep = servos, keep
+        self._servos, self._keep, self._forget = servos, keep, forget
         self.done = [joint.name for joint in servos.joints if joint.name in known]
 
     def look(self) -> list[JointState]:
@@ -287,6 +290,7 @@ class Assembly:
     def _one(self, person: Person, joint: Joint, where: str) -> None:
         """One joint, until it is done or left out."""
         while confirm(person, f"{where}: connect the servo of {joint} alone"):
+            self._forget(joint)  # before a servo is changed, and the program may end
             try:
                 changes = self._set_up(person, joint)
             except (SetupError, BringUpError, PortError) as error:
@@ -312,6 +316,7 @@ class Assembly:
                 raise SetupError(f"nothing was changed; connect the servo of {joint}") from None
             person.say(f"  {other} is not set up, until a servo answers as that of {other}")
             self.done.remove(other)
+            self._forget(error.owner)
             self._keep(tuple(self.done))
             return self._servos.set_up(joint, self.done)
 

@@ -8,8 +8,10 @@ its positive sense. Nothing here moves anything.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +21,8 @@ from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
 from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
-from antennate.params.hardware import SetupParams
+from antennate.hardware.setup.robot_toml import change
+from antennate.params.hardware import SetupParams, ZerosParams
 from antennate.robots.joints import QUARTER, STRAIGHT
 from antennate.robots.spec import GroupName, RobotSpec
 from antennate.types import Ints
@@ -264,3 +267,27 @@ def by_group(
         for name, _, count in robot.groups
         if count
     }
+
+
+def measured(
+    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], missing: Sequence[str]
+) -> dict[tuple[str, ...], Any]:
+    """Keys of a robot's file that say where its joints are, from today on."""
+    return {
+        **by_group(robot, "ids", robot.ids),
+        **by_group(robot, "zeros", zeros),
+        **by_group(robot, "directions", directions),
+        ("zeros", "measured"): time.strftime("%Y-%m-%d"),
+        ("zeros", "missing"): missing,
+    }
+
+
+def forgotten(robot: RobotSpec, zeros: ZerosParams, servo: int, file: Path | None) -> ZerosParams:
+    """What is known once another servo has this id, kept in the robot's file if there is one."""
+    joint = robot.joint_names[robot.ids.index(servo)]
+    if joint in (*zeros.missing, *robot.unstated("zeros")):
+        return zeros
+    missing = (*zeros.missing, joint)
+    if file is not None:
+        change(file, {("zeros", "missing"): missing})
+    return zeros.model_copy(update={"missing": missing})
