@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -287,6 +288,31 @@ def test_the_command_beside_a_claim_runs_just_that(name: str, quick: bool) -> No
     told = experiments.load(name).config
     parsed, _ = parse(name, "", told, words[len(asked) :], Options)
     assert parsed == told.model_validate(reproduce.settings(name, config))
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_parts_count_by_their_work(quick: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tunnels take 86 of 141 s of one core with `quick`: half of them done is no half of nine."""
+    steps: list[tuple[int, int]] = []
+    ends: dict[str, int] = {}
+    load = experiments.load
+
+    def stub(name: str) -> Any:
+        def run(config: Any, workers: Any, step: Any, row: Any) -> Any:
+            step(1, 2)
+            ends[name] = steps[-1][0]
+            return SimpleNamespace(result=dict)
+
+        return SimpleNamespace(config=load(name).config, run=run)
+
+    monkeypatch.setattr(experiments, "load", stub)
+    monkeypatch.setattr(reproduce, "CLAIMS", ())
+    EXPERIMENT.run(ReproduceConfig(quick=quick), 1, lambda *s: steps.append(s), lambda row: None)
+    done = [at for at, _ in steps]
+    assert done == sorted(done)
+    assert steps[-1] == (100, 100)
+    assert ends["wall"] < 45  # all but some walls and the tunnels
+    assert 55 <= ends["tunnel"] <= 75
 
 
 def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -> None:

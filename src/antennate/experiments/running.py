@@ -181,7 +181,7 @@ def run(
 def names_of(
     experiment: Experiment[Any, Any], config: Params, figures: bool = True, films: int | None = None
 ) -> list[str]:
-    """Names of what a run writes at its end, as far as they are known before: files, figures, films.
+    """Names of files, figures and films that a run writes at its end, as far as they are known.
 
     Args:
         experiment: The experiment.

@@ -58,9 +58,12 @@ FULL: Mapping[str, Mapping[str, Any]] = {
     "tunnel": {"trials": 100},
 }
 """Its settings otherwise: its defaults, and more tunnels."""
+_WORK = {"calibrate": 2, "force": 1, "touch": 4, "sweep": 28, "gait": 3, "wall": 16, "tunnel": 86}
+"""Processor time of each experiment with `quick` [s]: what a bar counts; of others at most 1."""
+_MORE = {"force": 8, "touch": 22, "sweep": 5, "gait": 3, "wall": 3, "tunnel": 10}
+"""How many times as long it takes without."""
 _WITHOUT_CHANCE = {"gait"}
 """Takes a seed only for draws of what is not known, and draws nothing here."""
-_PARTS = 100
 _LOOK = {
     "reproduced": "good",
     "conditional": "fair",
@@ -152,12 +155,13 @@ def run(
         AntennateError: An experiment failed.
     """
     judged: list[tuple[Claim, Finding]] = []
-    names = list(QUICK)
-    for i, name in enumerate(names):
+    work = {n: _WORK.get(n, 1) * (1 if config.quick else _MORE.get(n, 1)) for n in QUICK}
+    before = 0
+    for name, own in work.items():
         experiment = experiments.load(name)
 
-        def step(done: int, total: int, before: int = _PARTS * i) -> None:
-            on_step(before + _PARTS * done // total, _PARTS * len(names))
+        def step(done: int, total: int, before: int = before, own: int = own) -> None:
+            on_step(100 * (before + own * done // total) // sum(work.values()), 100)
 
         configured = experiment.config.model_validate(settings(name, config))
         try:
@@ -167,6 +171,7 @@ def run(
         if result.get("interrupted"):
             return ReproduceOutcome(config, tuple(judged), interrupted=True)
         step(1, 1)
+        before += own
         new = [(claim, claim.judge(result)) for claim in CLAIMS if claim.experiment == name]
         judged += new
         for row in ReproduceOutcome(config, tuple(new), interrupted=False).rows:
@@ -306,5 +311,5 @@ EXPERIMENT = Experiment.of_folder(
     figures=figures,
     body=body,
     captions={claim.name: claim.claim for claim in CLAIMS},
-    parts="parts of 9 experiments",
+    parts="% of 9 experiments",
 )
