@@ -210,6 +210,36 @@ class Scribbles(Around):
         return command
 
 
+class ScribblesLate(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        frame.t[frame.t > 90.0] = 0.0
+        return command
+
+
+class ScribblesAtLast(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        frame.positions[:] *= float(self.ticks < 2000)
+        return command
+
+
+class Rebinds(Around):
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        object.__setattr__(frame, "t", frame.t + 1.0)
+        return command
+
+
+class CountsFromItsStart(Around):
+    start = 0.37
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        t = frame.t
+        t -= self.start
+        return super().step(frame)
+
+
 class KeepsBuffer(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         command = super().step(frame)
@@ -250,7 +280,11 @@ BROKEN = {
     WalksBlind: "expected HOLD while an antenna reads nan",
     CreepsBlind: "expected joint targets that stand still in HOLD, found leg moves",
     KnowsBlind: "expected UNKNOWN for a reading of nan",
-    Scribbles: "expected a frame that is left as it is",
+    Scribbles: "expected a frame that is left as it is, found another counts .*; change a copy",
+    ScribblesLate: "a frame that is left as it is, found another t after a step at 120.00 s",
+    ScribblesAtLast: "that is left as it is, found another positions after a step at 360[0-9]",
+    Rebinds: "expected a frame that is left as it is, found another t after",
+    CountsFromItsStart: "expected a frame that is left as it is, found another t after",
     KeepsBuffer: "expected a command that stays as it was returned",
     TrustsItsCommand: "when a command that was returned is changed",
 }

@@ -601,7 +601,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     for changed, rows, said, code in [
         (text, 8, "8 of 8 rows repeat; 0 differ", 0),
         (cell.replace(",timeout,", ",success,", 1), 2, "1 of 2 rows repeat; 1 differ, 1", 2),
-        (cell.replace("timeout,0.3,", "timeout,0.4,", 1), 2, "1 differ, 0 of them", 2),
+        (cell.replace("timeout,0.3,", "timeout,0.2,", 1), 2, "1 differ, 0 of them", 2),
     ]:
         file.write_text(changed)
         assert main(["compete", "--check", str(file), *one, "--out", "again"]) == code
@@ -660,6 +660,10 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         (
             "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,1.0,0.0\n",
             "line 2: limit_s: expected a finite number above 0, found 0",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,43.0,8.0\n",
+            "line 2: time_s: expected a number of 0 to limit_s, 8, found 43",
         ),
     ],
 )

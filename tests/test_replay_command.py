@@ -26,7 +26,7 @@ from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import ReplayRobot, recorded_controller, replay
 from antennate.telemetry.writer import LogWriter
-from antennate.types import Contact, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 TICKS = 200
 
@@ -315,16 +315,24 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     assert [panel.get_title(loc="left") for panel in of_twin.axes] == ["Readings"]
 
 
-def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(log: Path) -> None:
-    """As a session does: the second command was refused, and the third tick kept the first."""
+@pytest.mark.parametrize("fresh", [True, False])
+def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(
+    log: Path, fresh: bool
+) -> None:
+    """As a session does: the second command was refused, and the third tick kept the first.
+
+    Also where a controller returns the same arrays each time, and writes into its frame.
+    """
 
     class Turning:
         maneuver, contact = np.zeros(1, int), np.zeros((1, 2), int)
-        yaw = 0.0
+        yaw = np.zeros((1, 5))
 
-        def step(self, frame: object) -> JointCommand:
+        def step(self, frame: AntennaFrame) -> JointCommand:
             self.yaw += 0.1
-            return JointCommand(np.full((1, 5), self.yaw), np.zeros((1, 6, 2)), np.zeros((1, 2)))
+            frame.t[:] = frame.counts[:] = 0.0
+            yaw = self.yaw.copy() if fresh else self.yaw
+            return JointCommand(yaw, np.zeros((1, 6, 2)), np.zeros((1, 2)))
 
     with LogReader(log) as reader:
         first, second, third, *_ = reader

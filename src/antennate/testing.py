@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from antennate.control.gait import targets
-from antennate.control.loop import CheckedController
+from antennate.control.loop import CheckedController, Wrapped
 from antennate.control.registry import ControllerFactory, make_controller
 from antennate.errors import AntennateError, raised
 from antennate.params.control import ConditioningParams, ControlParams
@@ -30,6 +30,8 @@ _ROWS = 5
 _TICKS = 700
 _RESET_AT = 350
 """Tick in which one row is reset while the others go on."""
+_LEAPS = (0.0, 120.0, 3600.0)
+"""Times from which readings are given [s]."""
 _BLIND_FROM, _BLIND_TO = 400, 420
 """Ticks in which a row reads NaN."""
 
@@ -65,8 +67,8 @@ def check_controller(
     again. Rows do not influence one another, whatever their order and number. A row that is reset
     answers as a new controller, and the others go on. A reading that is not finite makes its
     antenna UNKNOWN and its row HOLD, with joint targets that stand still. Frames are left as they
-    are. A command that was returned does not change later, and changing it does not change later
-    answers.
+    are, in 700 steps from 0 s on and in as many from 2 and from 60 minutes on. A command that was
+    returned does not change later, and changing it does not change later answers.
 
     Args:
         factory: The controller: its name, a class, or a function (control, robot, batch).
@@ -91,6 +93,7 @@ def check_controller(
         alone.expect_same(f"row {row} alone to answer as in a batch", together, [0], [row])
     _check_reset(run, together)
     _check_blind(run, together)
+    run.trace(np.concatenate([counts] * len(_LEAPS)), rows)
 
 
 class _Runs:
@@ -113,14 +116,15 @@ class _Runs:
     ) -> _Trace:
         """Answers to counts (ticks, rows, 2) from tick `first` on; row `reset` is reset then.
 
-        Time and phase of a row depend on its number in `rows`. With `spoil` each command is
-        overwritten after it was noted.
+        Time and phase of a row depend on its number in `rows`; after _TICKS time leaps to the next
+        of _LEAPS. With `spoil` each command is overwritten after it was noted.
         """
         batch, period = len(rows), self._control.period
         offsets = 0.37 * np.array(rows, float)
         try:
             controller = make_controller(self._factory, self._control, self._robot, batch)
-            checked = CheckedController(controller, self._robot, batch)
+            watched = _Watched(controller)
+            checked = CheckedController(watched, self._robot, batch)
             checked.reset(np.arange(batch), offsets)
             commands: list[JointCommand] = []
             copies_of: list[list[Floats]] = []
@@ -129,9 +133,9 @@ class _Runs:
             for tick, reading in enumerate(counts[first:], first):
                 if tick == _RESET_AT and reset is not None:
                     checked.reset(np.array([reset]), offsets[[reset]])
-                t = offsets + period * tick
+                t = offsets + period * (tick % _TICKS) + _LEAPS[tick // _TICKS]
                 frame = AntennaFrame(t, reading, self._positions(t), *self._motion(t))
-                commands.append(_step(checked, frame))
+                commands.append(_step(checked, watched, frame))
                 copies_of.append([getattr(commands[-1], part).copy() for part in self._parts])
                 for part in self._parts if spoil else ():
                     getattr(commands[-1], part)[...] = math.nan
@@ -169,15 +173,27 @@ class _Runs:
         return turning * [0.0, 0.0, 1.0], np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
 
 
-def _step(checked: CheckedController, given: AntennaFrame) -> JointCommand:
-    frame = given.copy()
-    command = checked.step(frame)
-    pairs = [(getattr(given, part.name), getattr(frame, part.name)) for part in fields(given)]
-    same = all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
-    _expect(same, "a frame that is left as it is", "other values in it after a step")
+class _Watched(Wrapped):
+    """A controller whose last command is kept as it gave it, and what it wrote into its frame."""
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        before = frame.copy()
+        self.command = super().step(frame)
+        self.written = [
+            part.name
+            for part in fields(before)
+            if not np.array_equal(*(getattr(f, part.name) for f in (before, frame)), equal_nan=True)
+        ]
+        return self.command
+
+
+def _step(checked: CheckedController, watched: _Watched, frame: AntennaFrame) -> JointCommand:
+    checked.step(frame)
+    found = f"another {' and '.join(watched.written)} after a step at {frame.t[0]:.2f} s"
+    _expect(not watched.written, "a frame that is left as it is", f"{found}; change a copy")
     for row, fault in checked.faults.items():
         raise AssertionError(f"{fault} in row {row}")
-    return command
+    return watched.command
 
 
 def _check_values(trace: _Trace) -> None:

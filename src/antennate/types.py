@@ -22,7 +22,6 @@ SIDES = ("l", "r")
 LEFT, RIGHT = 0, 1
 SIDE_SIGN = (1.0, -1.0)
 """Sign of the lateral (y) coordinate on each side; y points to the robot's left."""
-_EMPTY = np.zeros((0, 0))
 
 
 class Contact(IntEnum):
@@ -68,9 +67,9 @@ class AntennaFrame:
 
     t: Floats
     counts: Floats
-    positions: Floats = field(default_factory=lambda: _EMPTY)
-    angular_velocity: Floats = field(default_factory=lambda: _EMPTY)
-    linear_acceleration: Floats = field(default_factory=lambda: _EMPTY)
+    positions: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    angular_velocity: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    linear_acceleration: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def copy(self) -> AntennaFrame:
         """The same in arrays of its own."""
@@ -95,8 +94,8 @@ class JointCommand:
     yaw: Floats
     leg: Floats
     antenna: Floats
-    pitch: Floats = field(default_factory=lambda: _EMPTY)
-    elevation: Floats = field(default_factory=lambda: _EMPTY)
+    pitch: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    elevation: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def joint_angles(command: JointCommand, parts: Iterable[str], batch: int = 1) -> Floats:

@@ -1,7 +1,7 @@
 """The control loop of all robots: read, decide, write, wait for the next tick.
 
-What stands between robot and controller: a check of every answer, since a controller may be
-anybody's code, and new numbers for a controller that runs.
+What stands between robot and controller: copies of what either gives and a check of every answer,
+since a controller may be anybody's code, and new numbers for a controller that runs.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -54,7 +55,7 @@ def run_loop(
 
     Args:
         body: The robot.
-        control: The controller.
+        control: The controller; it is given a copy of each frame.
         period: Control period [s].
         go_on: Called after each write with what was read and written; False ends the loop.
 
@@ -65,7 +66,7 @@ def run_loop(
     ticks = due = 0
     while True:
         frame = body.read()
-        command = control.step(frame)
+        command = control.step(frame.copy())
         body.write(command)
         ticks += 1
         if not go_on(frame, command):
@@ -102,6 +103,9 @@ def _errors_of(what: str) -> Iterator[None]:
 class CheckedController:
     """A controller, and what is wrong with its last step.
 
+    It is given a copy of each frame, and its answers are copied: what it writes into either, at
+    once or later, changes nothing here. Who judges or logs it reads the copies.
+
     An exception, an array of another shape or a decision that is no integer affects all rows and
     raises `ControllerError`. An angle that is not finite, an infinite level, or a number that is no
     `Maneuver` or `Contact`, affects one row and is listed in `faults`.
@@ -112,7 +116,7 @@ class CheckedController:
         batch: Number of robots B.
 
     Attributes:
-        maneuver: `Maneuver` of the last step, shape (B,).
+        maneuver, contact, level: Of the last step, as of a `Controller`.
         faults: What is wrong with a row of the last step, by row.
     """
 
@@ -121,7 +125,14 @@ class CheckedController:
         self._shapes = robot.command_shapes(batch)
         self._attributes = {"maneuver": (batch,), "contact": (batch, 2), "level": (batch, 2)}
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
+        self.contact: Ints = np.full((batch, 2), int(Contact.UNKNOWN))
+        self.level: Floats = np.full((batch, 2), np.nan)
         self.faults: dict[int, str] = {}
+
+    @property
+    def phase(self) -> Any:
+        """What the controller tells as its gait phase [rad], None if it tells none."""
+        return getattr(self._controller, "phase", None)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Start some rows anew.
@@ -130,7 +141,7 @@ class CheckedController:
             ControllerError: The controller raised an exception.
         """
         with _errors_of("reset"):
-            self._controller.reset(rows, phase)
+            self._controller.reset(copy(rows), copy(phase))
 
     def know(self, knowledge: Knowledge) -> None:
         """Give it what a simulation knows, if it can use any.
@@ -150,11 +161,10 @@ class CheckedController:
         """
         self.faults = {}
         try:
-            command = self._controller.step(frame)
+            command = self._controller.step(frame.copy())
             if command is None:  # pyright: ignore[reportUnnecessaryComparison] `return` forgotten
                 raise ControllerError("expected a JointCommand from step, found None")
-            self._require_shapes(command)
-            self.maneuver = self._controller.maneuver
+            command = self._take(command)
             sound = self._all_sound(command)
         except ControllerError:
             raise
@@ -166,9 +176,10 @@ class CheckedController:
             self._find_faults(command)
         return command
 
-    def _require_shapes(self, command: JointCommand) -> None:
-        """Arrays of the right shapes."""
-        for owner, shapes in ((command, self._shapes), (self._controller, self._attributes)):
+    def _take(self, answer: JointCommand) -> JointCommand:
+        """Copy a command and the decision behind it: arrays of the right shapes."""
+        own: dict[str, Any] = {}
+        for owner, shapes in ((answer, self._shapes), (self._controller, self._attributes)):
             for name, shape in shapes.items():
                 value = getattr(owner, name)
                 if not isinstance(value, np.ndarray):
@@ -177,21 +188,24 @@ class CheckedController:
                     )
                 if value.shape != shape:
                     raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
+                own[name] = np.array(value)
+        command = JointCommand(**{name: own[name] for name in self._shapes})
         for name in self._shapes:
-            if (kind := getattr(command, name).dtype).kind not in "fiu":
+            if (kind := own[name].dtype).kind not in "fiu":
                 raise ControllerError(f"expected real numbers as {name}, found an array of {kind}")
         for name, words, kinds in _KINDS:
-            kind = getattr(self._controller, name).dtype
-            if kind.kind not in kinds:
+            if (kind := own[name].dtype).kind not in kinds:
                 raise ControllerError(f"expected {words} as {name}, found an array of {kind}")
+            setattr(self, name, own[name])
+        return command
 
     def _all_sound(self, command: JointCommand) -> bool:
         """Whether no row has a fault. A product that is finite has finite factors."""
-        maneuvers, contacts = self.maneuver.tolist(), self._controller.contact.ravel().tolist()
+        maneuvers, contacts = self.maneuver.tolist(), self.contact.ravel().tolist()
         angles = [getattr(command, name) for name in self._shapes]
         squares = sum(float(np.vdot(a, a)) for a in angles)
         known = min(contacts) >= 0 and max(contacts) <= _MOST_CONTACT
-        known = known and not np.isinf(self._controller.level).any()
+        known = known and not np.isinf(self.level).any()
         return known and math.isfinite(squares) and min(maneuvers) >= 0 and max(maneuvers) <= _LAST
 
     def _find_faults(self, command: JointCommand) -> None:
@@ -203,12 +217,11 @@ class CheckedController:
                 )
         for row in np.flatnonzero((self.maneuver < 0) | (self.maneuver > _LAST)):
             self.faults[int(row)] = f"expected a maneuver of 0 to 4, found {self.maneuver[row]}"
-        contact = self._controller.contact
-        for row in np.flatnonzero(((contact < 0) | (contact > _MOST_CONTACT)).any(axis=1)):
-            self.faults[int(row)] = f"expected contacts of 0 to 2, found {contact[row]}"
-        level = self._controller.level
-        for row in np.flatnonzero(np.isinf(level).any(axis=1)):
-            self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {level[row]}"
+        wrong = (self.contact < 0) | (self.contact > _MOST_CONTACT)
+        for row in np.flatnonzero(wrong.any(axis=1)):
+            self.faults[int(row)] = f"expected contacts of 0 to 2, found {self.contact[row]}"
+        for row in np.flatnonzero(np.isinf(self.level).any(axis=1)):
+            self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {self.level[row]}"
 
 
 class Wrapped:

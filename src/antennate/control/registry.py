@@ -147,8 +147,9 @@ def make_controller(
     checks.instance("control", control, ControlParams)
     checks.instance("robot", robot, RobotSpec)
     batch = checks.whole("batch", batch, least=1)
+    own = control.model_copy(deep=True), robot.model_copy(deep=True)  # which it may spoil
     try:
-        controller = factory(control, robot, batch)
+        controller = factory(*own, batch)
     except (KeyboardInterrupt, MissingPackageError):
         raise
     except ConfigError as error:

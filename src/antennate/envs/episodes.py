@@ -28,6 +28,7 @@ from antennate.sim.trial import (
     Outcome,
     Trial,
     draw_trial,
+    in_time,
     mishap,
     progress_of,
     require_room,
@@ -245,7 +246,7 @@ class Episodes:
                 continue
             looks = late[row] or not self._count[row] % LOOK_EVERY
             outcome, reason = self._look(row, episode) if looks else (None, "")
-            if outcome is None and (late[row] or (whole and episode.decisions == most)):
+            if outcome is None and whole and episode.decisions == most:
                 outcome = "timeout"
             if outcome is not None:
                 self._end(row, truth, outcome, reason)
@@ -260,7 +261,8 @@ class Episodes:
         except SceneError as error:
             return "invalid", str(error)
         outcome = outcome or mishap(episode.scene, world)
-        return outcome or ("overturned" if world.overturned else None), ""
+        outcome = outcome or ("overturned" if world.overturned else None)
+        return in_time(outcome, float(self._t[row]), float(self._limits[row])), ""
 
     def _end(self, row: int, truth: Truth, outcome: Outcome, reason: str) -> None:
         """Note how the episode of a row ended, and empty the row."""

@@ -319,6 +319,28 @@ class Judge:
         return self._crossings > 0
 
 
+def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
+    """How a trial ends at time t [s], of which a look says this; None if it goes on.
+
+    At its limit [s] it ends as `late`, and so does what is seen after it; a table has whole µs.
+    """
+    if outcome is not None:
+        return outcome if round(t, 6) <= limit else late
+    return late if t >= limit else None
+
+
+def require_times(time: float, limit: float) -> None:
+    """Check that a row can have this time and this time limit [s].
+
+    Raises:
+        ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.
+    """
+    if not 0.0 < limit < math.inf:
+        raise ValueError(f"limit_s: expected a finite number above 0, found {limit:g}")
+    if not 0.0 <= time <= limit:
+        raise ValueError(f"time_s: expected a number of 0 to limit_s, {limit:g}, found {time:g}")
+
+
 def has_fallen(links: Floats, ground: float) -> bool:
     """Whether the centre of any link is lower than the ground at the start by more than FALL.
 

@@ -23,6 +23,7 @@ from antennate.sim.trial import (
     Trial,
     TrialConfig,
     draw_trial,
+    in_time,
     mishap,
     require_own_curves,
     require_room,
@@ -148,9 +149,9 @@ class _Walk:
         time_limit: float,
     ) -> None:
         self._robot, self._start, self._time_limit = robot, start, time_limit
-        self.recorder = TimeSeriesRecorder(controller, lambda: start.world.head[:2])
         self.checked = CheckedController(controller, spec, 1)
-        self.decisions = Decisions(spec, controller)
+        self.recorder = TimeSeriesRecorder(self.checked, lambda: start.world.head[:2])
+        self.decisions = Decisions(spec, self.checked)
         self.log: SimulatedLog | None = None
         self.outcome = "timeout"
         self._ticks, self._judge = 0, Judge(start.scene)
@@ -163,9 +164,12 @@ class _Walk:
         if self.log is not None:
             self.log.take(self.decisions.take(frame, command))
         self._ticks += 1
-        self.outcome = "invalid" if self._robot.failures else "timeout"
-        if self.outcome == "timeout" and self._ticks % LOOK_EVERY == 0:
-            world, scene = self._start.world, self._start.scene
-            ended = self._judge.look(world.head[:2]) or mishap(scene, world)
-            self.outcome = ended or "timeout"
-        return self.outcome == "timeout" and self._start.world.t < self._time_limit
+        if self._robot.failures:
+            self.outcome = "invalid"
+            return False
+        world, limit, ended = self._start.world, self._time_limit, None
+        if world.t >= limit or self._ticks % LOOK_EVERY == 0:
+            seen = self._judge.look(world.head[:2]) or mishap(self._start.scene, world)
+            ended = in_time(seen, world.t, limit)
+        self.outcome = ended or "timeout"
+        return ended is None

@@ -160,6 +160,9 @@ class _Guarded:
             self.decision = decision_of(self._controller)
             if wrong := _wrong(command, self._robot):
                 self._note(wrong)
+            else:
+                parts = self._robot.command_shapes()
+                command = JointCommand(**{n: np.array(getattr(command, n)) for n in parts})
             if self._refused <= refused:
                 self._kept = command
             return command

@@ -9,7 +9,7 @@ from antennate.experiments.climb.config import CLIFF, LEVEL, Cell
 from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.sensing import Verdict
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import Judge, has_fallen
+from antennate.sim.trial import Judge, has_fallen, in_time
 from antennate.sim.world import World
 from antennate.types import Floats
 
@@ -61,17 +61,20 @@ class Criterion:
             links: Places of its links [m], shape (L, 3).
             verdict: What it feels.
         """
+        late = "timeout"
         if world.overturned:
-            return "overturned"
-        if self._cell.part == "ground":
+            ended = "overturned"
+        elif self._cell.part == "ground":
+            late = "walked" if self._cell.scene == FLAT else late
             ended = self._on_ground(world, links, verdict)
         elif has_left(links):
             ended = "left"
         elif self._cell.part == "climbing":
             ended = self._over(links)
         else:
+            late = "felt" if self._cell.ground in LEVEL else late
             ended = self._felt(world.t, links, verdict)
-        return ended or ("timeout" if world.t >= self._time_limit else None)
+        return in_time(ended, world.t, self._time_limit, late)
 
     def _over(self, links: Floats) -> str | None:
         scene = self._scene
@@ -81,7 +84,7 @@ class Criterion:
     def _on_ground(self, world: World, links: Floats, verdict: Verdict) -> str | None:
         """Crossed, left, fell or stopped; in a tunnel as its exit says."""
         if self._cell.scene == FLAT:
-            return "walked" if world.t >= self._time_limit else None
+            return None
         if self._cell.scene == "step_tunnel":
             return self._judge.look(world.head[:2])
         if has_left(links):
@@ -97,7 +100,7 @@ class Criterion:
         cell, scene = self._cell, self._scene
         if cell.ground in LEVEL:
             past = links[-1, 0] > scene.length if cell.scene == "rubble" else False
-            return "felt" if past or t >= self._time_limit else None
+            return "felt" if past else None
         if cell.scene == "step_down" and has_fallen(links, scene.ground):
             return "fell"
         if cell.ground == CLIFF:

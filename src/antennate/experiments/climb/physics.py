@@ -15,6 +15,7 @@ from antennate.experiments.climb.config import (
     ClimbConfig,
     cells,
     config_of,
+    limit_of,
     seed_of,
 )
 from antennate.experiments.climb.criterion import Criterion
@@ -48,7 +49,7 @@ class ClimbRow:
         divisor: Gain divisor of the body's servos.
         outcome: success, timeout, overturned, left, fell, stopped (before a drop), felt (the trial
             was there for a verdict, and ended with it), walked (the flat floor) or invalid.
-        time_s: Time to the end [s]; the limit for a timeout.
+        time_s: Time to the end [s], at most the limit.
         climb_time_s: Time from a link pitch before the first edge on [s], None if it never came
             there; `speed_m_s` is how fast the middle of the robot got on in it, or on a flat floor.
         torque_rms_n_m: RMS torque of the pitch motor with the largest one, while it climbs.
@@ -228,7 +229,7 @@ class ClimbMonitor:
         return ClimbRow(
             **_columns(self._config, self._cell, self.trial),
             outcome=outcome,
-            time_s=round(self.time_limit if outcome == "timeout" else world.t, 6),
+            time_s=round(min(self.time_limit, world.t), 6),
             climb_time_s=_rounded(took),
             speed_m_s=_rounded(self._speed(links, took)),
             **({} if self._load is None else self._load.columns()),
@@ -284,8 +285,9 @@ def _columns(config: ClimbConfig, cell: Cell, trial: int) -> dict[str, Any]:
 
 def lost_row(config: ClimbConfig, name: str, trial: int, reason: str) -> ClimbRow:
     """The row of a trial of which there is nothing else."""
-    columns = _columns(config, cells(config)[name], trial)
-    return ClimbRow(**columns, outcome="invalid", time_s=config.time_limit, reason=reason)
+    cell = cells(config)[name]
+    columns, limit = _columns(config, cell, trial), limit_of(config, cell)
+    return ClimbRow(**columns, outcome="invalid", time_s=limit, reason=reason)
 
 
 def carry_out(

@@ -22,6 +22,7 @@ from antennate.jackknife import ENOUGH
 from antennate.messages import nearest
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
+from antennate.sim.trial import require_times
 from antennate.studies.statistics import sign_flips
 
 CLOSE = 5e-7
@@ -107,7 +108,7 @@ def _row(path: Path, number: int, line: dict[str, str]) -> Episode:
 def _require_sound(row: Episode) -> None:
     """Check that there may be such a controller, and that numbers can be such.
 
-    They are finite, the limit is above 0 s, and none that counts is below 0.
+    They are finite, no time is above its limit, and none that counts is below 0.
 
     Raises:
         ConfigError: There is no controller of that name.
@@ -117,10 +118,9 @@ def _require_sound(row: Episode) -> None:
     for name in ("seed", "trial"):
         if not 0 <= (value := getattr(row, name)) <= LARGEST_SEED:
             raise ValueError(f"{name}: expected 0 to {LARGEST_SEED}, found {value}")
-    for name in ("time_s", "limit_s", "progress_m"):
-        if not isfinite(value := getattr(row, name)) or (name == "limit_s" and value <= 0):
-            least = " above 0" if name == "limit_s" else ""
-            raise ValueError(f"{name}: expected a finite number{least}, found {value:g}")
+    require_times(row.time_s, row.limit_s)
+    if not isfinite(row.progress_m):
+        raise ValueError(f"progress_m: expected a finite number, found {row.progress_m:g}")
 
 
 _PLACE = ("version", "engine", "processor")

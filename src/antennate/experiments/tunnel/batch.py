@@ -235,7 +235,7 @@ class _Rows:
             return
         made = self._make(make)
         control = CheckedController(made, config.robot, self._batch)
-        decisions = Decisions(config.robot, made, self._batch)
+        decisions = Decisions(config.robot, control, self._batch)
         nothing = [np.full((1, 2), np.nan)] * self._batch
         readings = make_readings(self._readings, config.control, self._batch, nothing)
         given = Given(control, readings)
@@ -253,7 +253,7 @@ class _Rows:
                     log.take(decided)
             if self._looks is not None:
                 self._look(self._looks, frame, made)
-            for row in self._watch(frame.t, control):
+            for row in self._watch(control):
                 self._reset(row, self._place(row), control, readings, decisions)
             self._inform(control)
             return bool(self._monitors)
@@ -371,8 +371,8 @@ class _Rows:
             log.close()
             log.path.unlink(missing_ok=True)
 
-    def _watch(self, t: Floats, control: CheckedController) -> list[int]:
-        """Watch all rows after a tick at times t [s], shape (B,); those whose trials have ended."""
+    def _watch(self, control: CheckedController) -> list[int]:
+        """Watch all rows after a tick, by the time of each world; those whose trials have ended."""
         maneuvers, ended = control.maneuver, list[int]()
         broken = {row: str(error) for row, error in self._robot.failures.items()} | self._blocked
         self._blocked.clear()
@@ -384,15 +384,15 @@ class _Rows:
             ended.append(row)
         self._maneuvers[self._every, maneuvers] += 1
         self._ticks += 1
-        times, ticks = t.tolist(), self._ticks
         for row, begun in [*self._begun.items()]:
             world = self._robot.world(row)
             self._monitors[row].bend(world)
-            if (ticks - begun) % LOOK_EVERY and times[row] < self._monitors[row].time_limit:
+            t, monitor = world.t, self._monitors[row]
+            if (self._ticks - begun) % LOOK_EVERY and t < monitor.time_limit:
                 continue
             maneuver = maneuvers.item(row)
             try:
-                outcome, reason = self._monitors[row].look(world, times[row], maneuver), ""
+                outcome, reason = monitor.look(world, t, maneuver), ""
             except SceneError as error:
                 outcome, reason = "invalid", str(error)
             if outcome is not None:

@@ -37,7 +37,16 @@ from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
-from antennate.sim.trial import Judge, Outcome, TrialConfig, mishap, progress_of, require_own_curves
+from antennate.sim.trial import (
+    Judge,
+    Outcome,
+    TrialConfig,
+    in_time,
+    mishap,
+    progress_of,
+    require_own_curves,
+    require_times,
+)
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -183,6 +192,9 @@ class TrialResult:
     overturned: bool = False
     reason: str = ""
 
+    def __post_init__(self) -> None:
+        require_times(self.time_s, self.limit_s)
+
 
 @dataclass(frozen=True, slots=True)
 class TrialPath:
@@ -258,9 +270,7 @@ class TrialMonitor:
         progress = progress_of(self.scene, head)
         self._note_progress(progress, t)
         self._note_offset(progress, head)
-        if outcome := self._judge.look(head) or mishap(self.scene, world):
-            return outcome
-        return "timeout" if t >= self.time_limit else None
+        return in_time(self._judge.look(head) or mishap(self.scene, world), t, self.time_limit)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
