@@ -6,7 +6,9 @@ import contextlib
 import io
 import json
 import logging
+import math
 import signal
+import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
@@ -107,6 +109,9 @@ _LOOK = 0.5
 """How often the driver looks for what its jobs have finished [s]."""
 _FAILED_STARTS = 3
 """So many jobs in a row that end before they have begun end the run."""
+_OF_TASKS = ("nodes", "tasks_per_node", "ntasks_per_node")
+_POSITIVE = ("timeout_min", "time", "mem_gb", "cpus_per_task", *_OF_TASKS)
+"""What is asked of SLURM that no job can do without."""
 _NOTE = logging.getLogger(__name__)
 
 
@@ -130,6 +135,9 @@ class Slurm:
     def __init__(self, cluster: str, options: Sequence[str]) -> None:
         require_package("submitit", "slurm", "engine")
         self._cluster, self._options = cluster, dict(_setting(option) for option in options)
+        with tempfile.TemporaryDirectory() as folder:  # what it refuses leaves nothing
+            for warning in self._executor(Path(folder))[1]:
+                _NOTE.warning("--slurm: submitit says: %s", warning.message)
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
@@ -145,10 +153,15 @@ class Slurm:
         except OSError as error:
             raise OutputError(f"expected to write {folder}, found: {error.strerror}") from None
         at_once = max(map(len, parts)) if work.together else 1
-        driver = _Driver(work, folder, self._executor(folder), at_once, emit, fail)
+        driver = _Driver(work, folder, self._executor(folder)[0], at_once, emit, fail)
         driver.run([place for part in parts for place in part], count)
 
-    def _executor(self, folder: Path) -> Any:
+    def _executor(self, folder: Path) -> tuple[Any, list[warnings.WarningMessage]]:
+        """What submits jobs, and what it warns of.
+
+        Raises:
+            WorkerError: It refuses the options, or cannot be used here.
+        """
         import submitit
 
         try:
@@ -163,9 +176,7 @@ class Slurm:
             ) from None
         except (RuntimeError, ValueError, TypeError) as error:
             raise WorkerError(f"slurm: cannot be used: {in_one_line(error)}") from None
-        for warning in caught:
-            _NOTE.warning("--slurm: submitit says: %s", warning.message)
-        return executor
+        return executor, caught
 
 
 @dataclass
@@ -233,9 +244,6 @@ class _Driver:
         except (RuntimeError, OSError) as error:
             text = "; ".join(str(error).replace("sbatch: error: ", "").splitlines())
             raise WorkerError(f"slurm: expected a job to be taken, found: {text}") from None
-        if handle.num_tasks > 1:
-            handle.cancel(check=False)
-            raise WorkerError(f"--slurm: expected jobs of one task, found {handle.num_tasks}")
         return _Job(handle, file, places)
 
     def _take_rows(self, job: _Job) -> None:
@@ -307,7 +315,14 @@ def _setting(text: str) -> tuple[str, Any]:
     name, _, value = text.partition("=")
     if not name.isidentifier() or not value:
         raise ConfigError(f"--slurm: expected NAME=VALUE, found {text}")
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value
+    setting: Any = value
+    with contextlib.suppress(ValueError):
+        setting = json.loads(value)
+    kind = name.removeprefix("slurm_").removeprefix("local_")
+    if kind in _POSITIVE and not (isinstance(setting, str) and kind == "time"):
+        is_number = isinstance(setting, int | float) and not isinstance(setting, bool)
+        if not is_number or not 0 < setting < math.inf:
+            raise ConfigError(f"--slurm: {name}: expected a number above 0, found {value}")
+    if kind in _OF_TASKS and setting != 1:
+        raise ConfigError(f"--slurm: {name}: expected 1, as jobs have one task, found {value}")
+    return name, setting

@@ -8,8 +8,9 @@ import os
 import pickle
 import platform
 import re
+import sys
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -257,7 +258,42 @@ class Here:
             work.part(part).carry_out(emit, fail)
 
 
-def added_objects(dumps: Callable[[Any], bytes] = pickle.dumps) -> Packed:
+def by_value() -> Callable[[Any], bytes] | None:
+    """What packs an object that no worker can import, as one of a prompt, where it is installed."""
+    try:
+        from cloudpickle import dumps
+    except ImportError:
+        return None
+    return dumps
+
+
+def _pack(each: Any) -> bytes:
+    """An object by its name, as workers that import the program find it; one of a prompt whole."""
+    dumps = pickle.dumps if _has_file(each) else by_value()
+    return (dumps or pickle.dumps)(each)
+
+
+def _has_file(each: Any) -> bool:
+    """Whether the module of an object can be imported elsewhere; that of a prompt cannot."""
+    module = sys.modules.get(getattr(each, "__module__", None) or "")
+    spec, file = getattr(module, "__spec__", None), getattr(module, "__file__", None)
+    return module is None or spec is not None or (file is not None and Path(file).is_file())
+
+
+def require_sent(names: Iterable[str]) -> None:
+    """Check that the objects of these names that were added here can be sent to workers.
+
+    Raises:
+        WorkerError: One cannot.
+    """
+    named = set(names)
+    for objects in ADDED.values():
+        for name in sorted(objects.keys() & named):
+            if isinstance(sent := sendable(objects[name]), NotSent):
+                raise WorkerError(f"{name}: {sent.reason}")
+
+
+def added_objects(dumps: Callable[[Any], bytes] = _pack) -> Packed:
     """Objects that were added to registries here, for workers; what cannot be sent says so.
 
     Each is packed apart, so that one that a worker cannot read costs no other.
@@ -296,5 +332,10 @@ def sendable(each: Any) -> Any:
         return NotSent(
             f"expected what can be sent to workers, found {in_one_line(error)}; an object of "
             "your own has to be defined at the top of a module, or run with one worker"
+        )
+    if not _has_file(each) and (each.__module__ != "__main__" or by_value() is None):
+        return NotSent(
+            f"expected what workers can import, found it in {each.__module__} without a file, as "
+            "in a notebook cell or after -c; put it in a file and import that, or use one worker"
         )
     return each
