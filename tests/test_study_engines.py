@@ -291,6 +291,62 @@ def test_a_name_that_submitit_does_not_know_is_one_line(capsys: pytest.CaptureFi
     assert said.endswith("Parameter 'timeout' need to be prefixed by an executor name.")
 
 
+POOL = """
+import sys
+import antennate
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+def half(number): return number / 2
+def trial(config, seed):
+    with ProcessPoolExecutor(1, get_context(config["start"])) as pool:
+        return dict(y=pool.submit(half, seed).result(timeout=60))
+def study(engine):
+    vary = dict(start=["fork", "spawn"])
+    return antennate.study(trial, vary, trials=1, workers=2, engine=engine, out="run")
+if __name__ == "__main__":
+    print(study(sys.argv[1]).rows)
+"""
+
+
+@pytest.mark.parametrize("engine", ["local", "slurm-local"])
+def test_a_trial_of_a_program_may_begin_processes_on_any_engine(engine: str) -> None:
+    """They find by its name what the trial gives them, as in the program."""
+    pytest.importorskip("submitit")
+    Path("program.py").write_text(POOL)
+    _ends_with_ok("program.py", engine)
+
+
+@pytest.mark.slow
+def test_a_trial_of_a_program_may_begin_processes_on_dask() -> None:
+    pytest.importorskip("distributed")
+    Path("program.py").write_text(POOL)
+    with scheduler() as (address, _):
+        _ends_with_ok("program.py", f"dask://{address}")
+
+
+def _ends_with_ok(*words: str) -> None:
+    done = subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout.count("'ok'")) == (0, 2), done.stdout + done.stderr
+
+
+def test_a_program_without_its_guard_is_run_once_by_its_jobs() -> None:
+    pytest.importorskip("submitit")
+    program = POOL.replace('["fork", "spawn"]', '["fork"]').replace("half, seed", "abs, seed")
+    program = program.replace('if __name__ == "__main__":', "if True:")
+    Path("program.py").write_text(program.replace('out="run"', 'out=f"run-{__name__}"'))
+    done = subprocess.run(
+        [sys.executable, "program.py", "slurm-local"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (done.returncode, done.stdout.count("'ok'")) == (0, 1), done.stderr
+    assert not [path.name for path in Path().glob("run-__mp_main__*")]
+
+
 @pytest.mark.parametrize(
     ("asked", "found"),
     [

@@ -25,7 +25,17 @@ from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
 from antennate.studies.store import Store, parsed
 from antennate.studies.submitted import require_same, work_apart
-from antennate.studies.work import Emit, Fail, Failure, Packed, Part, Waiting, Work, added_objects
+from antennate.studies.work import (
+    Emit,
+    Fail,
+    Failure,
+    Packed,
+    Part,
+    Waiting,
+    Work,
+    added_objects,
+    pack_whole,
+)
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
@@ -229,12 +239,10 @@ class _Driver:
                     job.handle.cancel(check=False)
 
     def _submit(self, places: list[int]) -> _Job:
-        from cloudpickle import dumps  # submitit brings it
-
         file = self._folder / f"{time.time_ns()}.jsonl"
         identity = self._work.shared or environment()
         part = self._work.part(places)
-        call = Resumable(str(file), identity, part, added_objects(dumps), self._at_once)
+        call = Resumable(str(file), identity, part, added_objects(pack_whole), self._at_once)
         try:
             file.touch()
             # submitit prints what it raises, and ends jobs of this machine by Ctrl-C, which they
@@ -311,6 +319,11 @@ def _last_words(job: _Job) -> str:
     return shortened(", ".join([job.handle.state, *lines[-1:]]))
 
 
+def _is_above_zero(value: Any) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and 0 < value < math.inf
+
+
 def _setting(text: str) -> tuple[str, Any]:
     name, _, value = text.partition("=")
     if not name.isidentifier() or not value:
@@ -319,10 +332,9 @@ def _setting(text: str) -> tuple[str, Any]:
     with contextlib.suppress(ValueError):
         setting = json.loads(value)
     kind = name.removeprefix("slurm_").removeprefix("local_")
-    if kind in _POSITIVE and not (isinstance(setting, str) and kind == "time"):
-        is_number = isinstance(setting, int | float) and not isinstance(setting, bool)
-        if not is_number or not 0 < setting < math.inf:
-            raise ConfigError(f"--slurm: {name}: expected a number above 0, found {value}")
+    is_text = isinstance(setting, str) and kind == "time"  # as 1-12:00:00
+    if kind in _POSITIVE and not is_text and not _is_above_zero(setting):
+        raise ConfigError(f"--slurm: {name}: expected a number above 0, found {value}")
     if kind in _OF_TASKS and setting != 1:
         raise ConfigError(f"--slurm: {name}: expected 1, as jobs have one task, found {value}")
     return name, setting

@@ -29,7 +29,7 @@ from antennate.studies.work import (
     Waiting,
     Work,
     added_objects,
-    by_value,
+    pack_whole,
     processor,
     take_added,
 )
@@ -70,7 +70,7 @@ class Submitted:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
         theirs = {**(work.shared or environment()), _FOLDER: _folder()}
-        environs = (theirs, added_objects(by_value() or pickle.dumps))
+        environs = (theirs, added_objects(pack_whole))
         try:
             while waiting or running:
                 count = self._workers() if self._workers is not None else count
@@ -176,7 +176,7 @@ class _Carried:
         for number in ignored:
             signal.signal(number, signal.SIG_IGN)
         os.chdir(folder)
-        take_added(added)
+        take_added(added, may_import=True)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run one task, or some together and emit their results."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import operator
 import os
 import pickle
 import platform
@@ -12,6 +13,7 @@ import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from multiprocessing.spawn import prepare
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -267,6 +269,46 @@ def by_value() -> Callable[[Any], bytes] | None:
     return dumps
 
 
+def pack_whole(each: Any) -> bytes:
+    """An object for workers that have not imported the program; with it where its file is."""
+    dumps = by_value() or pickle.dumps
+    path = os.path.abspath(getattr(sys.modules["__main__"], "__file__", None) or "")  # noqa: PTH100
+    if getattr(each, "__module__", None) != "__main__" or not Path(path).is_file():
+        return dumps(each)
+    program = _OfProgram(path, Path(path).read_bytes(), each.__qualname__, dumps(each))
+    return pickle.dumps(program)
+
+
+IMPORTING: list[str] = []
+"""The program that this worker imports now: it may run nothing."""
+
+
+@dataclass(frozen=True)
+class _OfProgram:
+    """An object of the program, which a process of our own imports as those of one machine do.
+
+    So a trial may begin processes that find by name what it gives them.
+    """
+
+    path: str
+    source: bytes
+    name: str
+    content: bytes
+
+    def found(self, may_import: bool) -> Any:
+        """It by name if the same program can be imported here, else a copy."""
+        with contextlib.suppress(Exception, SystemExit):
+            if may_import and Path(self.path).read_bytes() == self.source:
+                IMPORTING.append(self.path)
+                try:
+                    prepare({"init_main_from_path": self.path})
+                finally:
+                    IMPORTING.clear()
+            if getattr(sys.modules["__main__"], "__file__", None) == self.path:
+                return operator.attrgetter(self.name)(sys.modules["__main__"])
+        return pickle.loads(self.content)  # noqa: S301  (the driver wrote it)
+
+
 def _pack(each: Any) -> bytes:
     """An object by its name, as workers that import the program find it; one of a prompt whole."""
     dumps = pickle.dumps if _has_file(each) else by_value()
@@ -307,17 +349,23 @@ def added_objects(dumps: Callable[[Any], bytes] = _pack) -> Packed:
     }
 
 
-def take_added(added: Packed) -> None:
-    """In a worker: know the objects that were added in the driver."""
+def take_added(added: Packed, may_import: bool = False) -> None:
+    """In a worker: know the objects that were added in the driver.
+
+    Args:
+        added: Those objects.
+        may_import: Whether this process may import the driver's program as its own.
+    """
     for group, objects in added.items():
-        objects_read = {name: _read(content) for name, content in objects.items()}
+        objects_read = {name: _read(each, may_import) for name, each in objects.items()}
         ADDED.setdefault(group, {}).update(objects_read)
 
 
-def _read(content: bytes) -> Any:
+def _read(content: bytes, may_import: bool) -> Any:
     """In a worker: an object that was sent, or what says why it cannot be read here."""
     try:
-        return pickle.loads(content)  # noqa: S301  (the driver wrote it)
+        each = pickle.loads(content)  # noqa: S301  (the driver wrote it)
+        return each.found(may_import) if isinstance(each, _OfProgram) else each
     except Exception as error:  # noqa: BLE001  (an object's own module may raise anything)
         return NotSent(
             f"expected an object of your own that workers can import, found {in_one_line(error)}"
