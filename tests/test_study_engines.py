@@ -335,6 +335,10 @@ def test_a_program_without_its_guard_is_run_once_by_its_jobs() -> None:
     pytest.importorskip("submitit")
     program = POOL.replace('["fork", "spawn"]', '["fork"]').replace("half, seed", "abs, seed")
     program = program.replace('if __name__ == "__main__":', "if True:")
+    program = program.replace(
+        "sys.argv[1]", "'local' if __name__ == '__mp_main__' else sys.argv[1]"
+    )
+    program = program.replace("workers=2", "workers=1")
     Path("program.py").write_text(program.replace('out="run"', 'out=f"run-{__name__}"'))
     done = subprocess.run(
         [sys.executable, "program.py", "slurm-local"],
