@@ -194,8 +194,8 @@ def test_ctrl_c_cancels_the_jobs_and_the_same_command_goes_on(study: Study, tabl
 REFUSED = {
     "slurm_partition=nowhere": "invalid partition specified: nowhere",
     "slurm_colour=red": "Unknown argument 'colour' for executor 'slurm'",
-    "timeout_min=soon": 'Parameter "timeout_min" expected type',
-    "tasks_per_node=2": "expected jobs of one task, found 2",
+    "timeout_min=soon": "timeout_min: expected a number above 0, found soon",
+    "tasks_per_node=2": "tasks_per_node: expected 1, as jobs have one task, found 2",
     'slurm_setup=["exit 1"]': "found 3 in a row that ended before: FAILED",
 }
 """What SLURM cannot give, and the reason that is told."""

@@ -97,8 +97,41 @@ def test_a_function_that_workers_cannot_import_costs_no_other_study(
     assert [row["value"] for row in here.rows] == [1.0, 2.0]
     springs = antennate.study("springs", {"coil_mm": [3.5, 4.0]}, workers=2)
     assert springs.summary["statuses"] == {"ok": 2}
-    there = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=2)
-    assert all("workers can import, found " in row["reason"] for row in there.rows), there.rows
+    with pytest.raises(WorkerError, match=r"^own: expected what workers can import.* one worker$"):
+        antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=2, out="there")
+    assert not Path("there").exists()
+
+
+PROMPT = """
+import sys
+if {core}: sys.modules["cloudpickle"] = None  # as where it is not installed
+import antennate
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+def trial(config, seed): return dict(y=seed * config["w"])
+engine = ProcessPoolExecutor(1, get_context("spawn")) if {apart} else "local"
+print(antennate.study(trial, vary=dict(w=[1, 2]), trials=2, workers=2, engine=engine).rows)
+"""
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("core", [False, True])
+def test_a_function_of_a_prompt_is_sent_or_refused_alike_on_any_engine(
+    core: bool, apart: bool
+) -> None:
+    """A cell of a notebook has no file either; cloudpickle sends it whole where it is there."""
+    pytest.importorskip("cloudpickle")
+    words = [sys.executable, "-c", PROMPT.format(core=core, apart=apart)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    if core:
+        assert done.returncode == 1
+        assert done.stderr.splitlines()[-1] == (
+            "antennate.errors.WorkerError: trial: expected what workers can import, found it in "
+            "__main__ without a file, as in a notebook cell or after -c; put it in a file and "
+            "import that, or use one worker"
+        )
+    else:
+        assert (done.returncode, done.stdout.count("'ok'")) == (0, 4), done.stderr
 
 
 def test_what_is_no_function_of_its_own_is_refused() -> None:
@@ -256,6 +289,101 @@ def test_a_name_that_submitit_does_not_know_is_one_line(capsys: pytest.CaptureFi
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert "--slurm: expected names of submitit, such as timeout_min" in said
     assert said.endswith("Parameter 'timeout' need to be prefixed by an executor name.")
+
+
+POOL = """
+import sys
+import antennate
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+def half(number): return number / 2
+def trial(config, seed):
+    with ProcessPoolExecutor(1, get_context(config["start"])) as pool:
+        return dict(y=pool.submit(half, seed).result(timeout=60))
+def study(engine):
+    vary = dict(start=["fork", "spawn"])
+    return antennate.study(trial, vary, trials=1, workers=2, engine=engine, out="run")
+if __name__ == "__main__":
+    print(study(sys.argv[1]).rows)
+"""
+
+
+@pytest.mark.parametrize("engine", ["local", "slurm-local"])
+def test_a_trial_of_a_program_may_begin_processes_on_any_engine(engine: str) -> None:
+    """They find by its name what the trial gives them, as in the program."""
+    pytest.importorskip("submitit")
+    Path("program.py").write_text(POOL)
+    _ends_with_ok("program.py", engine)
+
+
+@pytest.mark.slow
+def test_a_trial_of_a_program_may_begin_processes_on_dask() -> None:
+    pytest.importorskip("distributed")
+    Path("program.py").write_text(POOL)
+    with scheduler() as (address, _):
+        _ends_with_ok("program.py", f"dask://{address}")
+
+
+def _ends_with_ok(*words: str) -> None:
+    done = subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout.count("'ok'")) == (0, 2), done.stdout + done.stderr
+
+
+def test_a_program_without_its_guard_is_run_once_by_its_jobs() -> None:
+    pytest.importorskip("submitit")
+    program = POOL.replace('["fork", "spawn"]', '["fork"]').replace("half, seed", "abs, seed")
+    program = program.replace('if __name__ == "__main__":', "if True:")
+    program = program.replace(
+        "sys.argv[1]", "'local' if __name__ == '__mp_main__' else sys.argv[1]"
+    )
+    program = program.replace("workers=2", "workers=1")
+    Path("program.py").write_text(program.replace('out="run"', 'out=f"run-{__name__}"'))
+    done = subprocess.run(
+        [sys.executable, "program.py", "slurm-local"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (done.returncode, done.stdout.count("'ok'")) == (0, 1), done.stderr
+    assert not [path.name for path in Path().glob("run-__mp_main__*")]
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ("timeout_min=0", "timeout_min: expected a number above 0, found 0"),
+        ("timeout_min=-5", "timeout_min: expected a number above 0, found -5"),
+        ("timeout_min=true", "timeout_min: expected a number above 0, found true"),
+        ("mem_gb=NaN", "mem_gb: expected a number above 0, found NaN"),
+        ("slurm_time=0", "slurm_time: expected a number above 0, found 0"),
+        ("cpus_per_task=many", "cpus_per_task: expected a number above 0, found many"),
+        ("nodes=2", "nodes: expected 1, as jobs have one task, found 2"),
+        ("timeout_min=0.5", "expected names of submitit, such as timeout_min"),
+        ("timeout=5", "expected names of submitit, such as timeout_min"),
+    ],
+)
+def test_limits_that_no_job_can_meet_are_refused_before_the_first(
+    asked: str, found: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("submitit")
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    words = ["--engine", "slurm-local", "--slurm", asked, "--out", "run"]
+    assert main(["study", "plan.toml", *words]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert f"error: --slurm: {found}" in said[0]
+    assert not Path("run").exists()
+
+
+def test_a_folder_in_which_jobs_alone_left_something_can_be_overwritten() -> None:
+    Path("run/slurm").mkdir(parents=True)
+    Path("run/slurm/1_0_log.err").write_text("")
+    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    assert main(["study", "plan.toml", "--out", "run", "--overwrite"]) == 0
+    assert Path("run.old/slurm/1_0_log.err").exists()
 
 
 @contextlib.contextmanager

@@ -14,14 +14,15 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
 from antennate.notebook import from_rows, html
 from antennate.params.base import Params, from_values
-from antennate.studies.engines import LOCAL, make_engine
+from antennate.studies.engines import LOCAL, Device, make_engine
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.identity import environment, identity
+from antennate.studies.identity import environment, identity, texts
 from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import FILMS
+from antennate.studies.work import require_sent
 from antennate.telemetry import FilmView
 
 _PARTS = 100
@@ -156,6 +157,8 @@ def run(
     if video is not None:
         require_films(experiment, config, checks.whole("video", video), out)
     pool = Workers(workers, make_engine(engine), shared=environment(experiment.name, config))
+    if workers > 1 if pool.engine is None else not isinstance(pool.engine, Device):
+        require_sent(texts(config.model_dump(mode="json")))
     if out is None:
         return Result(experiment, config, experiment.run(config, pool, on_step, lambda row: None))
     place = (

@@ -19,6 +19,7 @@ from antennate.errors import OutputError
 from antennate.studies.run_files import (
     FILES,
     FOLDERS,
+    JOBS,
     PARTIAL,
     ROOM,
     add_to_list,
@@ -159,7 +160,7 @@ def _set_aside(place: Path) -> Path:
 
 def _require_renamable(place: Path) -> None:
     """Refuse a folder without a run of ours, or one that cannot have another name."""
-    if listed(place) is None:
+    if listed(place) is None and {path.name for path in place.iterdir()} != {JOBS}:
         first = min((path.name for path in place.iterdir()), default="none")
         raise OutputError(
             f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "

@@ -18,7 +18,7 @@ from antennate.errors import WorkerError
 from antennate.studies.formats import decoded, encoded
 from antennate.studies.processes import Processes
 from antennate.studies.store import Store, key_of
-from antennate.studies.work import Engine, Failure, Here, Work
+from antennate.studies.work import IMPORTING, Engine, Failure, Here, Work
 
 Result = TypeVar("Result")
 TIMEOUT = 3600.0
@@ -214,6 +214,8 @@ def gather(
         KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
     workers = workers_from(workers)
+    if IMPORTING:
+        raise WorkerError(f'{IMPORTING[0]}: expected `if __name__ == "__main__":` around what runs')
     package = function.__module__.partition(".")[0]
     call = _Call(workers, len(tasks), package, on_result, on_step, lost)
     call.resume()

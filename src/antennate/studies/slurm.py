@@ -6,7 +6,9 @@ import contextlib
 import io
 import json
 import logging
+import math
 import signal
+import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
@@ -23,7 +25,17 @@ from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
 from antennate.studies.store import Store, parsed
 from antennate.studies.submitted import require_same, work_apart
-from antennate.studies.work import Emit, Fail, Failure, Packed, Part, Waiting, Work, added_objects
+from antennate.studies.work import (
+    Emit,
+    Fail,
+    Failure,
+    Packed,
+    Part,
+    Waiting,
+    Work,
+    added_objects,
+    pack_whole,
+)
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
@@ -107,6 +119,9 @@ _LOOK = 0.5
 """How often the driver looks for what its jobs have finished [s]."""
 _FAILED_STARTS = 3
 """So many jobs in a row that end before they have begun end the run."""
+_OF_TASKS = ("nodes", "tasks_per_node", "ntasks_per_node")
+_POSITIVE = ("timeout_min", "time", "mem_gb", "cpus_per_task", *_OF_TASKS)
+"""What is asked of SLURM that no job can do without."""
 _NOTE = logging.getLogger(__name__)
 
 
@@ -130,6 +145,9 @@ class Slurm:
     def __init__(self, cluster: str, options: Sequence[str]) -> None:
         require_package("submitit", "slurm", "engine")
         self._cluster, self._options = cluster, dict(_setting(option) for option in options)
+        with tempfile.TemporaryDirectory() as folder:  # what it refuses leaves nothing
+            for warning in self._executor(Path(folder))[1]:
+                _NOTE.warning("--slurm: submitit says: %s", warning.message)
 
     def run(
         self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
@@ -145,10 +163,15 @@ class Slurm:
         except OSError as error:
             raise OutputError(f"expected to write {folder}, found: {error.strerror}") from None
         at_once = max(map(len, parts)) if work.together else 1
-        driver = _Driver(work, folder, self._executor(folder), at_once, emit, fail)
+        driver = _Driver(work, folder, self._executor(folder)[0], at_once, emit, fail)
         driver.run([place for part in parts for place in part], count)
 
-    def _executor(self, folder: Path) -> Any:
+    def _executor(self, folder: Path) -> tuple[Any, list[warnings.WarningMessage]]:
+        """What submits jobs, and what it warns of.
+
+        Raises:
+            WorkerError: It refuses the options, or cannot be used here.
+        """
         import submitit
 
         try:
@@ -163,9 +186,7 @@ class Slurm:
             ) from None
         except (RuntimeError, ValueError, TypeError) as error:
             raise WorkerError(f"slurm: cannot be used: {in_one_line(error)}") from None
-        for warning in caught:
-            _NOTE.warning("--slurm: submitit says: %s", warning.message)
-        return executor
+        return executor, caught
 
 
 @dataclass
@@ -218,12 +239,10 @@ class _Driver:
                     job.handle.cancel(check=False)
 
     def _submit(self, places: list[int]) -> _Job:
-        from cloudpickle import dumps  # submitit brings it
-
         file = self._folder / f"{time.time_ns()}.jsonl"
         identity = self._work.shared or environment()
         part = self._work.part(places)
-        call = Resumable(str(file), identity, part, added_objects(dumps), self._at_once)
+        call = Resumable(str(file), identity, part, added_objects(pack_whole), self._at_once)
         try:
             file.touch()
             # submitit prints what it raises, and ends jobs of this machine by Ctrl-C, which they
@@ -233,9 +252,6 @@ class _Driver:
         except (RuntimeError, OSError) as error:
             text = "; ".join(str(error).replace("sbatch: error: ", "").splitlines())
             raise WorkerError(f"slurm: expected a job to be taken, found: {text}") from None
-        if handle.num_tasks > 1:
-            handle.cancel(check=False)
-            raise WorkerError(f"--slurm: expected jobs of one task, found {handle.num_tasks}")
         return _Job(handle, file, places)
 
     def _take_rows(self, job: _Job) -> None:
@@ -303,11 +319,22 @@ def _last_words(job: _Job) -> str:
     return shortened(", ".join([job.handle.state, *lines[-1:]]))
 
 
+def _is_above_zero(value: Any) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and 0 < value < math.inf
+
+
 def _setting(text: str) -> tuple[str, Any]:
     name, _, value = text.partition("=")
     if not name.isidentifier() or not value:
         raise ConfigError(f"--slurm: expected NAME=VALUE, found {text}")
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value
+    setting: Any = value
+    with contextlib.suppress(ValueError):
+        setting = json.loads(value)
+    kind = name.removeprefix("slurm_").removeprefix("local_")
+    is_text = isinstance(setting, str) and kind == "time"  # as 1-12:00:00
+    if kind in _POSITIVE and not is_text and not _is_above_zero(setting):
+        raise ConfigError(f"--slurm: {name}: expected a number above 0, found {value}")
+    if kind in _OF_TASKS and setting != 1:
+        raise ConfigError(f"--slurm: {name}: expected 1, as jobs have one task, found {value}")
+    return name, setting

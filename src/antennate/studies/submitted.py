@@ -29,6 +29,7 @@ from antennate.studies.work import (
     Waiting,
     Work,
     added_objects,
+    pack_whole,
     processor,
     take_added,
 )
@@ -69,7 +70,7 @@ class Submitted:
         """Run the tasks at these places; see `Engine`."""
         waiting, running = Waiting(parts), dict[Any, list[int]]()
         theirs = {**(work.shared or environment()), _FOLDER: _folder()}
-        environs = (theirs, added_objects(_by_value()))
+        environs = (theirs, added_objects(pack_whole))
         try:
             while waiting or running:
                 count = self._workers() if self._workers is not None else count
@@ -115,15 +116,6 @@ class Submitted:
                 work.saw(answer)
             else:
                 (fail if isinstance(answer, Failure) else emit)(place, answer)
-
-
-def _by_value() -> Callable[[Any], bytes]:
-    """What packs an object typed at a prompt too, where the engine brings it."""
-    try:
-        from cloudpickle import dumps
-    except ImportError:
-        return pickle.dumps
-    return dumps
 
 
 def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
@@ -184,7 +176,7 @@ class _Carried:
         for number in ignored:
             signal.signal(number, signal.SIG_IGN)
         os.chdir(folder)
-        take_added(added)
+        take_added(added, may_import=True)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run one task, or some together and emit their results."""
