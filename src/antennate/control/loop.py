@@ -170,11 +170,10 @@ class CheckedController:
         """Arrays of the right shapes."""
         for owner, shapes in ((command, self._shapes), (self._controller, self._attributes)):
             for name, shape in shapes.items():
-                value = getattr(owner, name)
+                value = getattr(owner, name, None)
                 if not isinstance(value, np.ndarray):
-                    raise ControllerError(
-                        f"expected an array as {name}, found {type(value).__name__}"
-                    )
+                    found = "none" if value is None else type(value).__name__
+                    raise ControllerError(f"expected an array as {name}, found {found}")
                 if value.shape != shape:
                     raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
         for name in self._shapes:
