@@ -90,6 +90,17 @@ class NoArray(Around):
         return command
 
 
+class NoLevel(Plain):
+    def __init__(self, control: Any, robot: Any, batch: int) -> None:
+        super().__init__(control, robot, batch)
+        del self.level
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        command = super().step(frame)
+        del self.level
+        return command
+
+
 class ObjectLevel(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         command = super().step(frame)
@@ -263,6 +274,7 @@ BROKEN = {
     ForOneOnly: "IndexError.*with 5 rows",
     FewJoints: r"expected yaw of shape \(5, 5\), found \(5, 2\)",
     NoArray: "expected an array as level, found list",
+    NoLevel: "expected an array as level, found none",
     ObjectLevel: "expected real numbers as level, found an array of object",
     NoManeuver: "expected a maneuver of 0 to 4, found 7",
     FloatManeuver: "expected whole numbers as maneuver, found an array of float64",

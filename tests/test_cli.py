@@ -121,7 +121,7 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     ("command", "flags"),
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
-        ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm"),
+        ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm --until"),
         ("bench wall", "--trials --seed --profiles --solver --out"),
     ],
 )

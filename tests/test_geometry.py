@@ -10,6 +10,7 @@ from antennate.cli import main
 from antennate.experiments.gait.optimise import optimise
 from antennate.experiments.gait.physics import rolling_speed
 from antennate.experiments.geometry import experiment
+from antennate.experiments.geometry.figure import leads
 from antennate.experiments.geometry.physics import (
     LARGEST_OFFSET,
     LEAST_AMPLITUDE,
@@ -151,3 +152,18 @@ def test_gaits_by_name_stay_within_the_joints():
     limit = RobotSpec().yaw_limit
     for name in ("serpenoid", "swift", "thrifty"):
         assert GaitParams.model_validate(GAITS[name]).amplitude <= limit
+
+
+@pytest.mark.parametrize("numbers", [(1.0,), (1.0, 1.5)])
+def test_each_name_in_the_legend_of_the_leads_has_something_drawn(numbers):
+    lead = {"law_deg": 80.0, "model_deg": 82.0, "engine_deg": 85.0}
+    drawn = leads([{"wave_number": number, **lead} for number in numbers])
+    (panel,) = drawn.axes
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == [
+        "law of stiff servos",
+        "model",
+        "engine",
+    ]
+    for line in panel.lines:
+        is_line = len(numbers) > 1 and line.get_linestyle() not in ("None", "")
+        assert is_line or line.get_marker() not in ("", "None", None), line.get_label()

@@ -67,6 +67,28 @@ def test_info_tells_the_first_and_the_last_events(
     assert "... 30 more events; --json has all" in said
 
 
+def test_info_of_a_good_drive_says_first_how_it_ended_and_calls_nothing_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    states = ["OFF; OFF NOT_ARMED: not armed yet; FAULT BOARD: gone; HOLD STALE: old", "HOLD"]
+    states += ["OK after HOLD", "HOLD after OK; HOLD STALE: old", "OK after HOLD"]
+    with LogWriter(tmp_path / "log.mcap", HEADER) as log:
+        for number, text in enumerate(states):
+            log.write(replace(tick(number), now=1.0 * number, state="", causes=()))
+            log.event(text)
+    assert main(["log", "info", str(tmp_path / "log.mcap")]) == 0
+    said = capsys.readouterr().out
+    told = [line.strip() for line in said.splitlines() if re.search(r"\d s (O|H)", line)]
+    times = [re.search(r"[\d.]+ s", line)[0] for line in told]  # type: ignore[index]
+    assert times[0] == times[-1]
+    assert [re.sub(r"[\d.]+ s ", "", line) for line in told] == [
+        "At the end: OK after HOLD",
+        "before it could walk, OFF; NOT_ARMED: not armed yet; BOARD: gone; STALE: old",
+        "before it could walk, HOLD",
+        *states[2:],
+    ]
+
+
 def test_info_says_what_there_is(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "info", str(log), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

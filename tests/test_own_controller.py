@@ -424,3 +424,29 @@ def test_the_reason_of_a_failure_names_the_line_of_the_user(tmp_path: Path) -> N
 def test_a_sensor_longer_than_its_antenna_is_refused() -> None:
     with pytest.raises(ValueError, match=r"at most the length of 0\.14 m, found 0\.5 m"):
         AntennaSpec.model_validate({"length": 0.14, "sensor": {"active_length": 0.5}})
+
+
+@pytest.mark.parametrize("part", ["reset", "step", "turn_offset"])
+def test_a_rule_that_lacks_a_part_is_told_so_before_anything_runs(
+    part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parts = {
+        "reset": "def reset(self, rows): pass",
+        "step": "def step(self, t, level, contact, flex): return np.zeros(len(t), int)",
+        "turn_offset": "turn_offset = 0.5",
+    }
+    del parts[part]
+    path = tmp_path / f"lacks_{part}.py"
+    path.write_text(
+        "import numpy as np\nfrom antennate.control.controllers import RuleController\n\n"
+        "class Lame:\n" + "".join(f"    {text}\n" for text in parts.values()) + "\n"
+        "def lame(control, robot, batch):\n"
+        "    return RuleController(Lame(), control, robot, batch)\n"
+    )
+    told = rf"expected a rule with reset, step and turn_offset, .* found Lame without {part}$"
+    with pytest.raises(ConfigError, match=told):
+        make_controller(f"{path}:lame")
+    words = ["tunnel", "--trials", "1", "--time-limit", "0.1", "--controllers", f"{path}:lame"]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"found Lame without {part}" in line

@@ -128,3 +128,16 @@ def test_what_is_written_is_read(first: dict, then: dict) -> None:
         for part in key:
             found = found[part]
         assert found == value
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["plain", "byte order mark"])
+def test_a_file_of_an_editor_for_windows_keeps_its_line_ends_and_its_mark(
+    mark: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_bytes(mark + '# mein Käfer\r\n[record]\r\nunit = "mm"  # so\r\n'.encode())
+    change(path, {("robot", "yaw", "zeros"): [1, 2], ("setup", "done"): ("yaw1", "yaw2")})
+    change(path, {("robot", "yaw", "zeros"): [3, 4]})
+    lines = [b"[robot.yaw]", b"zeros = [3, 4]", b"", b"[setup]", b'done = ["yaw1", "yaw2"]', b""]
+    before = mark + '# mein Käfer\r\n[record]\r\nunit = "mm"  # so\r\n\r\n'.encode()
+    assert path.read_bytes() == before + b"\r\n".join(lines)

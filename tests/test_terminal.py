@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from stated import STATED
 from terminal import Terminal
+from test_setup_zeros import ZEROS
 
 
 @pytest.mark.parametrize("columns", [80, 40])
@@ -38,6 +40,92 @@ def test_the_viewer_shows_what_to_do_whatever_the_width(columns: int, tmp_path: 
     assert len(status) >= (10 if columns == 80 else 5)
     assert max(map(len, terminal.rows)) < columns  # nothing wraps
     assert terminal.text.endswith("\n")
+
+
+FEED = (
+    "import sys; from dataclasses import replace; sys.path.insert(0, sys.argv[1]); "
+    "from test_feed import HEADER, tick, viewer; from antennate.telemetry.feed import Feed\n"
+    "note = 'touch=passed drift=+0,+0%'\n"
+    "with Feed(viewer(__import__('pathlib').Path('drive.mcap')), HEADER.pack()) as feed:\n"
+    "    for number in range(100):\n"
+    "        feed.send(replace(tick(number + 1), note=note, state='WALKING').pack())\n"
+)
+ZERO = (
+    "import sys; sys.path.insert(0, sys.argv[1])\n"
+    "from test_setup_zeros import Held\n"
+    "from antennate.cli.keys import TerminalPerson\n"
+    "held = Held(); person = TerminalPerson()\n"
+    "held.zeroing.zeros(person); person.close()\n"
+)
+COUNTERS = ("maneuver", "counts", "age", "touch", "drift", "missed_ticks", "missed_answers")
+COUNTERS += ("stale", "frames", "crc", "lost", "sent", "refused", "unlogged")
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_the_status_line_of_a_drive_has_all_its_labels(columns: int, tmp_path: Path) -> None:
+    terminal = Terminal(columns)
+    words = [sys.executable, "-c", FEED, str(Path(__file__).parent)]
+    process = terminal.start(words, cwd=tmp_path)
+    terminal.until(lambda _: False)
+    assert process.wait(30) == 0
+    assert max(map(len, terminal.rows)) < columns
+    shown = " ".join(terminal.rows).split(" s WALKING")[1].split()
+    assert [word.partition("=")[0] for word in shown if "=" in word][: len(COUNTERS)] == [*COUNTERS]
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_zero_shows_every_joint_that_is_watched(columns: int) -> None:
+    terminal = Terminal(columns)
+    words = [sys.executable, "-c", ZERO, str(Path(__file__).parent)]
+    process = terminal.start(words, stdin=subprocess.PIPE)
+    terminal.until(lambda text: text.count("yaw ") > 2)
+    process.communicate(b"\n", 30)
+    assert process.returncode == 0
+    assert max(map(len, terminal.rows)) < columns
+    shown = " ".join(terminal.text.split("\x1b[J")[-1].partition("\x1b[")[0].split())
+    numbers = [" ".join(map(str, part)) for part in (ZEROS[:5], ZEROS[5:17], ZEROS[17:])]
+    assert shown == "yaw {} legs {} antennae {}".format(*numbers)
+
+
+@pytest.mark.parametrize("columns", [80, 200])
+def test_what_another_process_says_stays_when_the_status_line_changes(columns: int) -> None:
+    source = (
+        "from antennate.cli.terminal import StatusLine, write_below_status\n"
+        "line = StatusLine()\n"
+        "for number in range(3):\n"
+        "    line.show(' '.join(f'{n}={number}' for n in range(40)), 'bend the antenna')\n"
+        "    if number == 1: write_below_status('the disk is full')\n"
+        "line.close()\n"
+        "print('table', file=__import__('sys').stderr)\n"
+    )
+    terminal = Terminal(columns)
+    process = terminal.start([sys.executable, "-c", source])
+    terminal.until(lambda _: False)
+    assert process.wait(30) == 0
+    screen = shown_on_screen(terminal.text)
+    assert screen[0].startswith("0=1 ")
+    assert screen[1] == "the disk is full"
+    assert " ".join(screen[2:-2]) == " ".join(f"{n}=2" for n in range(40))
+    assert screen[-2:] == ["bend the antenna", "table"]
+
+
+def shown_on_screen(text: str) -> list[str]:
+    """Rows of a screen that is high enough, for the few sequences that we send."""
+    rows, at, column = [""], 0, 0
+    for piece in re.findall(r"\x1b\[\d*[AJ]|[\r\n]|[^\x1b\r\n]+", text):
+        if piece == "\r":
+            column = 0
+        elif piece == "\n":
+            at += 1
+            rows += [""] * (at + 1 - len(rows))
+        elif piece.endswith("A") and piece[0] == "\x1b":
+            at -= int(piece[2:-1])
+        elif piece == "\x1b[J":
+            rows[at:] = [rows[at][:column]]
+        else:
+            rows[at] = rows[at][:column].ljust(column) + piece + rows[at][column + len(piece) :]
+            column += len(piece)
+    return [row for row in rows if row]
 
 
 @pytest.mark.slow

@@ -30,6 +30,8 @@ _LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--
 _LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
 _LATER += ("--readings", "--knows", "--json", "--overwrite")
 """Options that nobody uses first: they come last on the short page."""
+_FIRST = ("--arm", "--until")
+"""Options that the pages use: they come first on it, in this order."""
 
 
 class Command(NamedTuple):
@@ -82,7 +84,9 @@ def long_page(command: Command) -> str:
 
 
 def _rank(option: Option) -> int:
-    """Place among those that come last, -1 of all others."""
+    """Place among those that come last, -1 of all others, less of those that come first."""
+    if option.offered in _FIRST:
+        return _FIRST.index(option.offered) - len(_FIRST) - 1
     places = (i for i, name in enumerate(_LATER) if option.offered.startswith(name))
     return next(places, -1)
 

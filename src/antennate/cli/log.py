@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -62,6 +63,11 @@ _ROWS = 4096
 """Ticks that are written to a Parquet file at once."""
 _SHOWN = 10
 """Most events that `info` prints at either end of a log."""
+
+_WALKS = ("OK", "DEGRADED")
+"""Begin of the events of a robot that can walk."""
+_CAUSES = re.compile(r"(?<=; )(?:OFF|FAULT|HOLD|DEGRADED) (?=[A-Z_]+:)")
+"""What each cause asks for, which is no error while a robot is not armed yet."""
 
 
 @dataclass(frozen=True)
@@ -245,12 +251,25 @@ def _result(log: LogReader, survey: Survey) -> dict[str, Any]:
 
 def _table(result: Mapping[str, Any]) -> Table:
     events, start = result["events"], result["start_ns"]
-    lines = [f"{1e-9 * (e['time_ns'] - start):.2f} s {e['text']}" for e in events]
+    walks = [e["text"].startswith(_WALKS) for e in events]
+    begun = walks.index(True) if True in walks else 0
+    lines = [
+        f"before it could walk, {_line(e, start, _CAUSES.sub('', e['text']))}"
+        for e in events[:begun]
+    ]
+    lines += [_line(e, start, e["text"]) for e in events[begun:]]
     if (hidden := len(events) - 2 * _SHOWN) > 0:
         lines[_SHOWN:-_SHOWN] = [f"... {hidden} more events; --json has all"]
     rows = [(name, [str(count)]) for name, count in result["messages"].items()]
+    if begun:
+        lines.insert(0, f"At the end: {_line(events[-1], start, events[-1]['text'])}")
     note = "\n".join(map(one_line, lines))
     return Table(f"Log of {one_line(result['controller'])}", ["messages"], rows, note)
+
+
+def _line(event: Mapping[str, Any], start: int, text: str) -> str:
+    """When something happened, and what."""
+    return f"{1e-9 * (event['time_ns'] - start):.2f} s {text}"
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ import sys
 import time
 import unicodedata
 from collections.abc import Callable, Iterator
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any, TextIO
 
 from antennate.hardware.driving.stopping import STOPS, StopOnce
@@ -27,7 +27,7 @@ from antennate.messages import one_line
 
 _ASCII = {"·": ".", "×": "x", "–": "-", "−": "-", "±": "+-", "²": "^2", "→": "->", "…": "..."}
 _PLAIN = "antennate.plain"
-_COLUMNS = 80
+_COLUMNS, _ROWS = 80, 24
 
 
 class Output(io.TextIOBase):
@@ -182,8 +182,20 @@ def console() -> Any:
     return Console(file=sys.stdout, highlight=False, width=width, height=height)
 
 
+_ERASE = "\x1b[J"
+"""Erases what stands from the cursor on."""
+
+
+def write_below_status(text: str) -> None:
+    """Write a line on stderr below the first row of a status line, also one of another process."""
+    write(f"\n{_ERASE if is_drawable(sys.stderr) else ''}{text}\n")
+
+
 class StatusLine:
     """A line on stderr that changes: on a terminal over the last one, elsewhere one a second.
+
+    On a terminal it takes as many rows as it needs. The cursor waits in the first one, so whatever
+    another process writes is not erased with it.
 
     Attributes:
         terminal: Whether it is written over the last one.
@@ -191,15 +203,12 @@ class StatusLine:
 
     _PERIOD, _PERIOD_PLAIN = 0.2, 1.0
     """Time between two lines on a terminal, and elsewhere [s]."""
-    _CLEAR = "\r\x1b[K"
-    _GAP = "... "
-    _END = 3
-    """The end of a line without an instruction gets this part of the width."""
+    _CLEAR = f"\r{_ERASE}"
 
     def __init__(self) -> None:
         self.terminal = is_drawable(sys.stderr)
         self._due = -math.inf
-        self._open = False
+        self._rows = 0
 
     def due(self, now: float) -> bool:
         """Whether a line is to be shown at a time [s]."""
@@ -209,45 +218,50 @@ class StatusLine:
         return True
 
     def show(self, text: str, instruction: str = "") -> None:
-        """Show a line; on a terminal shortened to its width, since a line that wraps stays.
+        """Show a line; on a terminal broken between words, since a row that wraps stays.
 
         Args:
-            text: The line; its middle goes first.
-            instruction: What a person is to do, behind the line; it goes last.
+            text: The line; its end goes first where the terminal has too few rows.
+            instruction: What a person is to do, behind the line; on a terminal in rows of its own.
         """
-        text = f"{text} | {instruction}" if instruction else text
-        if self.terminal:
-            width = self._columns() - 1
-            text = one_line(text)
-            if len(text) > width:
-                end = min(len(one_line(instruction)) or width // self._END, width)
-                begin = max(0, width - end - len(self._GAP))
-                text = f"{text[:begin]}{self._GAP if begin else ''}{text[len(text) - end :]}"
-            text = self._CLEAR + text
-        self._open = self.terminal
-        write(text if self.terminal else text + "\n")
+        if not self.terminal:
+            write(f"{text} | {instruction}\n" if instruction else f"{text}\n")
+            return
+        columns, height = self._size()
+        asked = wrap(one_line(instruction), columns - 1, break_on_hyphens=False)
+        rows = wrap(
+            one_line(text),
+            columns - 1,
+            break_on_hyphens=False,
+            max_lines=max(1, height - 1 - len(asked)),
+            placeholder=" ...",
+        )
+        rows = [*rows, *asked]
+        back = f"\x1b[{len(rows) - 1}A" if len(rows) > 1 else ""
+        write(self._CLEAR + "\r\n".join(rows) + back + "\r")
+        self._rows = len(rows)
 
     def say(self, text: str) -> None:
         """Show something that stays, above the line; on a terminal broken between words."""
         if self.terminal:
-            width = self._columns() - 1
+            width = self._size()[0] - 1
             text = fill(text, width, break_long_words=False, break_on_hyphens=False)
-        write(f"{self._CLEAR if self._open else ''}{text}\n")
-        self._open = False
+        write(f"{self._CLEAR if self._rows else ''}{text}\n")
+        self._rows = 0
 
     def close(self) -> None:
         """End the line."""
-        if self._open:
-            write("\n")
-        self._open = False
+        write("\n" * self._rows)
+        self._rows = 0
 
     @staticmethod
-    def _columns() -> int:
-        """Width of the terminal on stderr; stdout may be a file."""
+    def _size() -> tuple[int, int]:
+        """Columns and rows of the terminal on stderr; stdout may be a file."""
         try:
-            return os.get_terminal_size(sys.stderr.fileno()).columns or _COLUMNS
+            columns, rows = os.get_terminal_size(sys.stderr.fileno())
         except (OSError, ValueError):
-            return _COLUMNS
+            columns = rows = 0
+        return columns or _COLUMNS, rows or _ROWS
 
 
 @contextlib.contextmanager

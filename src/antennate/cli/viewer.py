@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from antennate.cli.terminal import StatusLine, write
+from antennate.cli.terminal import StatusLine, write_below_status
 from antennate.control.readings import short_names
 from antennate.errors import AntennateError, LogError
 from antennate.hardware.driving.report import late_sentence
@@ -225,12 +225,12 @@ def main() -> int:
 
 def say(error: AntennateError) -> None:
     """Show an error of the log on stderr, below the status line."""
-    write(f"\nantennate drive: {one_line(str(error))}\n")
+    write_below_status(f"antennate drive: {one_line(str(error))}")
 
 
 def warn(text: str) -> None:
     """Show on stderr what to do before torque goes off, below the status line."""
-    write(f"\nantennate drive: torque goes off now; {text}\n")
+    write_below_status(f"antennate drive: torque goes off now; {text}")
 
 
 MEASURES = (

@@ -26,6 +26,7 @@ from antennate.control.conditioning import (
 from antennate.control.escape import Escape, SearchRule
 from antennate.control.gait import Gait
 from antennate.control.knowledge import ALIGNED, Kind, Knowledge, aligned
+from antennate.errors import ConfigError
 from antennate.params.control import ControlParams, EscapeParams, RuleParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.types import (
@@ -169,6 +170,10 @@ class Rule(Protocol):
         ...
 
 
+_PARTS = ("reset", "step", "turn_offset")
+"""What a rule has to have."""
+
+
 class Moves(Protocol):
     """What makes joint targets of maneuvers.
 
@@ -269,7 +274,7 @@ class RuleController:
         gait: What makes joint targets of its maneuvers; the `Gait` of the control if not given.
 
     Raises:
-        ConfigError: The robot has no antennae.
+        ConfigError: The robot has no antennae, or the rule lacks a part.
 
     Attributes:
         level: Bending levels b of the last step, shape (B, 2).
@@ -289,6 +294,11 @@ class RuleController:
         gait: Moves | None = None,
     ) -> None:
         require_antennae(robot, "this controller")
+        if lacking := [part for part in _PARTS if not hasattr(rule, part)]:
+            raise ConfigError(
+                "expected a rule with reset, step and turn_offset, the yaw offset of its turns "
+                f"[rad]; found {type(rule).__name__} without {', '.join(lacking)}"
+            )
         self._curves = curves(control)
         self._mean = RunningMean(control.conditioning, batch, control.period)
         self._contact = ContactState(control.rule, batch)

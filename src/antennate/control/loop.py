@@ -181,11 +181,10 @@ class CheckedController:
         own: dict[str, Any] = {}
         for owner, shapes in ((answer, self._shapes), (self._controller, self._attributes)):
             for name, shape in shapes.items():
-                value = getattr(owner, name)
+                value = getattr(owner, name, None)
                 if not isinstance(value, np.ndarray):
-                    raise ControllerError(
-                        f"expected an array as {name}, found {type(value).__name__}"
-                    )
+                    found = "none" if value is None else type(value).__name__
+                    raise ControllerError(f"expected an array as {name}, found {found}")
                 if value.shape != shape:
                     raise ControllerError(f"expected {name} of shape {shape}, found {value.shape}")
                 own[name] = np.array(value)

@@ -85,7 +85,8 @@ def leads(entries: Sequence[Mapping[str, Any]]) -> Figure:
     for name, (label, colour, marker, line) in looks.items():
         if name in entries[0]:
             angles = np.degrees(np.unwrap(np.radians([entry[name] for entry in entries])))
-            panel.plot(number, angles, color=colour, marker=marker, linestyle=line, label=label)
+            mark = marker or ("_" if len(number) == 1 else "")  # one number makes no line
+            panel.plot(number, angles, color=colour, marker=mark, linestyle=line, label=label)
     panel.set(xlabel="wave number", ylabel="best lead [deg]", title="Lead that walks fastest")
     panel.legend()
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from codecs import BOM_UTF8
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,9 +32,9 @@ def change(path: Path, values: Mapping[Key, Value]) -> None:
             it is as before.
         OutputError: It cannot be written.
     """
-    text, changed = _read_and_edited(path, values)
-    if changed != text:
-        write_whole(path, changed.encode(), overwrite=True)
+    data, changed = _read_and_edited(path, values)
+    if changed != data:
+        write_whole(path, changed, overwrite=True)
 
 
 def require_changeable(path: Path, values: Mapping[Key, Value]) -> None:
@@ -49,13 +50,15 @@ def require_changeable(path: Path, values: Mapping[Key, Value]) -> None:
     _read_and_edited(path, values)
 
 
-def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[str, str]:
-    """The text of a file, empty if there is none, and that text with keys set."""
-    text = ""
-    if path.exists():
-        text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
+def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[bytes, bytes]:
+    """The bytes of a file, none if it is not there, and those with keys set.
+
+    A byte order mark stays, and new lines end as those of the file.
+    """
+    data = read_limited(path, LARGEST_FILE, ConfigError) if path.exists() else b""
+    text = decoded(path, data, ConfigError)
     try:
-        return text, edited(text, values)
+        changed = edited(text, values)
     except (TOMLKitError, ValueError) as error:
         keys = ", ".join(
             f"{'.'.join(key)} = {tomlkit.item(value).as_string()}" for key, value in values.items()
@@ -63,6 +66,9 @@ def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[str, str]
         raise ConfigError(
             f"{path}: expected tables that can be changed, found: {error}; write by hand: {keys}"
         ) from None
+    if "\r\n" in text and text.count("\n") == text.count("\r\n"):
+        changed = changed.replace("\r\n", "\n").replace("\n", "\r\n")
+    return data, (BOM_UTF8 if data.startswith(BOM_UTF8) else b"") + changed.encode()
 
 
 def edited(text: str, values: Mapping[Key, Value]) -> str:
