@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 import antennate
 from antennate.cli import BAD_INPUT, main
@@ -601,7 +602,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     for changed, rows, said, code in [
         (text, 8, "8 of 8 rows repeat; 0 differ", 0),
         (cell.replace(",timeout,", ",success,", 1), 2, "1 of 2 rows repeat; 1 differ, 1", 2),
-        (cell.replace("timeout,0.3,", "timeout,0.4,", 1), 2, "1 differ, 0 of them", 2),
+        (cell.replace("timeout,0.3,0.3,", "timeout,0.4,0.4,", 1), 2, "1 differ, 0 of them", 2),
     ]:
         file.write_text(changed)
         assert main(["compete", "--check", str(file), *one, "--out", "again"]) == code
@@ -637,7 +638,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
             "line 2: outcome: expected one of success, .*, found 'sucess'",
         ),
         (
-            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,1.0\n",
+            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,100.0\n",
             "line 3: expected each draw once a controller, found that of line 2 again",
         ),
         (
@@ -655,7 +656,43 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",
-            "line 2: time_s: expected a (finite )?number",
+            "line 2: time_s: expected a finite number of 0 to limit_s, 100, found nan",
+        ),
+        *(
+            (
+                f"controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,{ended}\n",
+                f"a.csv: line 2: {why}",
+            )
+            for ended, why in (
+                ("success,-5,100", "time_s: expected .* 0 to limit_s, 100, found -5.0"),
+                ("success,-1e9,100", "time_s: expected .* found -1000000000.0"),
+                ("success,1e9,100", "time_s: expected .* found 1000000000.0"),
+                ("success,100.01,100", "time_s: expected .* found 100.01"),
+                ("timeout,99.9,100", "time_s: expected limit_s, 100, as it is no success"),
+                ("left,0,100", "time_s: expected limit_s, 100, as it is no success"),
+                ("invalid,-100,100", "time_s: expected a finite number of 0 to limit_s"),
+                ("success,1,inf", "limit_s: expected a finite number above 0, found inf"),
+            )
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,progress_m\nopen,flat,1,0,success,1,inf\n",
+            "line 2: progress_m: expected a finite number, found inf",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,overturned,100\n",
+            "line 2: overturned: expected True, as it ended so, found False",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,reason\nopen,flat,1,0,left,100,slow\n",
+            "line 2: reason: expected none, as it is not invalid, found 'slow'",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flatt,1,0,success,9\n",
+            "line 2: .*did you mean flat",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat+tim=1,1,0,success,9\n",
+            "line 2: scenes: expected a parameter of",
         ),
         (
             "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,1.0,0.0\n",
@@ -672,7 +709,7 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
 
 def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: Path) -> None:
     """Spreadsheets write such a mark, and R writes NA where nothing is."""
-    text = "controller,scene,seed,trial,outcome,time_s,given\nopen,flat,1,0,timeout,1.0,NA\n"
+    text = "controller,scene,seed,trial,outcome,time_s,given\nopen,flat,1,0,timeout,100.0,NA\n"
     (tmp_path / "a.csv").write_text(f"sep=,\n{text}", encoding="utf-8-sig")
     (row,) = read_rows(tmp_path / "a.csv")
     assert (row.controller, row.given) == ("open", "")
@@ -755,6 +792,82 @@ def test_on_another_processor_rows_may_end_otherwise_but_not_to_one_side(
         for rows in (theirs, ours)
     ]
     assert compared(*both)["successes_p"] == pytest.approx(2.0 * 0.5 ** min(won, 9))
+
+
+ELSEWHERE = "controller,scene,seed,trial,outcome,time_s,limit_s,processor"
+
+
+@pytest.mark.parametrize(
+    ("times", "code", "said"),
+    [
+        (["success,-5,0.3"] * 4, 2, "expected a finite number of 0 to limit_s"),
+        (
+            ["success,0.01,0.3"] * 4,
+            2,
+            "found mean times that differ by -96.7 % of the limit (p 0.0",
+        ),
+        (["success,0.01,0.3"] * 3, 0, "They are too few to tell."),
+        (["timeout,0.3,0.3"] * 4, 0, "4 are of another version"),
+    ],
+)
+def test_a_table_of_few_rows_of_another_processor_is_checked(
+    times: list[str],
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """4 of 4 draws from the limit to nearly 0 s have a p of 2 / 4^4 = 0.0078; 3 of 3 of 0.03."""
+    monkeypatch.chdir(tmp_path)
+    rows = [f"open,{SHORT},{DEVELOPMENT.start},{k},{time},q" for k, time in enumerate(times)]
+    (tmp_path / "theirs.csv").write_text("\n".join([ELSEWHERE, *rows]) + "\n")
+    words = ["--check", "theirs.csv", "--workers", "1", "--no-figures", "--out", "again"]
+    assert main(["compete", *words]) == code
+    out, err = capsys.readouterr()
+    assert said in out + err
+
+
+@pytest.mark.parametrize("outlier", [100.0, 0.0])
+def test_one_row_opens_no_tolerance_for_others(outlier: float) -> None:
+    """Each of 30 draws 5 s faster, but one that is as far off as a row may be."""
+    ours = [replace(HERE, trial=k, time_s=50.0) for k in range(30)]
+    theirs = [replace(row, processor="q", time_s=45.0) for row in ours]
+    assert "mean times" in refusal(compared(theirs, ours))
+    theirs[0] = replace(theirs[0], time_s=outlier)
+    assert "mean times" in refusal(compared(theirs, ours))
+
+
+def test_far_times_of_few_draws_have_the_chance_of_four_tosses() -> None:
+    """Two-sided p of k of n to one side, each with 1/4 at most: SciPy's binomial test."""
+    for count, far in ((4, 4), (4, 3), (12, 7), (12, 8)):
+        ours = [replace(HERE, trial=k, time_s=90.0) for k in range(count)]
+        theirs = [replace(r, processor="q", time_s=10.0 + 80.0 * (r.trial >= far)) for r in ours]
+        check = compared(theirs, ours)
+        test = binomtest(far, count, 0.25, alternative="greater")
+        assert check["far_p"] == pytest.approx(2.0 * test.pvalue)
+
+
+def test_the_check_refuses_few_of_the_tables_that_chance_makes() -> None:
+    """Draws that end anew on each processor, of every kind: at most 3 in 100 by three tests."""
+    rng = np.random.default_rng(5)
+    refused = 0
+    for _ in range(300):
+        crossed = rng.uniform(0.0, 1.0, 12)
+        tables = []
+        for place in "pq":
+            won = rng.random(12) < crossed
+            times = np.where(won, rng.uniform(5.0, 99.0, 12), 100.0)
+            tables.append(
+                [
+                    Episode(
+                        *("open", "flat", 1, k, "success" if w else "timeout", t), processor=place
+                    )
+                    for k, (w, t) in enumerate(zip(won.tolist(), times.tolist(), strict=True))
+                ]
+            )
+        refused += bool(refusal(compared(*tables)))
+    assert refused <= 0.03 * 300
 
 
 def test_rows_that_were_not_run_are_not_compared() -> None:

@@ -142,7 +142,7 @@ def test_yourdfpy_reads_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "mass"), [("scuttle", 2.0), ("scuttle3d", 2.4), ("hexapod", 1.0)])
 def test_what_is_exported_weighs_what_its_page_says(name: str, mass: float, tmp_path: Path) -> None:
-    """2.0 and 2.4 kg of docs/robots.md, 1.0 kg of the file of the hexapod; README.txt says so, too."""
+    """2.0 and 2.4 kg of docs/robots.md, 1.0 kg of the hexapod's file; README.txt says so, too."""
     for form, file in (("urdf", "robot.urdf"), ("mjcf", "robot.xml")):
         folder = tmp_path / form
         assert main(["robot", "--robot", name, "--export", form, str(folder)]) == 0

@@ -2,8 +2,9 @@
 
 URDF has one joint a link, and the frame of a link lies on its joint. So a link has the axes of the
 body of the simulated robot, moved to where it turns. Between two servos that turn one body stands a
-link of nearly no mass, as readers want one; the body has so much less. A locked pitch joint, which the simulation holds by a
-spring, is left out. Capsules are a cylinder and two spheres, a leg a cylinder.
+link of nearly no mass, as readers want one; the body has so much less. A locked pitch joint, which
+the simulation holds by a spring, is left out. Capsules are a cylinder and two spheres, a leg a
+cylinder.
 """
 
 from __future__ import annotations
