@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -118,18 +119,9 @@ class Curious(Entry):
     def know(self, knowledge):
         raise RuntimeError("it was told")
 class Breaks(Entry):
-    """What it changes fails outside of its own decisions."""
+    """What it changes would fail outside of its own decisions, in a process that others share."""
     def fault(self, command):
         np.clip = None
-class Once(Entry):
-    """It fails outside of its decisions, but only after its first reset in a process."""
-    resets = 0
-    def reset(self, rows, phase=0.0):
-        super().reset(rows, phase)
-        Once.resets += 1
-    def fault(self, command):
-        if Once.resets > 1:
-            np.clip = None
 class Ends(Entry):
     def fault(self, command):
         os.kill(os.getpid(), 9)
@@ -211,6 +203,127 @@ def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
     rows = episodes(entries("shifty"), 2)
     assert {row.given for row in rows} == {"jam map"}
     assert standings(rows, 0.01)["controllers"][rows[0].controller]["rank"] is None
+
+
+ESCAPES = """
+import ctypes, os, resource, signal, subprocess, sys, threading, time
+from antennate.control.controllers import open_loop
+
+clock = time.process_time
+def work(seconds):
+    end = clock() + seconds
+    while clock() < end:
+        pass
+
+class Entry:
+    ticks = 0
+    def __init__(self, *how):
+        self.inner = open_loop(*how)
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+    def step(self, frame):
+        self.ticks += 1
+        if self.ticks == 5:
+            self.escape()
+        return self.inner.step(frame)
+    def escape(self):
+        pass
+class Orphan(Entry):
+    def escape(self):
+        if not (child := os.fork()):
+            if not os.fork():
+                with open("pid", "w") as file:
+                    file.write(str(os.getpid()))
+                work(30.0)
+            os._exit(0)
+        os.waitpid(child, 0)
+class OrphanInside(Entry):
+    def escape(self):
+        ours, theirs = os.pipe()
+        if not (child := os.fork()):
+            if not os.fork():
+                os.close(ours)
+                work(0.2)
+            os._exit(0)
+        os.close(theirs)
+        os.waitpid(child, 0)
+        os.read(ours, 1)  # until it has ended
+        time.sleep(0.1)
+class Ignored(Entry):
+    def escape(self):
+        signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+        if not os.fork():
+            work(0.2)
+            os._exit(0)
+        try:
+            os.wait()
+        except ChildProcessError:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+class Between(Entry):
+    def escape(self):
+        threading.Thread(target=work, args=(30.0,), daemon=True).start()
+class Clocks(Entry):
+    def escape(self):
+        for module in (time, *(m for n, m in sys.modules.items() if n.startswith("antennate"))):
+            for name in ("process_time", "monotonic", "clock_gettime", "_processor_time"):
+                setattr(module, name, lambda *how: 0.0)
+        resource.getrusage = lambda who: resource.struct_rusage([0.0] * 16)
+        signal.setitimer = lambda *how: None
+        work(0.2)
+class Picks(Entry):
+    def step(self, frame):
+        class Answer:
+            def __reduce__(self):
+                return os.system, ("touch picked",)
+        return Answer() if self.ticks else Entry.step(self, frame)
+"""
+SLOW_SCENE = """
+import time
+import numpy as np
+from antennate.sim.scenes.scene import Route
+class Here(Route):
+    def left(self, head):
+        time.sleep(0.5)
+        return False
+class Slow:
+    random = False
+    def draw(self, robot, rng):
+        return Here(np.array([[0.0, 0.0], [2.0, 0.0]]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process tells its time itself")
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("Entry", ""),
+        ("Orphan", "controller: a program that it began runs on after a decision"),
+        ("OrphanInside", "controller: a decision took longer than 50 ms"),
+        ("Ignored", "controller: a decision took longer than 50 ms"),
+        ("Between", "controller: a decision took longer than 50 ms"),
+        ("Clocks", "controller: a decision took longer than 50 ms"),
+        ("Picks", "controller: expected plain arrays, found posix.system"),
+    ],
+)
+def test_processor_time_does_not_escape(
+    name: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Physics that take half a second leave time to work beside them."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "escapes.py").write_text(ESCAPES)
+    (tmp_path / "scenes.py").write_text(SLOW_SCENE)
+    words = ["--controllers", f"escapes.py:{name}", "--scenes", "scenes.py:Slow+time_limit=0.2"]
+    words += ["--trials", "1", "--workers", "1", "--no-figures", "--out", "run"]
+    assert main(["compete", *words]) == (2 if why else 0)
+    (row,) = read_rows(tmp_path / "run" / "trials.csv")
+    assert (row.outcome, row.reason) == ("invalid" if why else "timeout", why)
+    assert not (tmp_path / "picked").exists()
+    if name == "Orphan":
+        left = Path("/proc", (tmp_path / "pid").read_text())
+        end = time.monotonic() + 10.0
+        while left.exists() and time.monotonic() < end:
+            time.sleep(0.01)
+        assert not left.exists()
 
 
 # a run
@@ -365,7 +478,9 @@ def test_bad_input_is_one_line_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize(("name", "why"), [("Dies", "worker"), ("Hangs", "no result within 4 s")])
+@pytest.mark.parametrize(
+    ("name", "why"), [("Dies", "process ended"), ("Hangs", "no result within 4 s")]
+)
 def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     name: str,
     why: str,
@@ -384,27 +499,18 @@ def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
-def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
+def test_who_ends_its_process_in_a_trial_is_invalid_and_who_breaks_it_breaks_nothing_else(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
     names = [entries("Breaks"), entries("Ends"), entries("Asks"), "open"]
     words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
     assert main(["compete", *words, "--workers", "1", "--out", "run"]) == 0
     rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["invalid", "invalid", "invalid", "timeout"]
+    assert [row.outcome for row in rows] == ["timeout", "invalid", "invalid", "timeout"]
     assert {row.limit_s for row in rows} == {0.3}
     assert {row.time_s for row in rows} == {0.3}
-    assert "NoneType" in rows[0].reason
+    assert rows[1].reason == "controller: its process ended in step"
     assert "a program that it began runs on" in rows[2].reason
-
-
-def test_what_a_broken_process_held_is_run_again_in_another(
-    tmp_path: Path, entries: Callable[[str], str]
-) -> None:
-    words = ["--controllers", entries("Once"), "--scenes", SHORT, "--trials", "3"]
-    assert main(["compete", *words, "--no-figures", "--workers", "1", "--out", "run"]) == 0
-    rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["timeout"] * 3
 
 
 def test_entries_with_helpers_of_one_name_each_get_their_own(

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
+from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.checking import compared, read_rows, refusal
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import (
     Draw,
     Episode,
-    Timed,
     all_drawn,
     lost,
     run_episodes,
@@ -131,13 +132,14 @@ def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> st
     try:
         for scene, seed in cells:
             settings = tunnel_config(scene, name, seed)
-            made = make_controller(name, settings.control, settings.robot)
-            if needs := needs_of(made):
-                instance = draw_scene(settings, scene_of(settings), 0)
-                require_route(settings.scene, instance, needs)
-            elif (robot := settings.robot.model_dump_json()) not in decided:
-                decided.add(robot)
-                _decide(Timed(made, limit), settings)
+            make = partial(make_controller, name, settings.control, settings.robot)
+            with contextlib.closing(Apart(make, limit)) as made:
+                if made.needs:
+                    instance = draw_scene(settings, scene_of(settings), 0)
+                    require_route(settings.scene, instance, made.needs)
+                elif (robot := settings.robot.model_dump_json()) not in decided:
+                    decided.add(robot)
+                    _decide(made, settings)
     except ControllerError as error:
         return f"{name!r}: {error}"
     except (ConfigError, SceneError) as error:
