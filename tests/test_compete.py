@@ -21,7 +21,7 @@ from scipy.stats import binomtest
 import antennate
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.experiments.compete import experiment
+from antennate.experiments.compete import apart, experiment
 from antennate.experiments.compete.checking import compared, read_rows, refusal
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
@@ -36,6 +36,7 @@ from antennate.experiments.compete.page import sentence
 from antennate.experiments.compete.scenes import label, tunnel_config
 from antennate.experiments.compete.standings import standings
 from antennate.studies.formats import to_csv
+from antennate.studies.pool import Workers
 from antennate.studies.run_directory import RunDirectory
 
 SHORT = "flat+time_limit=0.3"
@@ -326,6 +327,16 @@ def test_processor_time_does_not_escape(
         assert not left.exists()
 
 
+@pytest.mark.parametrize("name", ["Busy", "Begins", "Entry"])
+def test_where_the_system_does_not_tell_a_process_tells_its_time_itself(
+    name: str, entries: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on macOS, where there is no /proc."""
+    monkeypatch.setattr(apart, "_below", lambda pid: iter(()))
+    (row,) = episodes(entries(name))
+    assert row.outcome == ("timeout" if name == "Entry" else "invalid")
+
+
 # a run
 
 
@@ -354,6 +365,22 @@ def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     assert told.startswith("Ranks in 1 scene")
     assert " No episode of NotFinite is valid: " in told
     assert "expected finite angles in yaw" in told
+
+
+def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between a hundredth and a fifth of a second of a core for each second of the limits."""
+    monkeypatch.chdir(tmp_path)
+    words = ["compete", "--controllers", "open", "--scenes", "flat+time_limit=0.5", "flat"]
+    words += ["--trials", "1", "--workers", "1", "--no-figures", "--out", "run"]
+    assert main(words) == 0
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    assert first == "2 episodes of 100 s together at most: 3 s to 22 s, 1 worker"
+    assert second.startswith("episodes: 1 of 2")
+    board = CompeteConfig(controllers=("open", "closed"), trials=100)  # 160,000 s of walking
+    told = experiment.EXPERIMENT.foretold(board, Workers(4))
+    assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 
 def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(

@@ -183,7 +183,7 @@ def test_times_of_the_board_are_ranked_as_fractions_have_them() -> None:
         share = Fraction(str(row.time_s)) / Fraction(str(row.limit_s))
         share = share if row.outcome == "success" else Fraction(1)
         draws.setdefault((row.seed, row.trial), {n: [] for n in names})[row.controller] += [share]
-    means = [sum(d[names[0]]) / 8 - sum(d[names[1]]) / 8 for d in draws.values()]
+    means = [Fraction(sum(d[names[0]]) - sum(d[names[1]]), 8) for d in draws.values()]
     whole = lcm(*(mean.denominator for mean in means))
     ticks = np.array([int(mean * whole) for mean in means])
     test = wilcoxon(ticks, zero_method="pratt", method="asymptotic", correction=False)

@@ -186,11 +186,11 @@ def _text(path: str) -> bytes:
 
 def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
     """What the warden does: it begins the controller, waits for all that is left to it, ends it."""
-    ending = list[int]()
+    ending, begun = list[int](), list[int]()
 
     def end(number: int, *_: object) -> None:
         ending.append(number)
-        for pid in _below(os.getpid()):
+        for pid in [*_below(os.getpid())] or begun:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 
@@ -199,7 +199,8 @@ def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
         signal.signal(signal.SIGTERM, end)
         _prctl(_SUBREAPER)
         _prctl(_DIES_WITH_PARENT, signal.SIGTERM)
-        if not os.fork():
+        begun.append(os.fork())
+        if not begun[0]:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
             _prctl(_DIES_WITH_PARENT, signal.SIGKILL)
             os.closerange(3, pipe.fileno())  # those of the judge

@@ -228,13 +228,14 @@ def _elsewhere(pairs: Sequence[tuple[Episode, Episode]]) -> dict[str, Any]:
         key = (row.controller, row.scene.partition("+")[0], row.seed, row.trial)
         walks.setdefault(key, []).append((won, theirs - ours))
     won = np.array([sum(won for won, _ in walk) for walk in walks.values()], int)
-    far = np.array([np.mean([far for _, far in walk]) for walk in walks.values()])
+    far: Floats = np.array([np.mean([far for _, far in walk]) for walk in walks.values()])
+    beyond: Floats = far - np.clip(far, -BIAS, BIAS)
     return {
         "draws": len(walks),
         "more_successes": int(won.sum()),
         "successes_p": sign_flips(won),
         "mean_share_difference": float(far.mean()) if len(far) else 0.0,
-        "times_p": signed_rank(np.sign(far) * np.maximum(0.0, abs(far) - BIAS)),
+        "times_p": signed_rank(beyond),
         "far_p": _far_p(far),
     }
 

@@ -31,12 +31,16 @@ from antennate.experiments.compete.standings import CONTROLLER, none_valid, stan
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.knowledge import require_route
-from antennate.sim.trial import check_start, draw_scene, scene_of
+from antennate.sim.trial import check_start, draw_scene, scene_of, time_limit_of
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import Workers, chunk_of, core_count, gather, workers_from
+from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
+from antennate.studies.run_files import span
 from antennate.studies.work import Failure
 from antennate.types import AntennaFrame, Controller
 
+START, COSTS = 2.0, (0.01, 0.2)
+"""Time to begin, and time of a core for each second of the limits [s]: where all cross early and
+draws go in lockstep, and where most run into the limit, one by one (docs/performance.md)."""
 PATIENCE = 120.0
 """Time in which a controller has to be made and to decide once, before anything is run [s]."""
 
@@ -120,7 +124,6 @@ def check(config: CompeteConfig) -> None:
         Workers(min(len(names), core_count()), timeout=PATIENCE, apart=True),
         no_step,
         lost=given_up,
-        fresh=True,
     )
     for trouble in filter(None, troubles):
         raise ConfigError(f"{config.check or '--controllers'}: {trouble}")
@@ -156,15 +159,32 @@ def _decide(made: Controller, config: TunnelConfig) -> None:
     checked.step(AntennaFrame(np.zeros(1), counts, joints))
 
 
+def foretold(config: CompeteConfig, workers: Workers) -> str:
+    """How long the episodes will take that are left: between two ends, as nobody knows more yet."""
+    kept = set[int]() if workers.store is None else places_of(workers.store.records)
+    left = [d for i, d in enumerate(draws(config)) if i not in kept and workers.mine(i)]
+    limits = dict[tuple[str, int], float]()
+    for draw in left:
+        if (key := (draw.scene, draw.seed)) not in limits:
+            made = tunnel_config(draw.scene, draw.controller, draw.seed)
+            scene = draw_scene(made, scene_of(made), 0)
+            limits[key] = time_limit_of(scene, made.time_limit)
+    seconds = sum(limits[draw.scene, draw.seed] for draw in left)
+    count = min(workers.count, max(1, len(left)))
+    low, high = (span(START + seconds * cost / count) for cost in COSTS)
+    what, where = f"episode{'s' * (len(left) != 1)}", f"worker{'s' * (count != 1)}"
+    return (
+        f"{len(left)} {what} of {seconds:,.0f} s together at most: {low} to {high}, {count} {where}"
+    )
+
+
 def run(
     config: CompeteConfig,
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> CompeteOutcome:
-    """Run all episodes; a process serves one controller in one scene alone, and then ends.
-
-    One that fails, as its controller changed what others need, is run again in a fresh process.
+    """Run all episodes.
 
     Raises:
         WorkerError: A worker process failed.
@@ -182,8 +202,6 @@ def run(
         chunk=chunk_of(len(planned), workers, BATCH),
         together=True,
         lost=given_up,
-        again=True,
-        fresh=True,
         group=lambda draw: (draw.controller, draw.scene, draw.seed),
     )
     return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
@@ -211,6 +229,7 @@ EXPERIMENT = Experiment.of_folder(
     files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
     failed=failed,
     undivided=undivided,
+    foretold=foretold,
     parts="episodes",
     measures=CONTROLLER,
     anywhere=False,
