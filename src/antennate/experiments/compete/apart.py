@@ -131,7 +131,7 @@ class Apart:
         A program is counted in that of who waited for its end, or as far as it was seen. Where
         nothing can be seen counts what its process says of itself [s].
         """
-        below = [*_below(self._warden)]
+        below = [*descendants(self._warden)]
         clocks = {pid: _clock(pid) for pid in below}
         self._seen |= clocks
         ended = sum(map(_ended, [self._warden, *below]))
@@ -151,13 +151,13 @@ class _Plain(pickle.Unpickler):
         return super().find_class(module, name)
 
 
-def _below(pid: int) -> Iterator[int]:
+def descendants(pid: int) -> Iterator[int]:
     """All processes that it began, and those these began; none where the system does not tell."""
     with contextlib.suppress(OSError):
         for thread in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  (in every decision)
             for child in map(int, _text(f"/proc/{pid}/task/{thread}/children").split()):
                 yield child
-                yield from _below(child)
+                yield from descendants(child)
 
 
 def _clock(pid: int) -> float:
@@ -190,7 +190,7 @@ def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
 
     def end(number: int, *_: object) -> None:
         ending.append(number)
-        for pid in [*_below(os.getpid())] or begun:
+        for pid in [*descendants(os.getpid())] or begun:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 

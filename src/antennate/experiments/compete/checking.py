@@ -228,7 +228,7 @@ def _elsewhere(pairs: Sequence[tuple[Episode, Episode]]) -> dict[str, Any]:
         key = (row.controller, row.scene.partition("+")[0], row.seed, row.trial)
         walks.setdefault(key, []).append((won, theirs - ours))
     won = np.array([sum(won for won, _ in walk) for walk in walks.values()], int)
-    far: Floats = np.array([np.mean([far for _, far in walk]) for walk in walks.values()])
+    far: Floats = np.array([sum(far for _, far in walk) / len(walk) for walk in walks.values()])
     beyond: Floats = far - np.clip(far, -BIAS, BIAS)
     return {
         "draws": len(walks),
