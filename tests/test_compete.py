@@ -773,7 +773,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
             "line 2: outcome: expected one of success, .*, found 'sucess'",
         ),
         (
-            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,100.0\n",
+            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,1.0\n",
             "line 3: expected each draw once a controller, found that of line 2 again",
         ),
         (
@@ -844,7 +844,7 @@ def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path:
 
 def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: Path) -> None:
     """Spreadsheets write such a mark, and R writes NA where nothing is."""
-    text = "controller,scene,seed,trial,outcome,time_s,given\nopen,flat,1,0,timeout,100.0,NA\n"
+    text = "controller,scene,seed,trial,outcome,time_s,given\nopen,flat,1,0,timeout,1.0,NA\n"
     (tmp_path / "a.csv").write_text(f"sep=,\n{text}", encoding="utf-8-sig")
     (row,) = read_rows(tmp_path / "a.csv")
     assert (row.controller, row.given) == ("open", "")

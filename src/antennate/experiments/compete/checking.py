@@ -101,7 +101,7 @@ def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Epi
     try:
         row = _ROW.validate_python(line | none)
         require_free(row.seed)
-        _require_sound(row)
+        _require_sound(row, limited="limit_s" in line)
         if row.scene not in scenes:
             tunnel_config(row.scene, row.controller, row.seed)
             scenes.add(row.scene)
@@ -112,21 +112,25 @@ def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Epi
     return row
 
 
-def _require_sound(row: Episode) -> None:
+def _require_sound(row: Episode, limited: bool) -> None:
     """Check that there may be such a controller, and such an episode whatever it is compared with.
+
+    Args:
+        row: The row.
+        limited: Whether its table says the limit; the time of a failure is compared with no other.
 
     Raises:
         ConfigError: There is no controller of that name.
         ValueError: A value is none that an episode can end with.
     """
     CONTROLLERS.check(row.controller)
-    limit, won = row.limit_s, row.outcome == "success"
+    limit, free = row.limit_s, row.outcome == "success" or not limited
     rules = (
         ("seed", 0 <= row.seed <= LARGEST_SEED, f"0 to {LARGEST_SEED}"),
         ("trial", 0 <= row.trial <= LARGEST_SEED, f"0 to {LARGEST_SEED}"),
         ("limit_s", 0 < limit < inf, "a finite number above 0"),
         ("time_s", 0 <= row.time_s <= limit + CLOSE, f"a finite number of 0 to limit_s, {limit:g}"),
-        ("time_s", won or row.time_s >= limit - CLOSE, f"limit_s, {limit:g}, as it is no success"),
+        ("time_s", free or row.time_s >= limit - CLOSE, f"limit_s, {limit:g}, as it is no success"),
         ("progress_m", isfinite(row.progress_m), "a finite number"),
         ("overturned", row.overturned or row.outcome != "overturned", "True, as it ended so"),
         ("reason", not row.reason or row.outcome == "invalid", "none, as it is not invalid"),
