@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -15,11 +16,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 import antennate
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.experiments.compete import experiment
+from antennate.experiments.compete import apart, experiment
 from antennate.experiments.compete.checking import compared, read_rows, refusal
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
@@ -34,6 +36,7 @@ from antennate.experiments.compete.page import sentence
 from antennate.experiments.compete.scenes import label, tunnel_config
 from antennate.experiments.compete.standings import standings
 from antennate.studies.formats import to_csv
+from antennate.studies.pool import Workers
 from antennate.studies.run_directory import RunDirectory
 
 SHORT = "flat+time_limit=0.3"
@@ -117,18 +120,9 @@ class Curious(Entry):
     def know(self, knowledge):
         raise RuntimeError("it was told")
 class Breaks(Entry):
-    """What it changes fails outside of its own decisions."""
+    """What it changes would fail outside of its own decisions, in a process that others share."""
     def fault(self, command):
         np.clip = None
-class Once(Entry):
-    """It fails outside of its decisions, but only after its first reset in a process."""
-    resets = 0
-    def reset(self, rows, phase=0.0):
-        super().reset(rows, phase)
-        Once.resets += 1
-    def fault(self, command):
-        if Once.resets > 1:
-            np.clip = None
 class Ends(Entry):
     def fault(self, command):
         os.kill(os.getpid(), 9)
@@ -212,6 +206,139 @@ def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
     assert standings(rows, 0.01)["controllers"][rows[0].controller]["rank"] is None
 
 
+ESCAPES = """
+import ctypes, os, resource, signal, subprocess, sys, threading, time
+from antennate.control.controllers import open_loop
+
+clock = time.process_time
+def end():
+    os.kill(os.getpid(), signal.SIGKILL)
+def work(seconds):
+    end = clock() + seconds
+    while clock() < end:
+        pass
+
+class Entry:
+    ticks = 0
+    def __init__(self, *how):
+        self.inner = open_loop(*how)
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+    def step(self, frame):
+        self.ticks += 1
+        if self.ticks == 5:
+            self.escape()
+        return self.inner.step(frame)
+    def escape(self):
+        pass
+class Orphan(Entry):
+    def escape(self):
+        if not (child := os.fork()):
+            if not os.fork():
+                with open("pid", "w") as file:
+                    file.write(str(os.getpid()))
+                work(30.0)
+            end()
+        os.waitpid(child, 0)
+class OrphanInside(Entry):
+    def escape(self):
+        ours, theirs = os.pipe()
+        if not (child := os.fork()):
+            if not os.fork():
+                os.close(ours)
+                work(0.2)
+            end()
+        os.close(theirs)
+        os.waitpid(child, 0)
+        os.read(ours, 1)  # until it has ended
+        time.sleep(0.1)
+class Ignored(Entry):
+    def escape(self):
+        signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+        if not os.fork():
+            work(0.2)
+            end()
+        try:
+            os.wait()
+        except ChildProcessError:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+class Between(Entry):
+    def escape(self):
+        threading.Thread(target=work, args=(30.0,), daemon=True).start()
+class Clocks(Entry):
+    def escape(self):
+        for module in (time, *(m for n, m in sys.modules.items() if n.startswith("antennate"))):
+            for name in ("process_time", "monotonic", "clock_gettime"):
+                setattr(module, name, lambda *how: 0.0)
+        resource.getrusage = lambda who: resource.struct_rusage([0.0] * 16)
+        signal.setitimer = lambda *how: None
+        work(0.2)
+class Picks(Entry):
+    def step(self, frame):
+        class Answer:
+            def __reduce__(self):
+                return os.system, ("touch picked",)
+        return Answer() if self.ticks else Entry.step(self, frame)
+"""
+SLOW_SCENE = """
+import time
+import numpy as np
+from antennate.sim.scenes.scene import Route
+class Here(Route):
+    def left(self, head):
+        time.sleep(0.5)
+        return False
+class Slow:
+    random = False
+    def draw(self, robot, rng):
+        return Here(np.array([[0.0, 0.0], [2.0, 0.0]]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process tells its time itself")
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("Entry", ""),
+        ("Orphan", "controller: a program that it began runs on after a decision"),
+        ("OrphanInside", "controller: a decision took longer than 50 ms"),
+        ("Ignored", "controller: a decision took longer than 50 ms"),
+        ("Between", "controller: a decision took longer than 50 ms"),
+        ("Clocks", "controller: a decision took longer than 50 ms"),
+        ("Picks", "controller: expected plain arrays, found posix.system"),
+    ],
+)
+def test_processor_time_does_not_escape(
+    name: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Physics that take half a second leave time to work beside them."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "escapes.py").write_text(ESCAPES)
+    (tmp_path / "scenes.py").write_text(SLOW_SCENE)
+    words = ["--controllers", f"escapes.py:{name}", "--scenes", "scenes.py:Slow+time_limit=0.2"]
+    words += ["--trials", "1", "--workers", "1", "--no-figures", "--out", "run"]
+    assert main(["compete", *words]) == (2 if why else 0)
+    (row,) = read_rows(tmp_path / "run" / "trials.csv")
+    assert (row.outcome, row.reason) == ("invalid" if why else "timeout", why)
+    assert not (tmp_path / "picked").exists()
+    if name == "Orphan":
+        left = Path("/proc", (tmp_path / "pid").read_text())
+        end = time.monotonic() + 10.0
+        while left.exists() and time.monotonic() < end:
+            time.sleep(0.01)
+        assert not left.exists()
+
+
+@pytest.mark.parametrize("name", ["Busy", "Begins", "Entry"])
+def test_where_the_system_does_not_tell_a_process_tells_its_time_itself(
+    name: str, entries: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on macOS, where there is no /proc."""
+    monkeypatch.setattr(apart, "descendants", lambda pid: iter(()))
+    (row,) = episodes(entries(name))
+    assert row.outcome == ("timeout" if name == "Entry" else "invalid")
+
+
 # a run
 
 
@@ -240,6 +367,22 @@ def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     assert told.startswith("Ranks in 1 scene")
     assert " No episode of NotFinite is valid: " in told
     assert "expected finite angles in yaw" in told
+
+
+def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between a hundredth and a fifth of a second of a core for each second of the limits."""
+    monkeypatch.chdir(tmp_path)
+    words = ["compete", "--controllers", "open", "--scenes", "flat+time_limit=0.5", "flat"]
+    words += ["--trials", "1", "--workers", "1", "--no-figures", "--out", "run"]
+    assert main(words) == 0
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    assert first == "2 episodes of 100 s together at most: 3 s to 22 s, 1 worker"
+    assert second.startswith("episodes: 1 of 2")
+    board = CompeteConfig(controllers=("open", "closed"), trials=100)  # 160,000 s of walking
+    told = experiment.EXPERIMENT.foretold(board, Workers(4))
+    assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 
 def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(
@@ -364,7 +507,9 @@ def test_bad_input_is_one_line_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize(("name", "why"), [("Dies", "worker"), ("Hangs", "no result within 4 s")])
+@pytest.mark.parametrize(
+    ("name", "why"), [("Dies", "process ended"), ("Hangs", "no result within 4 s")]
+)
 def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     name: str,
     why: str,
@@ -383,27 +528,18 @@ def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
-def test_who_breaks_its_process_in_a_trial_is_invalid_and_others_run(
+def test_who_ends_its_process_in_a_trial_is_invalid_and_who_breaks_it_breaks_nothing_else(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
     names = [entries("Breaks"), entries("Ends"), entries("Asks"), "open"]
     words = ["--controllers", *names, "--scenes", SHORT, "--trials", "1", "--no-figures"]
     assert main(["compete", *words, "--workers", "1", "--out", "run"]) == 0
     rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["invalid", "invalid", "invalid", "timeout"]
+    assert [row.outcome for row in rows] == ["timeout", "invalid", "invalid", "timeout"]
     assert {row.limit_s for row in rows} == {0.3}
     assert {row.time_s for row in rows} == {0.3}
-    assert "NoneType" in rows[0].reason
+    assert rows[1].reason == "controller: its process ended in step"
     assert "a program that it began runs on" in rows[2].reason
-
-
-def test_what_a_broken_process_held_is_run_again_in_another(
-    tmp_path: Path, entries: Callable[[str], str]
-) -> None:
-    words = ["--controllers", entries("Once"), "--scenes", SHORT, "--trials", "3"]
-    assert main(["compete", *words, "--no-figures", "--workers", "1", "--out", "run"]) == 0
-    rows = read_rows(tmp_path / "run" / "trials.csv")
-    assert [row.outcome for row in rows] == ["timeout"] * 3
 
 
 def test_entries_with_helpers_of_one_name_each_get_their_own(
@@ -601,7 +737,7 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
     for changed, rows, said, code in [
         (text, 8, "8 of 8 rows repeat; 0 differ", 0),
         (cell.replace(",timeout,", ",success,", 1), 2, "1 of 2 rows repeat; 1 differ, 1", 2),
-        (cell.replace("timeout,0.3,", "timeout,0.2,", 1), 2, "1 differ, 0 of them", 2),
+        (cell.replace("timeout,0.3,0.3,", "timeout,0.4,0.4,", 1), 2, "1 differ, 0 of them", 2),
     ]:
         file.write_text(changed)
         assert main(["compete", "--check", str(file), *one, "--out", "again"]) == code
@@ -655,7 +791,43 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         ),
         (
             "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",
-            "line 2: time_s: expected a (finite )?number",
+            "line 2: time_s: expected a finite number of 0 to limit_s, 100, found nan",
+        ),
+        *(
+            (
+                f"controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,{ended}\n",
+                f"a.csv: line 2: {why}",
+            )
+            for ended, why in (
+                ("success,-5,100", "time_s: expected .* 0 to limit_s, 100, found -5.0"),
+                ("success,-1e9,100", "time_s: expected .* found -1000000000.0"),
+                ("success,1e9,100", "time_s: expected .* found 1000000000.0"),
+                ("success,100.01,100", "time_s: expected .* found 100.01"),
+                ("timeout,99.9,100", "time_s: expected limit_s, 100, as it is no success"),
+                ("left,0,100", "time_s: expected limit_s, 100, as it is no success"),
+                ("invalid,-100,100", "time_s: expected a finite number of 0 to limit_s"),
+                ("success,1,inf", "limit_s: expected a finite number above 0, found inf"),
+            )
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,progress_m\nopen,flat,1,0,success,1,inf\n",
+            "line 2: progress_m: expected a finite number, found inf",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,overturned,100\n",
+            "line 2: overturned: expected True, as it ended so, found False",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s,reason\nopen,flat,1,0,left,100,slow\n",
+            "line 2: reason: expected none, as it is not invalid, found 'slow'",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flatt,1,0,success,9\n",
+            "line 2: .*did you mean flat",
+        ),
+        (
+            "controller,scene,seed,trial,outcome,time_s\nopen,flat+tim=1,1,0,success,9\n",
+            "line 2: scenes: expected a parameter of",
         ),
         (
             "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,1.0,0.0\n",
@@ -759,6 +931,82 @@ def test_on_another_processor_rows_may_end_otherwise_but_not_to_one_side(
         for rows in (theirs, ours)
     ]
     assert compared(*both)["successes_p"] == pytest.approx(2.0 * 0.5 ** min(won, 9))
+
+
+ELSEWHERE = "controller,scene,seed,trial,outcome,time_s,limit_s,processor"
+
+
+@pytest.mark.parametrize(
+    ("times", "code", "said"),
+    [
+        (["success,-5,0.3"] * 4, 2, "expected a finite number of 0 to limit_s"),
+        (
+            ["success,0.01,0.3"] * 4,
+            2,
+            "found mean times that differ by -96.7 % of the limit (p 0.0",
+        ),
+        (["success,0.01,0.3"] * 3, 0, "They are too few to tell."),
+        (["timeout,0.3,0.3"] * 4, 0, "4 are of another version"),
+    ],
+)
+def test_a_table_of_few_rows_of_another_processor_is_checked(
+    times: list[str],
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """4 of 4 draws from the limit to nearly 0 s have a p of 2 / 4^4 = 0.0078; 3 of 3 of 0.03."""
+    monkeypatch.chdir(tmp_path)
+    rows = [f"open,{SHORT},{DEVELOPMENT.start},{k},{time},q" for k, time in enumerate(times)]
+    (tmp_path / "theirs.csv").write_text("\n".join([ELSEWHERE, *rows]) + "\n")
+    words = ["--check", "theirs.csv", "--workers", "1", "--no-figures", "--out", "again"]
+    assert main(["compete", *words]) == code
+    out, err = capsys.readouterr()
+    assert said in out + err
+
+
+@pytest.mark.parametrize("outlier", [100.0, 0.0])
+def test_one_row_opens_no_tolerance_for_others(outlier: float) -> None:
+    """Each of 30 draws 5 s faster, but one that is as far off as a row may be."""
+    ours = [replace(HERE, trial=k, time_s=50.0) for k in range(30)]
+    theirs = [replace(row, processor="q", time_s=45.0) for row in ours]
+    assert "mean times" in refusal(compared(theirs, ours))
+    theirs[0] = replace(theirs[0], time_s=outlier)
+    assert "mean times" in refusal(compared(theirs, ours))
+
+
+def test_far_times_of_few_draws_have_the_chance_of_four_tosses() -> None:
+    """Two-sided p of k of n to one side, each with 1/4 at most: SciPy's binomial test."""
+    for count, far in ((4, 4), (4, 3), (12, 7), (12, 8)):
+        ours = [replace(HERE, trial=k, time_s=90.0) for k in range(count)]
+        theirs = [replace(r, processor="q", time_s=10.0 + 80.0 * (r.trial >= far)) for r in ours]
+        check = compared(theirs, ours)
+        test = binomtest(far, count, 0.25, alternative="greater")
+        assert check["far_p"] == pytest.approx(2.0 * test.pvalue)
+
+
+def test_the_check_refuses_few_of_the_tables_that_chance_makes() -> None:
+    """Draws that end anew on each processor, of every kind: at most 3 in 100 by three tests."""
+    rng = np.random.default_rng(5)
+    refused = 0
+    for _ in range(300):
+        crossed = rng.uniform(0.0, 1.0, 12)
+        tables = []
+        for place in "pq":
+            won = rng.random(12) < crossed
+            times = np.where(won, rng.uniform(5.0, 99.0, 12), 100.0)
+            tables.append(
+                [
+                    Episode(
+                        *("open", "flat", 1, k, "success" if w else "timeout", t), processor=place
+                    )
+                    for k, (w, t) in enumerate(zip(won.tolist(), times.tolist(), strict=True))
+                ]
+            )
+        refused += bool(refusal(compared(*tables)))
+    assert refused <= 0.03 * 300
 
 
 def test_rows_that_were_not_run_are_not_compared() -> None:

@@ -13,7 +13,6 @@ from test_export_mjcf import joints_of, robot_of
 from antennate.cli import main
 from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate.sim.export.folder import export_mjcf, export_urdf
-from antennate.sim.export.urdf import BETWEEN_MASS
 from antennate.types import Floats
 
 CLOSE = 1e-9
@@ -40,8 +39,8 @@ def test_it_weighs_and_bends_as_the_mjcf_does(name: str, tmp_path: Path) -> None
     bodies = [ours.body(i).name for i in range(1, ours.nbody)]
     between = {f"link{i}_yaw{i}" for i in range(1, robot.links)} if robot.pitch_count else set()
     assert {urdf.body(i).name for i in range(1, urdf.nbody)} == {*bodies, *between}
-    total = robot.mass + BETWEEN_MASS * len(between)
-    assert urdf.body_mass.sum() == pytest.approx(total, abs=CLOSE)
+    for model in (urdf, ours):
+        assert model.body_mass.sum() == pytest.approx(robot.mass, abs=CLOSE)
     here, there = mujoco.MjData(ours), mujoco.MjData(urdf)
     rng = np.random.default_rng(2)
     for _ in range(5):
@@ -52,12 +51,15 @@ def test_it_weighs_and_bends_as_the_mjcf_does(name: str, tmp_path: Path) -> None
         mujoco.mj_forward(ours, here)
         mujoco.mj_forward(urdf, there)
         for body in bodies:
-            assert urdf.body(body).mass == pytest.approx(ours.body(body).mass, abs=CLOSE)
+            parts = [part for part in between if part.startswith(f"{body}_")]
+            weight = sum(urdf.body(part).mass.item() for part in [body, *parts])
+            assert weight == pytest.approx(ours.body(body).mass.item(), abs=CLOSE)
             for part in ("xipos", "xmat"):  # centre of mass, axes
                 values = (getattr(data.body(body), part) for data in (here, there))
                 assert next(values) == pytest.approx(next(values), abs=CLOSE)
             moments = inertia(ours, here, body), inertia(urdf, there, body)
-            assert moments[0] == pytest.approx(moments[1], abs=1e-12)
+            light = sum(np.diag(urdf.body(part).inertia) for part in parts)
+            assert moments[0] == pytest.approx(moments[1] + light, abs=1e-12)
         for joint in joints:
             for part in ("xanchor", "xaxis"):
                 values = (getattr(data.joint(joint), part) for data in (here, there))
@@ -136,3 +138,15 @@ def test_yourdfpy_reads_it(tmp_path: Path) -> None:
         pose = urdf.get_transform(link, "link0")
         assert pose[:3, 3] == pytest.approx(data.body(link).xpos, abs=CLOSE)
         assert pose[:3, :3].ravel() == pytest.approx(data.body(link).xmat, abs=CLOSE)
+
+
+@pytest.mark.parametrize(("name", "mass"), [("scuttle", 2.0), ("scuttle3d", 2.4), ("hexapod", 1.0)])
+def test_what_is_exported_weighs_what_its_page_says(name: str, mass: float, tmp_path: Path) -> None:
+    """2.0 and 2.4 kg of docs/robots.md, 1.0 kg of the hexapod's file; README.txt says so, too."""
+    for form, file in (("urdf", "robot.urdf"), ("mjcf", "robot.xml")):
+        folder = tmp_path / form
+        assert main(["robot", "--robot", name, "--export", form, str(folder)]) == 0
+        model = mujoco.MjModel.from_xml_string((folder / file).read_text())
+        assert model.body_mass.sum() == pytest.approx(mass, abs=1e-12)
+        assert model.body_mass[1:].min() > 0.0
+    assert f"all links weigh {mass:g} kg" in (tmp_path / "urdf" / "README.txt").read_text()

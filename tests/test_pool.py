@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pool_tasks import die, halves, process_of, trouble, trouble_together
+from pool_tasks import beside, die, halves, trouble, trouble_together
 
 from antennate.errors import WorkerError
 from antennate.studies.engines import make_engine
@@ -62,11 +62,11 @@ def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:
         assert (found == [os.getpid()]) == own
 
 
-def test_groups_share_no_process_where_each_chunk_has_its_own() -> None:
+def test_groups_share_no_chunk() -> None:
     tasks = [*zip("aaabb", range(5), strict=True)]
-    how: dict[str, Any] = {"chunk": 2, "fresh": True, "group": lambda group, number: group}
-    found = gather(process_of, tasks, 2, no_step, **how)
-    assert [found.index(process) for process in found] == [0, 1, 1, 3, 3]
+    how: dict[str, Any] = {"chunk": 2, "together": True, "group": lambda group, number: group}
+    found = gather(beside, tasks, 2, no_step, **how)
+    assert found == [[0], [1, 2], [1, 2], [3, 4], [3, 4]]
 
 
 def lost(place: int, failure: Failure) -> Any:

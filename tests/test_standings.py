@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import product
+from math import lcm
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
+from scipy.stats import binomtest, wilcoxon
 
+from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.figure import drawn
 from antennate.experiments.compete.page import apart, markdown, ordered, readme, sentence, tables
@@ -168,6 +172,24 @@ def test_the_mean_of_draws_of_several_values_has_the_interval_of_draws() -> None
         assert ends is not None
         held += ends[0] <= 10.0 <= ends[1]
     assert 0.92 * 400 <= held <= 0.98 * 400
+
+
+def test_times_of_the_board_are_ranked_as_fractions_have_them() -> None:
+    """Means of the shares of each draw, in exact fractions, and of these SciPy's Pratt."""
+    rows = read_rows(Path(__file__).parents[1] / "docs" / "leaderboard.csv")
+    names = ("follow", "centre")
+    draws: dict[tuple[int, int], dict[str, list[Fraction]]] = {}
+    for row in (row for row in rows if row.controller in names):
+        share = Fraction(str(row.time_s)) / Fraction(str(row.limit_s))
+        share = share if row.outcome == "success" else Fraction(1)
+        draws.setdefault((row.seed, row.trial), {n: [] for n in names})[row.controller] += [share]
+    means = [Fraction(sum(d[names[0]]) - sum(d[names[1]]), 8) for d in draws.values()]
+    whole = lcm(*(mean.denominator for mean in means))
+    ticks = np.array([int(mean * whole) for mean in means])
+    test = wilcoxon(ticks, zero_method="pratt", method="asymptotic", correction=False)
+    pair = standings([row for row in rows if row.controller in names], 0.015)["paired"]
+    p = pair["follow-centre"]["wilcoxon_p"]
+    assert p == pytest.approx(np.asarray(test)[1], rel=1e-9) == pytest.approx(0.036265, abs=1e-6)
 
 
 def test_who_is_told_apart_is_said() -> None:

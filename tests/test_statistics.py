@@ -358,6 +358,28 @@ def test_differences_that_all_fall_do_not_gain_significance_as_pratt_asks() -> N
     assert left_out > signed_rank(list(PRATT - 1.0))
 
 
+@pytest.mark.parametrize("count", [24, 90])
+def test_differences_that_are_equal_in_ticks_are_ties(count: int) -> None:
+    """Sums of 0.01 s round in the last digit; SciPy is given the same as whole numbers."""
+    rng = np.random.default_rng(4)
+    first, second = rng.integers(500, 540, (2, count))
+    ticks = first - second
+    assert len(np.unique(first * 0.01 - second * 0.01)) > len(np.unique(ticks))
+    ok = np.ones(count, bool)
+    found = statistics.compare(ok, ok, first * 0.01, second * 0.01).wilcoxon_p
+    if count <= 50:
+        assert found == pytest.approx(signed_rank(ticks.astype(float).tolist()), rel=1e-12)
+    else:
+        test = wilcoxon(ticks, zero_method="pratt", method="asymptotic", correction=False)
+        assert found == pytest.approx(np.asarray(test)[1], rel=1e-12)
+
+
+def test_rounding_alone_is_no_difference_and_orders_none() -> None:
+    """Of 2, -2 and 3 ticks the ranks 1.5, 1.5 and 3 sum to 4.5: six of eight signs lie so far."""
+    assert signed_rank([0.1 + 0.2 - 0.3] * 9) == 1.0
+    assert signed_rank([0.3 - 0.1, 0.1 - 0.3 + 1e-16, 0.3]) == signed_rank([2.0, -2.0, 3.0]) == 0.75
+
+
 def exactly(values: np.ndarray, zeros: str) -> float:
     """All patterns of signs as SciPy goes through them."""
     method: Any = PermutationMethod(n_resamples=2 ** len(values))

@@ -10,7 +10,8 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
+
+from antennate.studies.statistics import signed_rank
 
 ROWS = Path(__file__).with_suffix(".csv")
 CLOSED, HASTE, OURS = ("closed", "0.6"), ("closed", "0.7026"), ("geometric", "0.6")
@@ -41,7 +42,7 @@ def main() -> None:
             change = times[keys[2]] - times[rival]
             sample = np.random.default_rng(0).choice(change, (RESAMPLES, len(change)))
             low, high = np.percentile(sample.mean(axis=1), [2.5, 97.5])
-            p = stats.wilcoxon(change, zero_method="pratt").pvalue
+            p = signed_rank(change)
             cells += [f"{change.mean():+.1f} ({low:+.1f} to {high:+.1f})", f"{p:.2g}"]
         print(f"| `{scene}` | {' | '.join(cells)} |")
 

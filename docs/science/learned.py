@@ -82,7 +82,8 @@ def elsewhere() -> None:
                 crossed = mcnemar(np.stack([own[:, 0], other[:, 0]], axis=1) > 0.0)
                 cell = f"{shown(scene, own)}{shown(name, other)}| {less(own, other)} "
                 cells.append((cell, f"{crossed.mcnemar_p:.2g}"))
-                _, alone = wilcoxon(own[:, 1] - other[:, 1])
+                apart = (own[:, 1] - other[:, 1]).round(6)  # as many decimals as the table
+                _, alone = wilcoxon(apart)
                 without.append(alone)
         columns = zip(cells, holm(p), holm(without), strict=True)
         for (cell, crossed), times, other in columns:

@@ -296,6 +296,8 @@ def _outcome(
         rows = interim.table()
         return None if rows is None else drawn_table(rows)
 
+    if words := experiment.foretold(config, workers):
+        sys.stderr.write(f"{words}\n")
     with progress(experiment.parts, table) as step:
         return experiment.run(config, workers, step, on_row, **how)
 

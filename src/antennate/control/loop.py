@@ -94,6 +94,8 @@ def _errors_of(what: str) -> Iterator[None]:
     """Raise a ControllerError for whatever a method of a controller raises, but Ctrl-C."""
     try:
         yield
+    except ControllerError:
+        raise
     except BaseException as error:
         if is_ctrl_c(error):
             raise

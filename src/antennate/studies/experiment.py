@@ -283,6 +283,8 @@ class Experiment(Generic[Config, Found]):
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
         anywhere: Whether workers may be elsewhere than in processes of this machine.
+        foretold: foretold(config, workers) -> one line on how long it will take, said before the
+            first trial; empty for nothing.
         tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
             trials; None if it is the list of `trials`, or if a run does not go on with more.
         in_shards: Whether its trials are known from the start, so that shards can divide them.
@@ -315,6 +317,7 @@ class Experiment(Generic[Config, Found]):
     anywhere: bool = True
     in_shards: bool = True
     undivided: Callable[[Config], str] = lambda config: ""
+    foretold: Callable[[Config, Workers], str] = lambda config, workers: ""
     tasks: Callable[[Config], Sequence[Any]] | None = None
 
     @property

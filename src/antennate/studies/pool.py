@@ -186,8 +186,6 @@ def gather(
     together: bool = False,
     lost: Callable[[int, Failure], Any] | None = None,
     batched: Callable[..., Any] | None = None,
-    again: bool = False,
-    fresh: bool = False,
     group: Callable[..., Any] | None = None,
 ) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
@@ -203,8 +201,6 @@ def gather(
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.
         batched: The same for `--engine warp`; see `Work`.
-        again: Whether what fails is run again in another process; see `Work`.
-        fresh: Whether each chunk has a process of its own; see `Work`.
         group: group(*task) -> what neighbouring tasks have in common if one chunk may hold them.
             Groups take turns, so that each is known in part before the first is known in full.
 
@@ -233,7 +229,6 @@ def gather(
         folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout
         how: dict[str, Any] = {"batched": batched, "shared": workers.shared}
-        how |= {"again": again, "fresh": fresh}
         if workers.store is not None:
             how["saw"] = workers.store.saw
         work = Work(function, tasks, together, timeout, folder, **how)

@@ -138,21 +138,18 @@ class _Pool:
         """Take what a worker sent; remove it if it has died."""
         ended = not worker.process.is_alive()
         try:
-            while worker.failure is None and worker.connection.poll():
+            while worker.connection.poll():
                 self._take(worker, *worker.connection.recv())
         except (EOFError, OSError):
             worker.process.join(_LAST_WORDS)
             ended = True
-        served = self._work.fresh and worker.given and not worker.places
-        if ended or served or worker.failure is not None:
+        if ended:
             self._remove(worker)
 
     def _take(self, worker: _Worker, kind: int, place: int, content: Any) -> None:
         worker.answered(self._work)
         if kind == _READY:
             worker.ready, self._failed_starts = True, 0
-        elif kind == _FAILED and self._work.again:
-            worker.failure = content
         elif kind != _BEGUN:
             worker.places.remove(place)
             (self._emit if kind == _RESULT else self._fail)(place, content)
@@ -170,7 +167,7 @@ class _Pool:
             return
         given_up = self._waiting.lost(left, self._work.together, final=hung)
         if given_up is not None:
-            why = worker.failure or (
+            why = (
                 Failure("hung", f"no result within {self._work.timeout:g} s")
                 if hung
                 else Failure("crashed", f"a worker process ended with code {code} in its work")
@@ -190,9 +187,7 @@ class _Worker:
 
     Attributes:
         ready: Whether it has started.
-        given: Whether it was given tasks.
         places: Those that it holds and has not answered.
-        failure: What one of them raised, after which it is ended.
         deadline: When it is given up.
     """
 
@@ -210,13 +205,12 @@ class _Worker:
                 "or raise the limits that `ulimit -a` shows"
             ) from None
         theirs.close()
-        self.ready = self.given = False
+        self.ready = False
         self.places: list[int] = []
-        self.failure: Failure | None = None
         self.deadline = float("inf")
 
     def give(self, work: Work, places: list[int]) -> None:
-        self.given, self.places = True, places
+        self.places = places
         self.answered(work)
         self.deadline += _IMPORT
         with contextlib.suppress(OSError):  # it has died: that is noticed next

@@ -304,11 +304,12 @@ def when_run(text: str) -> str:
         if what in dates:
             took = dates["ended"] - dates[what] if "ended" in dates else None
             day = f"{words} {dates[what]:%Y-%m-%d at %H:%M} UTC"
-            return f"{day}." if took is None else f"{day}; {it} took {_span(took.total_seconds())}."
+            return f"{day}." if took is None else f"{day}; {it} took {span(took.total_seconds())}."
     return ""
 
 
-def _span(seconds: float) -> str:
+def span(seconds: float) -> str:
+    """A time [s] in words, in the unit that suits it."""
     minutes, hours = seconds / 60, seconds / 3600
     if seconds < 1:
         return "less than 1 s"

@@ -99,9 +99,6 @@ class Work:
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
         saw: Takes the model of each processor that tasks are run on; engines call it.
-        again: Whether a process of this machine in which a task fails is ended, and what it held is
-            run again, as if the task had killed it: it may have changed what others need.
-        fresh: Whether each part has such a process of its own.
     """
 
     function: Callable[..., Any]
@@ -112,8 +109,6 @@ class Work:
     batched: Callable[..., Any] | None = None
     shared: Mapping[str, Any] | None = None
     saw: Callable[[str], None] = lambda model: None
-    again: bool = False
-    fresh: bool = False
 
     def part(self, places: Sequence[int]) -> Part:
         """Some of it, to be sent to a worker."""

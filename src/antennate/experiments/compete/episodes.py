@@ -1,48 +1,33 @@
 """One episode: a controller in one draw of a scene, with a time limit for each decision.
 
 A decision has to be there before the readings are stale. Its time is that of the processor, with
-that of programs that it began and that have ended, so that a machine with other work to do judges
-alike; none may run on after it. Who waits or sleeps in a decision is stopped by the clock, after
-`WAITING` times as long. The first decision, in which libraries are loaded, and a reset may take so
-long on the processor, too. Episodes run in lockstep, and a step of all that stays within the limit
-of one is within it for each. After one that does not, each episode runs alone, and is INVALID where
-its own decision takes too long.
+that of programs that it began, so that a machine with other work to do judges alike; none may run
+on after it. Who waits or sleeps in a decision is stopped by the clock, after `WAITING` times as
+long. The first decision, in which libraries are loaded, and a reset may take so long on the
+processor, too. Episodes run in lockstep, and a step of all that stays within the limit of one is
+within it for each. After one that does not, each episode runs alone, and is INVALID where its own
+decision takes too long.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import multiprocessing
-import os
-import resource
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from antennate import __version__
-from antennate.control.knowledge import Kind, needs_of
-from antennate.control.loop import Wrapped
 from antennate.control.readings import condition
 from antennate.control.registry import make_controller
-from antennate.errors import ControllerError
+from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult
-from antennate.params.control import ControlParams
-from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import Outcome, draw_scene, scene_of, time_limit_of
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
-from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
-
-WAITING = 20.0
-"""How many times as long a decision may take on the clock as on the processor; the first one may
-take so long on the processor, too."""
+from antennate.types import Controller
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,81 +84,6 @@ class Draw:
     drawn: bool = False
 
 
-class Timed(Wrapped):
-    """A controller whose decisions must not take longer than a limit.
-
-    Args:
-        made: The controller.
-        limit: Processor time of a step [s].
-
-    Raises:
-        ControllerError: In a step or reset that took longer, or that left a program running.
-    """
-
-    def __init__(self, made: Controller, limit: float) -> None:
-        super().__init__(made)
-        self._limit, self._begun = limit, False
-        self._needs = super().needs
-        self._alarm = threading.current_thread() is threading.main_thread()
-        if self._alarm:
-            signal.signal(signal.SIGALRM, self._give_up)
-
-    @property
-    def needs(self) -> tuple[Kind, ...]:
-        """What it needed when it was made: that it is given, whatever it says later."""
-        return self._needs
-
-    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of a `Controller`."""
-        with self._within(WAITING * self._limit):
-            self._made.reset(rows, phase)
-
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        """As of a `Controller`."""
-        with self._within(self._limit * (1.0 if self._begun else WAITING)):
-            command = self._made.step(frame)
-        self._begun = True
-        return command
-
-    @contextlib.contextmanager
-    def _within(self, limit: float) -> Iterator[None]:
-        """Refuse what takes longer on the processor [s], or waits for too long."""
-        most = WAITING * self._limit
-        if self._alarm:
-            signal.setitimer(signal.ITIMER_REAL, most)
-        begin, clock = _processor_time(), time.monotonic()
-        try:
-            yield
-            used, waited = _processor_time() - begin, time.monotonic() - clock
-        finally:
-            if self._alarm:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if used > limit or waited > most:
-            self._give_up()
-        if _leaves_programs():
-            raise ControllerError("a program that it began runs on after a decision")
-
-    def _give_up(self, *_: object) -> None:
-        raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
-
-
-def _leaves_programs() -> bool:
-    """Whether this worker has begun a program whose end it has not waited for."""
-    if multiprocessing.parent_process() is None:
-        return False  # no worker: who calls may have programs of its own
-    try:
-        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
-    except ChildProcessError:
-        return False
-    return True
-
-
-def _processor_time() -> float:
-    """Processor time of this process and of those that it began and that have ended [s]."""
-    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + ended.ru_utime + ended.ru_stime
-
-
 def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None]) -> None:
     """Run episodes of one controller in one scene with one seed, in this process and in lockstep.
 
@@ -184,23 +94,24 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
     first = draws[0][0]
     config = tunnel_config(first.scene, first.controller, first.seed)
     places = {draw.trial: place for place, (draw,) in enumerate(draws)}
-    needs: list[str] = []
+    made: list[Apart] = []
 
     def take(item: tuple[TrialResult, Any]) -> None:
         place = places[item[0].trial]
-        emit(place, _row_of(draws[place][0], item[0], " ".join(needs)))
+        emit(place, _row_of(draws[place][0], item[0], " ".join(made[-1].needs) if made else ""))
 
-    make = functools.partial(_timed, first.decision_limit, needs)
-    run_trials(config, condition(first.controller, config.readings[0]), [*places], take, make=make)
+    def make(*how: Any) -> Controller:
+        for former in made:
+            former.close()
+        made[:] = [Apart(functools.partial(make_controller, *how), first.decision_limit)]
+        return made[0]
 
-
-def _timed(
-    limit: float, needs: list[str], name: str, control: ControlParams, robot: RobotSpec, batch: int
-) -> Controller:
-    """The controller behind its limit; what it needs, and so is given, is put into `needs`."""
-    made = Timed(make_controller(name, control, robot, batch), limit)
-    needs[:] = needs_of(made)
-    return made
+    name = condition(first.controller, config.readings[0])
+    try:
+        run_trials(config, name, [*places], take, make=make)
+    finally:
+        for last in made:
+            last.close()
 
 
 def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from antennate.control.knowledge import needs_of
 from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
+from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.checking import compared, read_rows, refusal
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import (
     Draw,
     Episode,
-    Timed,
     all_drawn,
     lost,
     run_episodes,
@@ -30,12 +31,16 @@ from antennate.experiments.compete.standings import CONTROLLER, none_valid, stan
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.knowledge import require_route
-from antennate.sim.trial import check_start, draw_scene, scene_of
+from antennate.sim.trial import check_start, draw_scene, scene_of, time_limit_of
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
-from antennate.studies.pool import Workers, chunk_of, core_count, gather, workers_from
+from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
+from antennate.studies.run_files import span
 from antennate.studies.work import Failure
 from antennate.types import AntennaFrame, Controller
 
+START, COSTS = 2.0, (0.01, 0.2)
+"""Time to begin, and time of a core for each second of the limits [s]: where all cross early and
+draws go in lockstep, and where most run into the limit, one by one (docs/performance.md)."""
 PATIENCE = 120.0
 """Time in which a controller has to be made and to decide once, before anything is run [s]."""
 
@@ -119,7 +124,6 @@ def check(config: CompeteConfig) -> None:
         Workers(min(len(names), core_count()), timeout=PATIENCE, apart=True),
         no_step,
         lost=given_up,
-        fresh=True,
     )
     for trouble in filter(None, troubles):
         raise ConfigError(f"{config.check or '--controllers'}: {trouble}")
@@ -131,13 +135,14 @@ def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> st
     try:
         for scene, seed in cells:
             settings = tunnel_config(scene, name, seed)
-            made = make_controller(name, settings.control, settings.robot)
-            if needs := needs_of(made):
-                instance = draw_scene(settings, scene_of(settings), 0)
-                require_route(settings.scene, instance, needs)
-            elif (robot := settings.robot.model_dump_json()) not in decided:
-                decided.add(robot)
-                _decide(Timed(made, limit), settings)
+            make = partial(make_controller, name, settings.control, settings.robot)
+            with contextlib.closing(Apart(make, limit)) as made:
+                if made.needs:
+                    instance = draw_scene(settings, scene_of(settings), 0)
+                    require_route(settings.scene, instance, made.needs)
+                elif (robot := settings.robot.model_dump_json()) not in decided:
+                    decided.add(robot)
+                    _decide(made, settings)
     except ControllerError as error:
         return f"{name!r}: {error}"
     except (ConfigError, SceneError) as error:
@@ -154,15 +159,32 @@ def _decide(made: Controller, config: TunnelConfig) -> None:
     checked.step(AntennaFrame(np.zeros(1), counts, joints))
 
 
+def foretold(config: CompeteConfig, workers: Workers) -> str:
+    """How long the episodes will take that are left: between two ends, as nobody knows more yet."""
+    kept = set[int]() if workers.store is None else places_of(workers.store.records)
+    left = [d for i, d in enumerate(draws(config)) if i not in kept and workers.mine(i)]
+    limits = dict[tuple[str, int], float]()
+    for draw in left:
+        if (key := (draw.scene, draw.seed)) not in limits:
+            made = tunnel_config(draw.scene, draw.controller, draw.seed)
+            scene = draw_scene(made, scene_of(made), 0)
+            limits[key] = time_limit_of(scene, made.time_limit)
+    seconds = sum(limits[draw.scene, draw.seed] for draw in left)
+    count = min(workers.count, max(1, len(left)))
+    low, high = (span(START + seconds * cost / count) for cost in COSTS)
+    what, where = f"episode{'s' * (len(left) != 1)}", f"worker{'s' * (count != 1)}"
+    return (
+        f"{len(left)} {what} of {seconds:,.0f} s together at most: {low} to {high}, {count} {where}"
+    )
+
+
 def run(
     config: CompeteConfig,
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> CompeteOutcome:
-    """Run all episodes; a process serves one controller in one scene alone, and then ends.
-
-    One that fails, as its controller changed what others need, is run again in a fresh process.
+    """Run all episodes.
 
     Raises:
         WorkerError: A worker process failed.
@@ -180,8 +202,6 @@ def run(
         chunk=chunk_of(len(planned), workers, BATCH),
         together=True,
         lost=given_up,
-        again=True,
-        fresh=True,
         group=lambda draw: (draw.controller, draw.scene, draw.seed),
     )
     return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
@@ -210,6 +230,7 @@ EXPERIMENT = Experiment.of_folder(
     files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
     failed=failed,
     undivided=undivided,
+    foretold=foretold,
     parts="episodes",
     measures=CONTROLLER,
     anywhere=False,

@@ -7,7 +7,7 @@ from typing import Any
 
 from antennate.control.readings import short_names
 from antennate.control.registry import about
-from antennate.experiments.compete.checking import refusal
+from antennate.experiments.compete.checking import ENOUGH, refusal
 from antennate.experiments.compete.config import DEVELOPMENT
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.scenes import label
@@ -137,10 +137,10 @@ def sentence(result: Result) -> str:
             f"{check['same']} of {check['rows']} rows repeat; {len(check['differ'])} differ, "
             f"{check['other_outcome']} of them in how they end."
         )
-        few = " They are too few to tell." if check["largest_share_difference"] is None else ""
+        few = " They are too few to tell." if check["draws"] < ENOUGH else ""
         sums = (
             f"{check['elsewhere']} are of another version, engine or processor, where chance ends "
-            f"rows in another way: they are judged by their sums alone.{few}"
+            f"rows in another way: they are judged together.{few}"
         )
         return " ".join(filter(None, [text, sums if check["elsewhere"] else "", refusal(check)]))
     rows, names = result["controllers"], ordered(result)

@@ -72,7 +72,7 @@ Servos without torque, or with other gains and limits: the twin alone sets them.
 _URDF = """\
 {title}
 
-robot.urdf  links, joints, limits, masses, inertias and shapes
+robot.urdf  links, joints, limits, masses, inertias and shapes; all links weigh {mass:g} kg
 
 Units: m, kg, s, rad, N·m. x ahead, y left, z up.
 
@@ -139,9 +139,10 @@ def urdf_readme(title: str, robot: RobotSpec) -> str:
     if robot.pitch_count:
         pitch = (
             f"Between yaw and pitch stands a link of {BETWEEN_MASS:g} kg and {BETWEEN_INERTIA:g} "
-            "kg·m², as readers want some.\nThe simulated robot has none there."
+            "kg·m², as readers want some.\nThe simulated robot has none there: the link behind it "
+            "has so much less, so all of it\nweighs the same."
         )
-    return _URDF.format(title=title, pitch=pitch, lacks=_lines(LACKS))
+    return _URDF.format(title=title, mass=robot.mass, pitch=pitch, lacks=_lines(LACKS))
 
 
 def _lines(words: Iterable[str]) -> str:

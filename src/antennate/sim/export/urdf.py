@@ -2,8 +2,9 @@
 
 URDF has one joint a link, and the frame of a link lies on its joint. So a link has the axes of the
 body of the simulated robot, moved to where it turns. Between two servos that turn one body stands a
-link of nearly no mass, as readers want one. A locked pitch joint, which the simulation holds by a
-spring, is left out. Capsules are a cylinder and two spheres, a leg a cylinder.
+link of nearly no mass, as readers want one; the body has so much less. A locked pitch joint, which
+the simulation holds by a spring, is left out. Capsules are a cylinder and two spheres, a leg a
+cylinder.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from antennate.sim.world import PREFIX, add_robot, new_spec
 from antennate.types import Floats
 
 BETWEEN_MASS = 1e-6
-"""Mass of a link between two servos [kg]."""
+"""Mass of a link between two servos, taken from the link behind it [kg]."""
 BETWEEN_INERTIA = 1e-9
 """Its inertia about any axis [kg·m²]."""
 _GEOMS = mujoco.mjtGeom
@@ -83,7 +84,7 @@ def to_urdf(robot: RobotSpec, title: str) -> str:
         first = model.body_jntadr[body]
         anchors[body] = model.jnt_pos[first]
         _add_chain(root, model, body, joints, anchors)
-        _add_link(root, model, body, anchors[body])
+        _add_link(root, model, body, anchors[body], between=max(0, len(joints) - 1))
     ElementTree.indent(root)
     lines = [title, "m, kg, s, rad, N·m; x ahead, y left, z up.", "URDF cannot hold:"]
     comment = "\n".join([*lines, *(f"  - {what}" for what in LACKS)])
@@ -157,13 +158,19 @@ def _place(model: mujoco.MjModel, body: int, anchors: dict[int, Floats]) -> dict
     return _origin(model.body_pos[body] + turn @ anchors[body] - above, turn)
 
 
-def _add_link(root: Element, model: mujoco.MjModel, body: int, anchor: Floats) -> None:
-    """Add the link of a body whose joint is at `anchor` in the body's frame [m], shape (3,)."""
+def _add_link(
+    root: Element, model: mujoco.MjModel, body: int, anchor: Floats, between: int = 0
+) -> None:
+    """Add the link of a body, less what the links between its joints have.
+
+    The innermost joint of it is at `anchor` in its frame [m], shape (3,).
+    """
     link = SubElement(root, "link", name=_name(model.body(body).name))
     turn = _matrix(model.body_iquat[body])
-    inertia = turn @ np.diag(model.body_inertia[body]) @ turn.T
+    inertia = turn @ np.diag(model.body_inertia[body] - between * BETWEEN_INERTIA) @ turn.T
+    mass = float(model.body_mass[body]) - between * BETWEEN_MASS
     place = model.body_ipos[body] - anchor
-    _add_inertial(link, float(model.body_mass[body]), place, inertia)
+    _add_inertial(link, mass, place, inertia)
     first = model.body_geomadr[body]
     geoms = np.arange(first, first + model.body_geomnum[body])
     touching = geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]

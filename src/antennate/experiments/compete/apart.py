@@ -1,0 +1,243 @@
+"""A controller in a process of its own: its judge looks from outside at the time that it takes.
+
+The judge begins a warden, and that the controller. On Linux the warden is a subreaper: whatever the
+controller begins, in however many steps, stays below it, and is counted and found there. So no
+clock of the controller's decides, and what works between two decisions counts for the later one,
+as all that its process does there is to wait. Decisions come back as plain arrays. Limits of the
+system would not do: RLIMIT_CPU counts each process alone, and a cgroup needs rights.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import io
+import multiprocessing
+import os
+import pickle
+import resource
+import signal
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from typing import Any, NoReturn
+
+from antennate.control.knowledge import Kind, Knowing, Knowledge
+from antennate.errors import AntennateError, ConfigError, ControllerError, raised
+from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
+
+WAITING = 20.0
+"""How many times as long a decision may take on the clock as on the processor; the first one may
+take so long on the processor, too."""
+_LOOK = 0.005
+"""Time between two looks at what works for a decision [s]."""
+_LARGEST = 2**26
+"""Most bytes of an answer."""
+_SUBREAPER, _DIES_WITH_PARENT = 36, 1
+"""Numbers of prctl(2)."""
+_PLAIN = {("numpy", name) for name in ("ndarray", "dtype", "_reconstruct", "_frombuffer", "scalar")}
+_PLAIN |= {("antennate", "JointCommand")}
+"""What an answer may hold beside plain values: a package and a name in it."""
+
+
+class Apart:
+    """A controller whose decisions must not take longer than a limit, in a process of its own.
+
+    Args:
+        make: Makes the controller there.
+        limit: Processor time of a step [s].
+
+    Attributes:
+        knows, needs: What it could use and needed when it was made: that it is given, whatever it
+            says later.
+        maneuver, contact, level: As of a `Controller`, of the last step.
+
+    Raises:
+        ConfigError: It cannot be made.
+        ControllerError: It died; later also in a step or reset that raised, that took longer, or
+            that left a program running.
+    """
+
+    maneuver: Ints
+    contact: Ints
+    level: Floats
+
+    def __init__(self, make: Callable[[], Controller], limit: float) -> None:
+        self._limit, self._begun = limit, False
+        self._seen, self._used, self._answered = dict[int, float](), 0.0, 0.0
+        self._pipe, theirs = multiprocessing.Pipe()
+        with warnings.catch_warnings():  # of threads, from Python 3.12 on; a judge's hold no lock
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._warden = os.fork()
+        if not self._warden:
+            _guard(theirs, make)
+        theirs.close()
+        self.knows: tuple[Kind, ...]
+        self.needs: tuple[Kind, ...]
+        self.knows, self.needs = self._ask(float("inf"), "make")
+
+    def know(self, knowledge: Knowledge) -> None:
+        """As of `Knowing`."""
+        self._ask(self._limit, "know", knowledge)
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """As of a `Controller`."""
+        self._ask(WAITING * self._limit, "reset", rows, phase)
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """As of a `Controller`."""
+        limit = self._limit * (1.0 if self._begun else WAITING)
+        command, self.maneuver, self.contact, self.level = self._ask(limit, "step", frame)
+        self._begun = True
+        return command
+
+    def close(self) -> None:
+        """End it, and all that it began: that does the warden, also when the judge is killed."""
+        self._pipe.close()
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):
+            os.kill(self._warden, signal.SIGTERM)
+            os.waitpid(self._warden, 0)
+
+    def _ask(self, limit: float, *call: Any) -> Any:
+        """What it answers; refused if it took longer on the processor [s], or waits for long."""
+        end = time.monotonic() + WAITING * (self._limit if limit < float("inf") else limit)
+        before = self._answered
+        try:
+            self._pipe.send(call)
+            while not self._pipe.poll(_LOOK):
+                self._look()
+                if time.monotonic() > end:
+                    self._give_up()
+            wrong, answer, told = _Plain(io.BytesIO(self._pipe.recv_bytes(_LARGEST))).load()
+        except (EOFError, OSError):
+            raise ControllerError(f"its process ended in {call[0]}") from None
+        except Exception as error:  # noqa: BLE001  (it may send anything)
+            raise ControllerError(f"expected plain arrays, found {error}") from None
+        programs = self._look(told)
+        self._answered = self._used
+        if wrong:
+            raise (ConfigError if wrong == "ConfigError" else ControllerError)(answer)
+        if self._used - before > limit or time.monotonic() > end:
+            self._give_up()
+        if programs:
+            raise ControllerError("a program that it began runs on after a decision")
+        return answer
+
+    def _look(self, told: float = 0.0) -> bool:
+        """Note the processor time used by now; whether there is another process beside its own.
+
+        A program is counted in that of who waited for its end, or as far as it was seen. Where
+        nothing can be seen counts what its process says of itself [s].
+        """
+        below = [*descendants(self._warden)]
+        clocks = {pid: _clock(pid) for pid in below}
+        self._seen |= clocks
+        ended = sum(map(_ended, [self._warden, *below]))
+        self._used = max(told, sum(clocks.values()) + ended, sum(self._seen.values()))
+        return len(below) > 1
+
+    def _give_up(self) -> NoReturn:
+        raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
+
+
+class _Plain(pickle.Unpickler):
+    """Reads an answer; it makes nothing but plain values, arrays and commands."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module.partition(".")[0], name) not in _PLAIN:
+            raise pickle.UnpicklingError(f"{module}.{name}")
+        return super().find_class(module, name)
+
+
+def descendants(pid: int) -> Iterator[int]:
+    """All processes that it began, and those these began; none where the system does not tell."""
+    with contextlib.suppress(OSError):
+        for thread in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  (in every decision)
+            for child in map(int, _text(f"/proc/{pid}/task/{thread}/children").split()):
+                yield child
+                yield from descendants(child)
+
+
+def _clock(pid: int) -> float:
+    """Processor time of a process with all its threads [s]: clock_getcpuclockid(3) of Linux."""
+    with contextlib.suppress(OSError):
+        return time.clock_gettime((~pid << 3) | 2)
+    return 0.0
+
+
+def _ended(pid: int) -> float:
+    """Processor time of the programs for whose end a process has waited [s]: proc_pid_stat(5)."""
+    with contextlib.suppress(OSError):
+        words = _text(f"/proc/{pid}/stat").rpartition(b")")[2].split()
+        return (int(words[13]) + int(words[14])) / os.sysconf("SC_CLK_TCK")
+    return 0.0
+
+
+def _text(path: str) -> bytes:
+    """What a file of /proc says; `open` takes three times as long."""
+    file = os.open(path, os.O_RDONLY)
+    try:
+        return os.read(file, 2**16)
+    finally:
+        os.close(file)
+
+
+def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
+    """What the warden does: it begins the controller, waits for all that is left to it, ends it."""
+    ending, begun = list[int](), list[int]()
+
+    def end(number: int, *_: object) -> None:
+        ending.append(number)
+        for pid in [*descendants(os.getpid())] or begun:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
+    with contextlib.suppress(BaseException):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, end)
+        _prctl(_SUBREAPER)
+        _prctl(_DIES_WITH_PARENT, signal.SIGTERM)
+        begun.append(os.fork())
+        if not begun[0]:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            _prctl(_DIES_WITH_PARENT, signal.SIGKILL)
+            os.closerange(3, pipe.fileno())  # those of the judge
+            os.closerange(pipe.fileno() + 1, 1024)
+            _serve(pipe, make)
+        pipe.close()
+        while True:
+            os.wait()
+            if ending:  # what was begun meanwhile
+                end(*ending[:1])
+    os._exit(0)
+
+
+def _prctl(what: int, value: int = 1) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
+
+
+def _serve(pipe: Connection, make: Callable[[], Controller]) -> None:
+    """What the controller's process does: it answers each call."""
+    made: Any = None
+    while True:
+        name, *values = pipe.recv()
+        wrong, answer = "", None
+        try:
+            if name == "make":
+                made = make()
+                knowing = isinstance(made, Knowing)
+                answer = (tuple(made.knows), tuple(made.needs)) if knowing else ((), ())
+            else:
+                answer = getattr(made, name)(*values)
+            if name == "step":
+                answer = answer, made.maneuver, made.contact, made.level
+        except BaseException as error:  # noqa: BLE001  (it may raise anything)
+            ours = isinstance(error, AntennateError)
+            wrong = type(error).__name__
+            answer = str(error) if ours else f"{name} raised {raised(error)}"
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        told = time.process_time() + ended.ru_utime + ended.ru_stime
+        pipe.send_bytes(pickle.dumps((wrong, answer, told), pickle.HIGHEST_PROTOCOL))
