@@ -126,10 +126,11 @@ the [contract](#policy-files) of a policy.
 Further arguments: `control`, `robot`, `variation`, `tunnel`, `corridors` and `physics`, as of
 `antennate tunnel` ([parameters](parameters.md)), each an object of ours or a table, not a name
 (`robot=RobotSpec.named(...)`), and `readings`: `own`, `none` or `swapped`. Nothing is drawn: films
-are made by `tunnel --controllers FILE.onnx --video`. An environment cannot be pickled or copied
-after its first reset. `max_episode_steps` is given to Gymnasium's own `TimeLimit` by `gym.make`, so
-`info` then has no `outcome`; a vector ends such an episode itself, as `timeout`, one control tick
-before its last decision is over.
+are made by `tunnel --controllers FILE.onnx --video`. After its first reset an
+environment can be neither copied nor pickled, and one line says so: make another by `gym.make`, and
+begin the same episode by `reset(seed=..., options={{"episode_number": ...}})`. `max_episode_steps`
+is given to Gymnasium's own `TimeLimit` by `gym.make`, so `info` then has no `outcome`; a vector
+ends such an episode itself, as `timeout`, one control tick before its last decision is over.
 
 ## Reward
 
