@@ -126,10 +126,11 @@ the [contract](#policy-files) of a policy.
 Further arguments: `control`, `robot`, `variation`, `tunnel`, `corridors` and `physics`, as of
 `antennate tunnel` ([parameters](parameters.md)), each an object of ours or a table, not a name
 (`robot=RobotSpec.named(...)`), and `readings`: `own`, `none` or `swapped`. Nothing is drawn: films
-are made by `tunnel --controllers FILE.onnx --video`. An environment cannot be pickled or copied
-after its first reset. `max_episode_steps` is given to Gymnasium's own `TimeLimit` by `gym.make`, so
-`info` then has no `outcome`; a vector ends such an episode itself, as `timeout`, one control tick
-before its last decision is over.
+are made by `tunnel --controllers FILE.onnx --video`. After its first reset an
+environment can be neither copied nor pickled, and one line says so: make another by `gym.make`, and
+begin the same episode by `reset(seed=..., options={{"episode_number": ...}})`. `max_episode_steps`
+is given to Gymnasium's own `TimeLimit` by `gym.make`, so `info` then has no `outcome`; a vector
+ends such an episode itself, as `timeout`, one control tick before its last decision is over.
 
 ## Reward
 
@@ -168,15 +169,26 @@ uv run antennate drive --arm \\
 
 - Input `observation`, shape (1, n); output `action`, shape (1, k). Of maneuvers it is their
   scores, of which the largest is done.
-- The normaliser is in the graph. Recurrent states are inputs and outputs that the contract names;
-  they are zeros at a start. A policy starts at the first reading that can be used; until then the
+- The normaliser is in the graph.
+- A recurrent state is an input, and the output that is given to it at the next decision, both
+  float32 of one shape. The contract names them:
+  `contract_of(..., states=(State(input="h", output="h_next", shape=(1, 1, 64)),))`, with
+  `from antennate.control.policy.contract import State`. The shape is that of one robot, with all
+  its axes, and has no free length. States are zeros at a start. `write_policy(..., memory=...)`
+  declares its own, `memory`.
+- A policy starts at the first reading that can be used; until then the
   robot holds, and nothing enters its history.
 - A policy made for another robot, rate, gait, observation or action is refused before the first
   trial, with what was expected and what was found. Ids, directions and zeros of servos may differ,
   and so may the calibration of the antennae: one that is given `counts` is right for the sensor it
   was trained with alone, `flex` and `level` are made of any sensor by its own calibration.
-- An answer that is not a number is HOLD. On a robot the supervisor stands behind it, as behind
-  every controller.
+- `write_policy` refuses arrays of other lengths than the contract says, NaN, numbers that float32
+  does not hold, and a `scale` or `clip` that is not above 0. `add_contract` refuses constants that
+  are NaN, infinite (but for masks and bounds) or 0 where they divide. Whoever loads a file first
+  asks for its answers to zeros and to an observation of chance: they, and its states, must be
+  finite.
+- An answer that is not a number later on is HOLD. `tunnel`, `compete` and `drive` say in how many
+  decisions that was so. On a robot the supervisor stands behind it, as behind every controller.
 
 `add_contract` puts a contract into the file of another exporter. This trains with
 Stable-Baselines3 for a moment, and writes such a policy, which answers with the scores of the

@@ -44,19 +44,33 @@ def drawn(path: Path, made: Contract, seed: int = 0) -> tuple[Path, dict[str, An
 
 def counting(path: Path) -> Path:
     """A policy with a state: FORWARD three times, then TURN_L as often as it is asked."""
+    nodes = [
+        h.make_node("Mul", ["n", "go"], ["turn"]),
+        h.make_node("Add", ["turn", "stay"], ["action"]),
+    ]
+    return _with_state(path, {"stay": [[2.5, 0, 0, 0]], "go": [[0, 1.0, 0, 0]]}, nodes)
+
+
+def failing(path: Path) -> Path:
+    """A policy that says FORWARD three times, and from then on the root of a negative number."""
+    nodes = [
+        h.make_node("Sub", ["most", "n"], ["left"]),
+        h.make_node("Sqrt", ["left"], ["action"]),
+    ]
+    return _with_state(path, {"most": [[2.5, 2.4, 2.4, 2.4]]}, nodes)
+
+
+def _with_state(path: Path, more: dict[str, Any], ends: list[Any]) -> Path:
+    """A policy that counts its decisions in n, with constants and nodes for its answer."""
     made = contract()
     made = made.model_copy(update={"states": (State(input="n", output="m", shape=(1, 1)),)})
     real = onnx.TensorProto.FLOAT
-    constants = {"one": [[1.0]], "stay": [[2.5, 0, 0, 0]], "go": [[0, 1.0, 0, 0]]}
+    constants = {"one": [[1.0]], **more}
     tensors = [
         onnx.numpy_helper.from_array(np.array(value, np.float32), name)
         for name, value in constants.items()
     ]
-    nodes = [
-        h.make_node("Add", ["n", "one"], ["m"]),
-        h.make_node("Mul", ["n", "go"], ["turn"]),
-        h.make_node("Add", ["turn", "stay"], ["action"]),
-    ]
+    nodes = [h.make_node("Add", ["n", "one"], ["m"]), *ends]
     info = h.make_tensor_value_info
     given = [info("observation", real, [1, len(made.observations)]), info("n", real, [1, 1])]
     put = [info("action", real, [1, 4]), info("m", real, [1, 1])]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 import subprocess
 import sys
 import warnings
@@ -19,7 +21,7 @@ from gymnasium.vector import AutoresetMode
 from antennate import envs
 from antennate.control.policy.interface import PolicyInterface, observations
 from antennate.envs.reward import EARLY, EXIT, HOLD, PROGRESS, TIME
-from antennate.errors import ConfigError
+from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import ControlParams
@@ -591,3 +593,32 @@ def test_rows_without_a_seed_of_their_own_get_one_by_chance():
     _, info = vector.reset(seed=[1, None, 2])
     assert info["seed"][[0, 2]].tolist() == [1, 2]
     assert info["seed"][1] >= 2**32
+
+
+# copies
+
+
+@pytest.mark.parametrize("kind", ["make", "make_vec"])
+def test_an_environment_that_has_begun_refuses_to_be_copied_in_one_line(kind: str) -> None:
+    """`copy.copy` gave one that shared the simulation, the others an error of memoryviews."""
+    env = getattr(gym, kind)("antennate/Flat-v1").unwrapped
+    env.reset(seed=3)
+    for act in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(BadInputError, match=r"expected no copy .*gymnasium\.make.*reset") as no:
+            act(env)
+        assert "\n" not in str(no.value)
+        assert isinstance(no.value, TypeError)  # as of all that cannot be pickled
+    env.step(env.action_space.sample())
+
+
+@pytest.mark.parametrize("act", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_an_environment_that_has_not_begun_is_copied_whole(act: Any) -> None:
+    env = gym.make("antennate/Flat-v1").unwrapped
+    other = act(env)
+    with pytest.raises(BadInputError, match="expected no copy"):
+        copy.copy(env)
+    first, again = env.reset(seed=3)[0], other.reset(seed=3)[0]
+    assert np.array_equal(first, again)
+    moved = [env.step(0)[0] for _ in range(3)][-1]
+    assert not np.array_equal(moved, other.step(0)[0])
+    assert np.array_equal(moved, [other.step(0)[0] for _ in range(2)][-1])

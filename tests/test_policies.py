@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 import resource
 import signal
 import sys
@@ -14,10 +16,10 @@ import onnx
 import pytest
 from lockstep import BoardPort, LockstepClock
 from pages import blocks
-from policy_files import FORWARD, constant, contract, counting, drawn
+from policy_files import FORWARD, constant, contract, counting, drawn, failing
 from recorded import recorded
 
-from antennate.cli import main
+from antennate.cli import main, viewer
 from antennate.control.policy.contract import Contract, contract_of, require_match
 from antennate.control.policy.controller import Policy
 from antennate.control.policy.interface import PolicyInterface, Quantity, actions, observations
@@ -25,6 +27,9 @@ from antennate.control.policy.writer import add_contract, write_policy
 from antennate.control.readers import UNREAD_BY_POLICIES
 from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError, OutputError
+from antennate.experiments.compete.episodes import Draw, run_episodes
+from antennate.experiments.compete.page import sentence
+from antennate.experiments.compete.standings import standings
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.hardware.config import DriveConfig
@@ -151,14 +156,66 @@ def test_rows_do_not_influence_one_another(tmp_path: Path, mode: str) -> None:
 
 
 def test_an_answer_that_is_no_number_is_hold(tmp_path: Path) -> None:
-    path = constant(tmp_path / "p.onnx", (np.nan, 0.0, 0.0, 0.0))
-    control = make_controller(str(path))
+    control, ticks = make_controller(str(failing(tmp_path / "p.onnx"))), PolicyInterface().ticks
     control.reset(np.array([0]), 1.0)
-    first = control.step(frame(0.0, 1800.0))
-    again = control.step(frame(0.01, 1800.0))
-    assert control.maneuver.tolist() == [Maneuver.HOLD]
-    assert np.array_equal(first.yaw, again.yaw)
-    assert [row.share_hold for row in trials_of(path)] == [1.0] * 3
+    yaw = []
+    for tick in range(3 * ticks + 2):
+        yaw.append(control.step(frame(0.01 * tick, 1800.0)).yaw)
+        held = tick >= 3 * ticks
+        assert control.maneuver.tolist() == [Maneuver.HOLD if held else Maneuver.FORWARD]
+    assert np.array_equal(yaw[-1], yaw[-2])
+    assert not np.array_equal(yaw[0], yaw[1])
+
+
+def test_tunnel_says_in_how_many_decisions_the_answer_was_no_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decisions fall at 0, 0.1, ... 2 s: 21 in a trial of 2 s, of which three are FORWARD."""
+    monkeypatch.chdir(tmp_path)
+    failing(Path("p.onnx"))
+    words = ["--trials", "2", "--time-limit", "2", "--workers", "1", "--out", "run"]
+    assert main(["tunnel", "--controllers", "open", "p.onnx", *words]) == 0
+    said = capsys.readouterr().out
+    assert "Decisions whose answer was no number, so that the robot held: p.onnx 36." in said
+    result = json.loads(Path("run/result.json").read_text())["controllers"]
+    assert {name: row["void_decisions"] for name, row in result.items()} == {
+        "open": 0,
+        "p.onnx": 36,
+    }
+    rows = [*csv.DictReader(Path("run/trials.csv").read_text().splitlines())]
+    assert [row["void_decisions"] for row in rows] == ["0", "0", "18", "18"]
+
+
+def test_compete_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: Path) -> None:
+    """Of 100 s, in which the robot leaves nothing and reaches nothing, 1001 less three."""
+    path = str(failing(tmp_path / "p.onnx"))
+    rows: list[Any] = []
+    run_episodes([(Draw(path, "flat", 5, 0, 1.0),)], lambda place, row: rows.append(row))
+    assert [(row.outcome, row.void_decisions) for row in rows] == [("timeout", 998)]
+    said = sentence({"check": None, "seeds": [5], "hidden": False, **standings(rows, 0.0)})
+    assert said.endswith(
+        "Decisions whose answer was no number, so that the robot held: p.onnx 998."
+    )
+
+
+def test_drive_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: Path) -> None:
+    robot = watched(TwinConfig())[0]
+    clock = LockstepClock(robot)
+    path = str(failing(tmp_path / "p.onnx"))
+    config = DriveConfig(controller=path, dry_run=0.5, duration=4.0, touch_check=False)
+    session = prepare(config, BoardPort(robot, clock), clock, clock)
+    held: list[bool] = []
+
+    def on_tick(session: Session, now: float) -> None:
+        held.append(session.control.decision.maneuver == Maneuver.HOLD)
+
+    result = drive(session, config, True, on_tick).result(session)
+    last = held[::-1].index(False)  # ticks since it walked, ten to a decision
+    assert result["void_decisions"] == math.ceil(last / 10) > 5
+    head = {"controller": path, "armed": True}
+    said = viewer.sentences(head | result).splitlines()
+    told = f"Decisions whose answer was no number, so that the robot held: `{path}` "
+    assert f"{told}{result['void_decisions']}." in said
 
 
 def test_a_reading_that_cannot_be_used_is_hold(tmp_path: Path) -> None:
@@ -310,7 +367,13 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
     del model.metadata_props[:]
     (tmp_path / "bare.onnx").write_bytes(model.SerializeToString())
     (tmp_path / "text.onnx").write_text("no model")
-    constant(tmp_path / "size.onnx", (1.0, 2.0, 3.0), contract())
+    short = onnx.load(str(path))
+    for tensor in short.graph.initializer:
+        if tensor.name in ("w0", "b0"):
+            three = onnx.numpy_helper.to_array(tensor)[:3]
+            tensor.CopyFrom(onnx.numpy_helper.from_array(three, tensor.name))
+    short.graph.output[0].type.tensor_type.shape.dim[1].dim_value = 3
+    (tmp_path / "size.onnx").write_bytes(short.SerializeToString())
     old = json.loads(contract().model_dump_json()) | {"version": 2}
     model.metadata_props.add(key="antennate", value=json.dumps(old))
     (tmp_path / "new.onnx").write_bytes(model.SerializeToString())
@@ -355,6 +418,129 @@ def test_files_that_are_no_policy_are_refused_in_one_line(
         assert main(["tunnel", *argv]) == 2
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert words in line
+
+
+BROKEN = {
+    "scale[3]": (0.0, -1.0, math.nan, math.inf, 1e-300),
+    "mean[3]": (math.nan, -math.inf, 1e300),
+    "layers[0][0][0]": (math.nan, 1e300),
+    "layers[1][1][0]": (math.inf, math.nan),
+    "choices[0]": (math.nan, math.inf),
+    "memory[1][0]": (math.nan, -1e39),
+    "clip": (0.0, -1.0, math.nan, math.inf, 1e39),
+}
+"""Numbers that no network may hold, by where they are put; float32 ends at 3.4e38."""
+
+
+def parts_of_policy(**sizes: int) -> dict[str, Any]:
+    """All that `write_policy` is given for a memory of three and two layers of two, of ones."""
+    n, h, k = len(contract().observations), 3, sizes.get("k", 4)
+    memory = [np.ones(shape) for shape in ((3 * h, n), (3 * h, h), (3 * h,), (3 * h,))]
+    layers = [[np.ones((2, h)), np.ones(2)], [np.ones((2, 2)), np.ones(2)]]
+    parts = {"layers": layers, "mean": np.ones(n), "scale": np.ones(n), "clip": 5.0}
+    return {**parts, "choices": np.ones((2, k)), "memory": memory}
+
+
+@pytest.mark.parametrize(("where", "value"), [(w, v) for w, vs in BROKEN.items() for v in vs])
+def test_a_number_that_breaks_a_policy_is_refused_by_the_name_of_its_input(
+    tmp_path: Path, where: str, value: float
+) -> None:
+    parts = parts_of_policy()
+    Policy(write_policy(tmp_path / "sound.onnx", contract(), **parts))
+    name, *places = where.replace("]", "").split("[")
+    if not places:
+        parts[name] = value
+    else:
+        array = parts[name]
+        for place in places[:-1]:
+            array = array[int(place)]
+        array[int(places[-1])] = value
+    with pytest.raises(BadInputError) as found:
+        write_policy(tmp_path / "p.onnx", contract(), **parts)
+    named = "".join([name, *(f"[{place}]" for place in places[:-1])])
+    assert str(found.value).startswith(f"{named}: expected ")
+    assert "\n" not in str(found.value)
+    assert not (tmp_path / "p.onnx").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"mean": np.ones(3)}, "mean: expected 200 finite numbers, found shape (3,)"),
+        ({"scale": np.ones((200, 1))}, "scale: expected 200 finite numbers"),
+        ({"layers": []}, "number of layers: expected a whole number of at least 1, found 0"),
+        ({"layers": [[np.ones((2, 4)), np.ones(2)]]}, "layers[0][0]: expected finite numbers of"),
+        ({"choices": np.ones((2, 3))}, "choices: expected finite numbers of shape (2, 4)"),
+        ({"choices": None}, "layers[1][0]: expected finite numbers of shape (4, 2)"),
+        ({"memory": [np.ones(3)] * 3}, "number of arrays in memory: expected a whole number of 4"),
+        ({"memory": [np.ones((9, 200)), np.ones((9, 2)), *[np.ones(9)] * 2]}, "memory[1]: "),
+        ({"mean": "words"}, "mean: expected 200 finite numbers, found 'words'"),
+    ],
+)
+def test_an_array_of_another_shape_is_refused_by_its_name(
+    tmp_path: Path, change: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadInputError) as found:
+        write_policy(tmp_path / "p.onnx", contract(), **(parts_of_policy() | change))
+    assert told in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("w0", math.nan, "w0: expected finite numbers"),
+        ("b0", math.inf, "b0: expected finite numbers"),
+        ("mean", -math.inf, "mean: expected finite numbers"),
+        ("scale", 0.0, "scale: expected finite numbers, and none of 0 that divides, found 0"),
+        ("high", math.inf, ""),  # a bound
+    ],
+)
+def test_a_broken_constant_of_another_exporter_is_refused_by_its_name(
+    tmp_path: Path, name: str, value: float, told: str
+) -> None:
+    path, _ = drawn(tmp_path / "p.onnx", contract())
+    model = onnx.load(str(path))
+    for tensor in model.graph.initializer:
+        if tensor.name == name:
+            numbers = np.array(onnx.numpy_helper.to_array(tensor))
+            numbers.flat[0] = value
+            tensor.CopyFrom(onnx.numpy_helper.from_array(numbers, name))
+    path.write_bytes(model.SerializeToString())
+    if not told:
+        add_contract(path, contract())
+        return
+    with pytest.raises(BadInputError) as found:
+        add_contract(path, contract())
+    assert f"{path}: {told}" in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("answer", "expected finite numbers as action for 200 zeros, found nan"),
+        ("chance", "expected finite numbers as action for an observation of chance, found inf"),
+        ("state", "expected finite numbers as m for an observation of chance, found inf"),
+    ],
+)
+def test_a_file_whose_answer_is_no_number_is_refused_before_the_first_trial(
+    tmp_path: Path, refused: Any, kind: str, told: str
+) -> None:
+    """Files as they may have been written before that was checked."""
+    path = (
+        counting(tmp_path / "p.onnx") if kind == "state" else constant(tmp_path / "p.onnx", FORWARD)
+    )
+    model = onnx.load(str(path))
+    changes = {"answer": ("b0", 0, math.nan), "chance": ("w0", 0, 3e38), "state": ("one", 0, 2e38)}
+    name, place, value = changes[kind]
+    for tensor in model.graph.initializer:
+        if tensor.name == name:
+            numbers = np.array(onnx.numpy_helper.to_array(tensor))
+            numbers[...] = value if kind != "answer" else numbers
+            numbers.flat[place] = value
+            tensor.CopyFrom(onnx.numpy_helper.from_array(numbers, name))
+    path.write_bytes(model.SerializeToString())
+    assert told in refused("tunnel", "--controllers", str(path), "--out", str(tmp_path / "run"))
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_contract_is_put_into_sound_files_alone(tmp_path: Path) -> None:

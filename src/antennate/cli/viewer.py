@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.cli.terminal import StatusLine, write_below_status
+from antennate.control.loop import void_sentence
 from antennate.control.readings import short_names
 from antennate.errors import AntennateError, LogError
 from antennate.hardware.driving.report import late_sentence
@@ -265,7 +266,9 @@ def sentences(result: Mapping[str, Any]) -> str:
     causes = f"{result['refusal']}; {result['why']}" if held or failed(result) else ""
     held = result.get("held")  # results of older versions have none
     last = [f"Before torque went off: {held}."] if held else []
-    return "\n".join([_sentence(result), *late_sentence(result), *what_to_do(causes), *last])
+    void = void_sentence({f"`{result['controller']}`": result.get("void_decisions", 0)})
+    lines = [_sentence(result), void, *late_sentence(result), *what_to_do(causes), *last]
+    return "\n".join(filter(None, lines))
 
 
 _LONG = 1.0

@@ -7,7 +7,7 @@ since a controller may be anybody's code, and new numbers for a controller that 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
 from typing import Any, Protocol
@@ -225,6 +225,18 @@ class CheckedController:
             self.faults[int(row)] = f"expected levels of 0 to 1, or NaN, found {self.level[row]}"
 
 
+def void_decisions(controller: object, row: int = 0) -> int:
+    """Decisions of a learned policy in which its answer was no number; 0 of other controllers."""
+    counts = getattr(controller, "void_decisions", None)
+    return int(counts[row]) if isinstance(counts, np.ndarray) else 0
+
+
+def void_sentence(counts: Mapping[str, int]) -> str:
+    """Which policies answered with no number and how often; empty if none did."""
+    some = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    return f"Decisions whose answer was no number, so that the robot held: {some}." if some else ""
+
+
 class Wrapped:
     """A controller that stands before another one, and answers as that does.
 
@@ -254,6 +266,11 @@ class Wrapped:
     def phase(self) -> Floats | None:
         """Gait phase [rad], shape (B,); None if the controller tells none."""
         return getattr(self._made, "phase", None)
+
+    @property
+    def void_decisions(self) -> Ints | None:
+        """As of a learned policy; None of any other controller."""
+        return getattr(self._made, "void_decisions", None)
 
     @property
     def knows(self) -> tuple[Kind, ...]:

@@ -12,12 +12,12 @@ from antennate.envs.episodes import Episodes
 from antennate.envs.reward import REWARD_VERSION, TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
 from antennate.envs.truth import OUTCOMES, Truth
-from antennate.envs.vector import config_of, known_options, require_no_pictures, whole
+from antennate.envs.vector import NotCopied, config_of, known_options, require_no_pictures, whole
 from antennate.params.base import LARGEST_SEED
 from antennate.sim.world import World
 
 
-class AntennaEnv(Env[Any, Any]):
+class AntennaEnv(NotCopied, Env[Any, Any]):
     """One robot in a scene.
 
     A seed s begins episode 0 of it, and each reset without a seed the next one;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -24,6 +24,34 @@ from antennate.types import Bools
 
 class RenderModeError(ConfigError, TypeError):
     """There are no pictures. Stable-Baselines3 asks for some, and for none after a TypeError."""
+
+
+class CopyError(ConfigError, TypeError):
+    """There is no copy of an environment. It is a TypeError, as of all that cannot be pickled."""
+
+
+class NotCopied:
+    """An environment that has begun is neither copied nor pickled: its simulation would be lost."""
+
+    _seeded = False
+
+    def __copy__(self) -> Any:
+        """Refuse: the copy would share its simulation."""
+        raise _no_copy(self)
+
+    def __reduce_ex__(self, protocol: SupportsIndex, /) -> str | tuple[Any, ...]:
+        """Be pickled or deeply copied before the first reset, and refuse it then."""
+        if self._seeded:
+            raise _no_copy(self)
+        return super().__reduce_ex__(protocol)
+
+
+def _no_copy(env: object) -> CopyError:
+    return CopyError(
+        f"{type(env).__name__}: expected no copy of a simulation, found one; make another "
+        "environment by gymnasium.make with the same arguments, and begin the same episode by "
+        "reset(seed=..., options={'episode_number': ...})"
+    )
 
 
 def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
@@ -63,7 +91,7 @@ def require_no_pictures(render_mode: object) -> None:
         )
 
 
-class AntennaVectorEnv(VectorEnv[Any, Any, Any]):
+class AntennaVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
     """B robots in a scene, stepped in lockstep.
 
     Row i of an integer seed s plays the episodes i, i + B, i + 2 B ... of seed s; with a list of

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import alike, numbers, scalar, whole
 from antennate.types import Floats
 
 
@@ -37,16 +38,16 @@ class PlanarChain:
     drag_ratio: float = 2.0
 
     def __post_init__(self) -> None:
-        if len(self.lengths) < 2:
+        if np.ndim(self.lengths) == 1 and len(self.lengths) < 2:
             raise BadInputError(f"a chain needs 2 links or more, found {len(self.lengths)}")
-        for name, value in (*(("length", v) for v in self.lengths), ("ratio", self.drag_ratio)):
-            if not (np.isfinite(value) and value > 0):
-                raise BadInputError(f"each {name} of a chain must be above 0, found {value}")
+        numbers("each length of a chain", self.lengths, None, above=0.0)
+        scalar("the drag ratio of a chain", self.drag_ratio, above=0.0)
 
     @classmethod
     def equal(cls, links: int, length: float = 1.0, drag_ratio: float = 2.0) -> PlanarChain:
         """A chain of links that are equally long and `length` together."""
-        return cls((length / max(links, 1),) * links, drag_ratio)
+        whole("links", links, 2)
+        return cls((scalar("length", length, above=0.0) / links,) * links, drag_ratio)
 
     @property
     def links(self) -> int:
@@ -65,7 +66,7 @@ class PlanarChain:
 
     def poses(self, shape: Floats) -> Floats:
         """Centre and heading (x, y, heading) of each link in the first one's frame, (..., N, 3)."""
-        shape = np.asarray(shape, dtype=float)
+        shape = numbers("shape", shape, self.joints)
         heading = np.concatenate([np.zeros_like(shape[..., :1]), np.cumsum(shape, -1)], axis=-1)
         half = np.array(self.lengths) / 2
         ends = half[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
@@ -107,6 +108,7 @@ class PlanarChain:
 
     def connection(self, shape: Floats, link: int = 0) -> Floats:
         """Local connection A (..., 3, m): a link's twist is -A rate (Hatton and Choset 2011)."""
+        whole("link", link, -self.links, self.links - 1)
         resistance = self.resistance(shape)
         first: Floats = np.asarray(
             np.linalg.solve(resistance[..., :3, :3], resistance[..., :3, 3:]), dtype=np.float64
@@ -125,7 +127,9 @@ class PlanarChain:
 
     def twist(self, shape: Floats, rate: Floats, link: int = 0) -> Floats:
         """Twists (..., 3) of a link while the shape changes at the rates (..., m) [rad/s]."""
-        return -(self.connection(shape, link) @ np.asarray(rate)[..., None])[..., 0]
+        given = numbers("shape", shape, self.joints), numbers("rate", rate, self.joints)
+        alike("shape and rate", *given)
+        return -(self.connection(shape, link) @ given[1][..., None])[..., 0]
 
 
 def purcell(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import called, numbers, scalar, whole
 from antennate.mechanics.lie import se2_adjoint, se2_inverse, se2_pose
 from antennate.mechanics.stroke import Connection
 from antennate.types import Floats, Ints
@@ -63,9 +64,11 @@ def minimum_perturbation(connection: Connection, shapes: Floats, degree: int = 8
     Raises:
         BadInputError: Fewer equations than coefficients.
     """
-    shapes = np.asarray(shapes, dtype=float)
+    whole("degree", degree, 0)
+    shapes = numbers("shapes", shapes, None, None)
+    numbers("shapes", shapes[None], 1, *shapes.shape[-2:])
     count, joints = shapes.shape
-    reach = float(np.abs(shapes).max())
+    reach = scalar("largest shape", np.abs(shapes).max(initial=0.0), above=0.0)
     degrees = itertools.product(range(degree + 1), repeat=joints)
     powers = np.array([power for power in degrees if sum(power) <= degree])
     if count * joints < len(powers):
@@ -74,7 +77,7 @@ def minimum_perturbation(connection: Connection, shapes: Floats, degree: int = 8
             f"degree {degree}: give more shapes or a lower degree"
         )
     values, slopes = _polynomials(shapes, reach, powers)
-    matrices = connection(shapes)
+    matrices = numbers("connection", called("connection", connection, shapes), count, 3, joints)
     turning = np.swapaxes(slopes, -1, -2)  # (n, m, P): what each coefficient adds to the rows of A
     swing = matrices[:, 2, :, None] * values[:, None, :]
     moving = np.block([[turning, swing], [-swing, turning]])  # x' = dx + A_theta y, y' = dy - ...
@@ -90,14 +93,16 @@ def _least_squares(rows: Floats, wanted: Floats) -> Floats:
 
 def square(reach: float, count: int = 24) -> Floats:
     """Shapes (count^2, 2) [rad]: cell centres of the square from -reach to reach."""
-    line = reach * ((np.arange(count) + 0.5) * 2 / count - 1)
+    whole("count", count, 1)
+    line = scalar("reach", reach, above=0.0) * ((np.arange(count) + 0.5) * 2 / count - 1)
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _polynomials(shape: Floats, reach: float, powers: Ints) -> tuple[Floats, Floats]:
     """Products of Legendre polynomials (..., P) and their slopes (..., P, m) [per rad]."""
     degree = int(powers.max())
-    values = legendre.legvander(np.asarray(shape, dtype=float) / reach, degree)
+    shape = numbers("shape", shape, powers.shape[1])
+    values = legendre.legvander(shape / reach, degree)
     slopes = values[..., :degree] @ legendre.legder(np.eye(degree + 1)) / reach
     joints = np.arange(powers.shape[1])
     factors, rates = values[..., joints, powers], slopes[..., joints, powers]

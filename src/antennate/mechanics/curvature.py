@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from antennate.mechanics.arguments import called, numbers, sampled, whole
 from antennate.mechanics.lie import se2_bracket
 from antennate.mechanics.stroke import Connection, Stroke
 from antennate.types import Floats
@@ -23,11 +24,14 @@ def gradient(function: Connection, shape: Floats) -> Floats:
 
     The shape is (..., m), the function's value any array with the shape's leading axes.
     """
-    shape = np.asarray(shape, dtype=float)
+    shape = numbers("shape", shape, None)
     steps = _STEP * np.eye(shape.shape[-1])
     weights = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
     columns = [
-        sum(weight / _STEP * function(shape + at * step) for at, weight in weights.items())
+        sum(
+            weight / _STEP * called("function", function, shape + at * step)
+            for at, weight in weights.items()
+        )
         for step in steps
     ]
     return np.stack(columns, axis=-1)
@@ -44,15 +48,15 @@ def curvature(connection: Connection, shape: Floats) -> Floats:
 
     A small loop from shape j towards shape k with the area a moves the body by -DA_jk a.
     """
-    columns = np.swapaxes(connection(np.asarray(shape, dtype=float)), -1, -2)
+    columns = np.swapaxes(called("connection", connection, numbers("shape", shape, None)), -1, -2)
     bracket = se2_bracket(columns[..., :, None, :], columns[..., None, :, :])
     return exterior_derivative(connection, shape) - np.moveaxis(bracket, -1, -3)
 
 
 def velocity_integral(connection: Connection, stroke: Stroke, steps: int = 200) -> Floats:
     """Body velocity integral (3,) of a stroke: its twist summed as if motions commuted."""
-    shape, rate = stroke((np.arange(steps) + 0.5) / steps)
-    return -(connection(shape) @ rate[..., None])[..., 0].mean(axis=0)
+    shape, rate = sampled(stroke, (np.arange(whole("steps", steps, 1)) + 0.5) / steps)
+    return -(called("connection", connection, shape) @ rate[..., None])[..., 0].mean(axis=0)
 
 
 def corrected_integral(connection: Connection, stroke: Stroke, steps: int = 200) -> Floats:
@@ -61,12 +65,12 @@ def corrected_integral(connection: Connection, stroke: Stroke, steps: int = 200)
     It is the plain integral and, over the cone, the local Lie bracket, with Gauss points along
     each ray. `exp` of it estimates the displacement.
     """
-    shape, rate = stroke((np.arange(steps) + 0.5) / steps)
+    shape, rate = sampled(stroke, (np.arange(whole("steps", steps, 1)) + 0.5) / steps)
     ray = shape - shape.mean(axis=0)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     along, weights = (nodes + 1) / 2, weights / 2
     shapes = shape.mean(axis=0) + along[:, None, None] * ray
-    columns = connection(shapes)
+    columns = called("connection", connection, shapes)
     outward, around = columns @ ray[..., None], columns @ rate[..., None]
     bracket = se2_bracket(outward[..., 0], around[..., 0])
     inside = ((weights * along)[:, None, None] * bracket).sum(axis=0).mean(axis=0)

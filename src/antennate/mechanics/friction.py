@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from antennate.mechanics.arguments import alike, numbers, whole
 from antennate.mechanics.chain import PlanarChain
 from antennate.types import Floats
 
@@ -28,7 +29,9 @@ _EVEN = 0.3
 
 def coulomb_twist(chain: PlanarChain, shape: Floats, rate: Floats, link: int = 0) -> Floats:
     """Twists (..., 3) of a link at shapes [rad] and joint rates [rad/s], both (..., m)."""
-    shape, rate = np.broadcast_arrays(np.asarray(shape, dtype=float), np.asarray(rate, dtype=float))
+    whole("link", link, -chain.links, chain.links - 1)
+    given = numbers("shape", shape, chain.joints), numbers("rate", rate, chain.joints)
+    shape, rate = alike("shape and rate", *given)
     flat = shape.reshape(-1, chain.joints), rate.reshape(-1, chain.joints)
     jacobians = chain.jacobians(flat[0])
     motion = np.concatenate([_first_twist(chain, *flat, jacobians), flat[1]], axis=-1)
@@ -38,7 +41,9 @@ def coulomb_twist(chain: PlanarChain, shape: Floats, rate: Floats, link: int = 0
 
 def coulomb_power(chain: PlanarChain, shape: Floats, rate: Floats, twist: Floats) -> Floats:
     """Dissipation (...) by friction, if the first link has the twists (..., 3)."""
-    motion = np.concatenate([twist, rate], axis=-1)
+    given = numbers("rate", rate, chain.joints), numbers("twist", twist, 3)
+    alike("rate and twist", given[0][..., :1], given[1][..., :1])
+    motion = np.concatenate(given[::-1], axis=-1)
     slip = (chain.jacobians(shape) @ motion[..., None, :, None])[..., 0]
     return _integrals(chain, slip, np.full(slip.shape[:-2], 1e-9))[0].sum(axis=-1)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from antennate.mechanics.arguments import alike, numbers
 from antennate.types import Floats
 
 _SERIES = 0.02
@@ -25,7 +26,8 @@ def _sinc(angle: Floats) -> Floats:
 
 def se2_pose(x: Floats | float, y: Floats | float, heading: Floats | float) -> Floats:
     """Poses in the plane of positions and headings [rad], shape (..., 3, 3)."""
-    x, y, heading = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, y, heading)))
+    given = {"x": x, "y": y, "heading": heading}
+    x, y, heading = alike("x, y and heading", *(numbers(*each) for each in given.items()))
     pose = np.zeros((*x.shape, 3, 3))
     cosine, sine = np.cos(heading), np.sin(heading)
     pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 2] = cosine, -sine, x
@@ -36,7 +38,7 @@ def se2_pose(x: Floats | float, y: Floats | float, heading: Floats | float) -> F
 
 def se2_exp(twist: Floats) -> Floats:
     """Poses reached in unit time with constant twists (..., 3), shape (..., 3, 3)."""
-    twist = np.asarray(twist, dtype=float)
+    twist = numbers("twist", twist, 3)
     vx, vy, turn = twist[..., 0], twist[..., 1], twist[..., 2]
     ahead = _sinc(turn)
     aside = turn / 2 * _sinc(turn / 2) ** 2
@@ -45,7 +47,7 @@ def se2_exp(twist: Floats) -> Floats:
 
 def se2_log(pose: Floats) -> Floats:
     """Twists (..., 3) that reach the poses (..., 3, 3) in unit time; omega in (-pi, pi]."""
-    pose = np.asarray(pose, dtype=float)
+    pose = numbers("pose", pose, 3, 3)
     turn = np.arctan2(pose[..., 1, 0], pose[..., 0, 0])
     x, y = pose[..., 0, 2], pose[..., 1, 2]
     ahead = np.cos(turn / 2) / _sinc(turn / 2)
@@ -60,14 +62,15 @@ def se2_inverse(pose: Floats) -> Floats:
 
 def se2_adjoint(pose: Floats) -> Floats:
     """Matrices Ad(g) (..., 3, 3): a twist in the frame of g, seen from the frame g is given in."""
-    adjoint = np.array(pose, dtype=float)
+    pose = numbers("pose", pose, 3, 3)
+    adjoint = pose.copy()
     adjoint[..., 0, 2], adjoint[..., 1, 2] = pose[..., 1, 2], -pose[..., 0, 2]
     return adjoint
 
 
 def se2_bracket(a: Floats, b: Floats) -> Floats:
     """Lie brackets [a, b] of twists (..., 3), shape (..., 3)."""
-    a, b = np.broadcast_arrays(a, b)
+    a, b = alike("a and b", numbers("a", a, 3), numbers("b", b, 3))
     x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     return np.stack([x, y, np.zeros_like(x)], axis=-1)
@@ -75,7 +78,7 @@ def se2_bracket(a: Floats, b: Floats) -> Floats:
 
 def hat(vector: Floats) -> Floats:
     """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
-    vector = np.asarray(vector, dtype=float)
+    vector = numbers("vector", vector, 3)
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     zero = np.zeros_like(x)
     rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
@@ -84,6 +87,7 @@ def hat(vector: Floats) -> Floats:
 
 def so3_exp(rotation: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) [rad]."""
+    rotation = numbers("rotation", rotation, 3)
     angle = np.linalg.norm(rotation, axis=-1)[..., None, None]
     cross = hat(rotation)
     return np.eye(3) + _sinc(angle) * cross + _sinc(angle / 2) ** 2 / 2 * (cross @ cross)
@@ -94,7 +98,7 @@ def so3_log(matrix: Floats) -> Floats:
 
     By way of the quaternion, whose largest component is never small: exact up to pi.
     """
-    m = np.asarray(matrix, dtype=float)
+    m = numbers("matrix", matrix, 3, 3)
     trace = np.trace(m, axis1=-2, axis2=-1)[..., None, None]
     outer = m + np.swapaxes(m, -1, -2) + (1 - trace) * np.eye(3)  # 4 v v^T of a quaternion (v, s)
     odd = np.stack(
@@ -123,7 +127,7 @@ def so3_log(matrix: Floats) -> Floats:
 
 def se3_exp(twist: Floats) -> Floats:
     """Poses reached in unit time with constant twists (..., 6), shape (..., 4, 4)."""
-    twist = np.asarray(twist, dtype=float)
+    twist = numbers("twist", twist, 6)
     velocity, rotation = twist[..., :3], twist[..., 3:]
     angle = np.linalg.norm(rotation, axis=-1)[..., None, None]
     cross = hat(rotation)
@@ -143,7 +147,7 @@ def se3_exp(twist: Floats) -> Floats:
 
 def se3_log(pose: Floats) -> Floats:
     """Twists (..., 6) that reach the poses (..., 4, 4) in unit time; they turn by pi at most."""
-    pose = np.asarray(pose, dtype=float)
+    pose = numbers("pose", pose, 4, 4)
     rotation = so3_log(pose[..., :3, :3])
     angle = np.linalg.norm(rotation, axis=-1)[..., None, None]
     cross = hat(rotation)
@@ -165,7 +169,7 @@ def se3_inverse(pose: Floats) -> Floats:
 
 def se3_adjoint(pose: Floats) -> Floats:
     """Matrices Ad(g) (..., 6, 6): a twist in the frame of g, seen from the frame g is given in."""
-    pose = np.asarray(pose, dtype=float)
+    pose = numbers("pose", pose, 4, 4)
     rotation = pose[..., :3, :3]
     adjoint = np.zeros((*pose.shape[:-2], 6, 6))
     adjoint[..., :3, :3] = adjoint[..., 3:, 3:] = rotation
@@ -174,7 +178,7 @@ def se3_adjoint(pose: Floats) -> Floats:
 
 
 def _inverse(pose: Floats, size: int) -> Floats:
-    inverse = np.array(pose, dtype=float)
+    inverse = numbers("pose", pose, size + 1, size + 1).copy()
     back = np.swapaxes(inverse[..., :size, :size], -1, -2).copy()
     inverse[..., :size, :size] = back
     inverse[..., :size, size] = -(back @ inverse[..., :size, size, None])[..., 0]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import scalar, whole
 from antennate.mechanics.chain import PlanarChain
 from antennate.mechanics.coordinates import minimum_perturbation, square
 from antennate.mechanics.curvature import corrected_integral, curvature
@@ -74,7 +75,8 @@ def curvature_map(chain: PlanarChain, reach: float = 2.4, count: int = 61) -> Cu
     """
     if chain.links != 3:
         raise BadInputError(f"a map needs a chain of 3 links, found {chain.links}")
-    angle = np.linspace(-reach, reach, count)
+    whole("count", count, 2)
+    angle = np.linspace(-scalar("reach", reach, above=0.0), reach, count)
     grid = np.stack(np.meshgrid(angle, angle, indexing="ij"), axis=-1)
 
     def middle(shape: Floats) -> Floats:

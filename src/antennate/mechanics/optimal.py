@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import minimize
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import sampled, scalar, whole
 from antennate.mechanics.chain import PlanarChain
 from antennate.mechanics.curvature import curvature
 from antennate.mechanics.stroke import FourierStroke, Stroke, displacement
@@ -49,7 +50,7 @@ class SmallStroke:
 
     def stroke(self, size: float) -> FourierStroke:
         """The stroke with no angle above a size [rad]."""
-        scale = size / np.hypot(self.first, self.second).max()
+        scale = scalar("size", size) / np.hypot(self.first, self.second).max()
         return FourierStroke(0 * self.first, scale * self.first[None], scale * self.second[None])
 
 
@@ -71,7 +72,7 @@ def small_stroke(chain: PlanarChain) -> SmallStroke:
 
 def effort(chain: PlanarChain, stroke: Stroke, steps: int = 120) -> float:
     """Length of a stroke in the dissipation metric; its square is the least energy per period."""
-    shape, rate = stroke((np.arange(steps) + 0.5) / steps)
+    shape, rate = sampled(stroke, (np.arange(whole("steps", steps, 1)) + 0.5) / steps)
     power = (rate[:, None, :] @ chain.metric(shape) @ rate[..., None])[:, 0, 0]
     return float(np.sqrt(power).mean())
 
@@ -125,7 +126,12 @@ def best_stroke(
             "a stroke needs 3 links or more with lengths alike from both ends, found "
             f"{chain.lengths}"
         )
-    if harmonics < 1 or not abs(centre) < bound:
+    if objective not in get_args(Objective):
+        known = " or ".join(get_args(Objective))
+        raise BadInputError(f"objective: expected {known}, found {objective!r:.60}")
+    scalar("centre", centre)
+    scalar("bound", bound)
+    if whole("harmonics", harmonics, -1 << 31) < 1 or not abs(centre) < bound:
         raise BadInputError(
             f"a stroke needs 1 harmonic or more and a centre within its bound, found {harmonics} "
             f"harmonics, the centre {centre:g} and the bound {bound:g} rad"

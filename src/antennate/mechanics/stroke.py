@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import alike, called, numbers, sampled, whole
 from antennate.mechanics.lie import se2_bracket, se2_exp, se2_pose
 from antennate.types import Floats
 
@@ -37,6 +38,8 @@ class FourierStroke:
     sine: Floats
 
     def __post_init__(self) -> None:
+        for name in ("centre", "cosine", "sine"):
+            numbers(name, getattr(self, name))
         shapes = [np.shape(part) for part in (self.cosine, self.sine)]
         if shapes[0] != shapes[1] or shapes[0][1:] != np.shape(self.centre):
             raise BadInputError(
@@ -46,6 +49,7 @@ class FourierStroke:
 
     def __call__(self, t: Floats) -> tuple[Floats, Floats]:
         """Shapes [rad] and rates [rad per period] at the times (n,), both (n, m)."""
+        t = numbers("t", t)
         wave = 2 * np.pi * np.arange(1, len(self.cosine) + 1)
         cosine, sine = np.cos(np.multiply.outer(t, wave)), np.sin(np.multiply.outer(t, wave))
         shape = self.centre + cosine @ self.cosine + sine @ self.sine
@@ -58,13 +62,15 @@ def ellipse(
     centre: Floats | float = 0.0,
 ) -> FourierStroke:
     """The stroke centre + first cos(2 pi t) + second sin(2 pi t), vectors (m,) [rad]."""
-    cosine, sine = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    return FourierStroke(centre + 0 * cosine, cosine[None], sine[None])
+    cosine, sine = numbers("first", first, None), numbers("second", second, None)
+    middle = alike("centre and first", numbers("centre", centre), cosine)[0]
+    return FourierStroke(middle, cosine[None], sine[None])
 
 
 def polygon(corners: Floats) -> Stroke:
     """The stroke along the sides between corners (n, m) [rad], equal time on each side."""
-    corners = np.asarray(corners, dtype=float)
+    corners = numbers("corners", corners, None, None)
+    whole("number of corners", len(corners), 1)
     sides = np.roll(corners, -1, axis=0) - corners
 
     def stroke(t: Floats) -> tuple[Floats, Floats]:
@@ -93,8 +99,9 @@ def displacement(velocity: Velocity, stroke: Stroke, steps: int = 120) -> Floats
 def _places(velocity: Velocity, stroke: Stroke, steps: int) -> Floats:
     """Values (steps + 1, 3) of x, y and heading along a stroke."""
     offset = np.sqrt(3) / 6 * np.array([-1, 1])
-    t = (np.arange(steps)[:, None] + 0.5 + offset) / steps
-    twist = velocity(*stroke(t.reshape(-1))).reshape(steps, 2, 3) / steps
+    t = (np.arange(whole("steps", steps, 1))[:, None] + 0.5 + offset) / steps
+    twist = called("velocity", velocity, *sampled(stroke, t.reshape(-1)))
+    twist = numbers("velocity", twist, 2 * steps, 3).reshape(steps, 2, 3) / steps
     first, second = twist[:, 0], twist[:, 1]
     step = (first + second) / 2 + np.sqrt(3) / 12 * se2_bracket(first, second)
     heading = np.append(0.0, np.cumsum(step[:, 2]))

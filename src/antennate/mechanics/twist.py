@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.mechanics.arguments import numbers, scalar, whole
 from antennate.types import Floats
 
 
@@ -73,6 +74,14 @@ class TwistMap:
 
     def __post_init__(self) -> None:
         """Invert the table: at each curvature, amplitude and offset over the speeds it allows."""
+        size = [len(numbers(name, getattr(self, name), None)) for name in ("amplitude", "offset")]
+        for name, count in zip(("amplitude", "offset"), size, strict=True):
+            whole(f"number of {name}s", count, 2)
+            numbers(f"steps of {name}", np.diff(getattr(self, name)), count - 1, above=0.0)
+        numbers("lead", self.lead, size[0])
+        scalar("wave_number", self.wave_number)
+        numbers("speed", self.speed, *size)
+        numbers("curvature", self.curvature, *size)
         amplitudes, offsets, ranges = [], [], []
         bent = np.maximum.accumulate(self.curvature, 1)
         for wanted in np.linspace(0.0, self.sharpest, _CURVATURES):
@@ -101,6 +110,7 @@ class TwistMap:
 
     def speeds(self, curvature: float) -> tuple[float, float]:
         """Slowest and fastest forward speed [m/s] at a curvature [1/m]."""
+        scalar("curvature", curvature)
         _, _, ranges, height = self._inverse
         row, part = _columns(abs(curvature), 0.0, height, len(ranges))
         slowest, width = _mixed(ranges[row], ranges[row + 1], part)
@@ -134,6 +144,8 @@ class TwistMap:
 
     def twist(self, amplitude: float, offset: float) -> tuple[float, float]:
         """Forward speed [m/s] and curvature [1/m] of a gait of the map."""
+        scalar("amplitude", amplitude)
+        scalar("offset", offset)
         speed, curvature, _, high, wide = self._forward
         row, part = _columns(amplitude, 0.0, high, len(speed))
         column, share = _columns(abs(offset), 0.0, wide, len(speed[0]))

@@ -44,6 +44,18 @@ def require_names(
             raise ConfigError(f"{place}: expected the {kind} {', '.join(wanted)}, found {actual}")
 
 
+def _trials(contract: Contract) -> dict[str, Vector]:
+    """Observations that a policy is tried with, shape (1, n), by what they are."""
+    ends = [(e.low or 0.0, e.high or 0.0) for e in contract.observations]
+    chance = np.random.default_rng(0).random(len(ends))
+    drawn = [[low + part * (high - low) for (low, high), part in zip(ends, chance, strict=True)]]
+    with np.errstate(over="ignore"):
+        return {
+            f"{len(ends)} zeros": np.zeros((1, len(ends)), np.float32),
+            "an observation of chance": np.array(drawn, np.float32),
+        }
+
+
 class Policy:
     """A policy file: its contract, and its network for one robot at a time.
 
@@ -53,7 +65,8 @@ class Policy:
         path: The file.
 
     Raises:
-        ConfigError: It cannot be read, is no ONNX model, or has no contract.
+        ConfigError: It cannot be read, is no ONNX model, has no contract, or does not answer zeros
+            and an observation of chance with finite numbers.
         MissingPackageError: onnxruntime is not installed.
 
     Attributes:
@@ -89,15 +102,26 @@ class Policy:
         require_names(
             str(path), self.contract, [node.name for node in inputs], [n.name for n in outputs]
         )
-        size = len(self.contract.observations)
-        try:
-            answer, states = self.answer(np.zeros((1, size), np.float32), self.start())
-        except ControllerError as error:
-            takes = ", ".join(f"{node.name} as {node.type} {node.shape}" for node in inputs)
-            raise ConfigError(
-                f"{path}: expected an answer to {size} zeros, as float32 of shape (1, {size}), "
-                f"found {error}; it takes {takes}"
-            ) from None
+        takes = ", ".join(f"{node.name} as {node.type} {node.shape}" for node in inputs)
+        self._try(path, takes)
+
+    def _try(self, path: Path, takes: str) -> None:
+        """Ask for the answers to zeros, then to an observation of chance within its bounds."""
+        size, states = len(self.contract.observations), self.start()
+        for what, observation in _trials(self.contract).items():
+            try:
+                answer, states = self.answer(observation, states)
+            except ControllerError as error:
+                raise ConfigError(
+                    f"{path}: expected an answer to {what}, as float32 of shape (1, {size}), "
+                    f"found {error}; it takes {takes}"
+                ) from None
+            self._require_sound(path, what, answer, states)
+
+    def _require_sound(
+        self, path: Path, what: str, answer: Floats, states: dict[str, Vector]
+    ) -> None:
+        """Check an answer and the states after it."""
         if answer.shape != (1, len(self.contract.actions)):
             raise ConfigError(
                 f"{path}: expected {ACTION} of shape (1, {len(self.contract.actions)}), found "
@@ -109,6 +133,13 @@ class Policy:
                 raise ConfigError(
                     f"{path}: expected {state.output} as float32 of shape {state.shape}, found "
                     f"{after.dtype} of shape {after.shape}"
+                )
+        names = {s.output: states[s.input] for s in self.contract.states}
+        for name, numbers in {ACTION: answer, **names}.items():
+            if (bad := numbers[~np.isfinite(numbers)]).size:
+                raise ConfigError(
+                    f"{path}: expected finite numbers as {name} for {what}, found {bad[0]}; its "
+                    "weights or its normaliser are broken"
                 )
 
     def start(self) -> dict[str, Vector]:
@@ -151,6 +182,7 @@ class PolicyController:
         contact: `Contact` of the last step, shape (B, 2).
         maneuver: The `Maneuver` nearest to what was done, shape (B,); HOLD of an answer that is no
             number, and where a reading is UNKNOWN.
+        void_decisions: Decisions since the reset whose answer was no number, shape (B,).
     """
 
     def __init__(
@@ -168,6 +200,7 @@ class PolicyController:
         self._states = [policy.start() for _ in range(batch)]
         self._count: Ints = np.zeros(batch, np.int64)
         self._begun: Bools = np.zeros(batch, dtype=bool)
+        self.void_decisions: Ints = np.zeros(batch, np.int64)
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
@@ -183,7 +216,7 @@ class PolicyController:
         self._observer.reset(rows)
         self._actor.reset(rows, phase)
         self._contacts.reset(rows)
-        self._count[rows], self._begun[rows] = 0, False
+        self._count[rows], self._begun[rows], self.void_decisions[rows] = 0, False, 0
         for row in np.arange(len(self._count))[rows].tolist():
             self._states[row] = self._policy.start()
 
@@ -214,6 +247,7 @@ class PolicyController:
             )
             self._answers[row] = answer[0]
         self._actor.decide(self._answers, rows)
+        self.void_decisions += rows & ~np.isfinite(self._answers).all(axis=1)
 
 
 def policy_factory(name: str) -> Callable[[ControlParams, RobotSpec, int], PolicyController]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from antennate import checks
 from antennate.control.policy.contract import KEY, Contract, State
 from antennate.control.policy.controller import ACTION, LARGEST, OBSERVATION, require_names
 from antennate.errors import BadInputError, MissingPackageError, in_one_line
@@ -17,6 +18,9 @@ from antennate.messages import extra
 
 OPSET = 17
 Weights = NDArray[np.floating[Any]]
+_SINGLE = np.finfo(np.float32)
+_MAY_BE_INFINITE = frozenset(("Add", "Clip", "Max", "Min", "Where"))
+"""Operators that masks and bounds are constants of."""
 
 
 def write_policy(
@@ -52,11 +56,15 @@ def write_policy(
         The path.
 
     Raises:
+        BadInputError: An array has another shape than the contract and the other ones say, holds
+            NaN or what float32 does not hold, or `scale` or `clip` is not above 0.
         MissingPackageError: The package onnx is not installed.
     """
     onnx = _onnx()
+    single = _checked(contract, layers, mean, scale, clip, choices, memory)
     helper, numpy_helper, kind = onnx.helper, onnx.numpy_helper, onnx.TensorProto.FLOAT
-    constants = {"mean": mean, "scale": scale, "low": np.array(-clip), "high": np.array(clip)}
+    (limit,) = single["clip"]
+    constants = {"mean": single["mean"], "scale": single["scale"], "low": -limit, "high": limit}
     nodes = [
         helper.make_node("Sub", [OBSERVATION, "mean"], ["centred"]),
         helper.make_node("Div", ["centred", "scale"], ["scaled"]),
@@ -68,17 +76,17 @@ def write_policy(
         state = State(input="memory", output="memory_next", shape=(1, 1, memory[1].shape[1]))
         contract = contract.model_copy(update={"states": (state,)})
         inputs[state.input] = outputs[state.output] = state.shape
-        constants |= _memory(memory)
+        constants |= _memory([single[f"memory[{i}]"] for i in range(4)])
         nodes += _remembering(helper, state)
-    for i, (weight, bias) in enumerate(layers):
-        constants |= {f"w{i}": weight, f"b{i}": bias}
+    for i in range(len(layers)):
+        constants |= {f"w{i}": single[f"layers[{i}][0]"], f"b{i}": single[f"layers[{i}][1]"]}
         last = i == len(layers) - 1
         out = f"y{i}" if not last else ACTION if choices is None else "scores"
         nodes.append(helper.make_node("Gemm", [f"x{i}", f"w{i}", f"b{i}"], [out], transB=1))
         if not last:
             nodes.append(helper.make_node("Tanh", [out], [f"x{i + 1}"]))
     if choices is not None:
-        constants["choices"] = choices
+        constants["choices"] = single["choices"]
         nodes += [
             helper.make_node("ArgMax", ["scores"], ["best"], axis=1, keepdims=0),
             helper.make_node("Gather", ["choices", "best"], [ACTION], axis=0),
@@ -89,13 +97,59 @@ def write_policy(
         for ends in (inputs, outputs)
     )
     tensors = [
-        numpy_helper.from_array(np.asarray(value, np.float32), name)
-        for name, value in constants.items()
+        numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()
     ]
     graph = helper.make_graph(nodes, "policy", given, answers, tensors)
     imports = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(graph, opset_imports=imports, ir_version=8)
     return _save(model, contract, Path(path))
+
+
+def _checked(
+    contract: Contract,
+    layers: Sequence[tuple[Weights, Weights]],
+    mean: Weights,
+    scale: Weights,
+    clip: float,
+    choices: Weights | None,
+    memory: Sequence[Weights] | None,
+) -> dict[str, Weights]:
+    """What `write_policy` is given, by name, as float32, in which the network is run."""
+    width, answers = len(contract.observations), len(contract.actions)
+    given: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "mean": (mean, (width,)),
+        "scale": (scale, (width,)),
+        "clip": ([clip], (1,)),
+    }
+    if memory is not None:
+        checks.whole("number of arrays in memory", len(memory), 4, 4)
+        rows, inputs, width = np.size(memory[3]), width, np.size(memory[3]) // 3
+        shapes = (3 * width, inputs), (rows, width), (rows,), (3 * width,)
+        given |= {f"memory[{i}]": (memory[i], shape) for i, shape in enumerate(shapes)}
+    checks.whole("number of layers", len(layers), 1)
+    for i, (weight, bias) in enumerate(layers):
+        last = i == len(layers) - 1 and choices is None
+        inputs, width = width, answers if last else np.size(bias)
+        given |= {f"layers[{i}][0]": (weight, (width, inputs)), f"layers[{i}][1]": (bias, (width,))}
+    if choices is not None:
+        given["choices"] = choices, (width, answers)
+    return {name: _single(name, *each) for name, each in given.items()}
+
+
+def _single(name: str, value: Any, shape: tuple[int, ...]) -> Weights:
+    """An array as float32, above 0 if it divides or bounds."""
+    numbers = checks.array(name, value, shape, error=BadInputError)
+    with np.errstate(over="ignore"):
+        single = numbers.astype(np.float32)
+    bad, wanted = ~np.isfinite(single), f"numbers up to {_SINGLE.max:.1e} either way"
+    if name in ("scale", "clip"):
+        bad, wanted = bad | (single < _SINGLE.tiny), f"{_SINGLE.tiny:.1e} to {_SINGLE.max:.1e}"
+    if bad.any():
+        place = np.argwhere(bad)[0].tolist()
+        raise BadInputError(
+            f"{name}: expected {wanted}, as float32 has them, found {numbers[bad][0]:g} at {place}"
+        )
+    return single
 
 
 def _memory(memory: Sequence[Weights]) -> dict[str, Weights]:
@@ -130,8 +184,8 @@ def add_contract(path: Path | str, contract: Contract) -> Path:
     those of the states. Weights that lie in files beside it are joined with it.
 
     Raises:
-        BadInputError: It cannot be read, is no ONNX model, has other inputs or outputs, or is too
-            large with its weights.
+        BadInputError: It cannot be read, is no ONNX model, has other inputs or outputs, a constant
+            that holds NaN, is infinite or divides by 0, or is too large with its weights.
         MissingPackageError: The package onnx is not installed.
         OutputError: It cannot be written; the file is as it was.
     """
@@ -150,7 +204,29 @@ def add_contract(path: Path | str, contract: Contract) -> Path:
         [node.name for node in model.graph.input if node.name not in weights],
         [node.name for node in model.graph.output],
     )
+    _require_numbers(model, path)
     return _save(model, contract, path)
+
+
+def _require_numbers(model: Any, path: Path) -> None:
+    """Check the constants that a network is made of."""
+    users = {
+        (name, f"{node.op_type} {place}" if node.op_type == "Div" else node.op_type)
+        for node in model.graph.node
+        for place, name in enumerate(node.input)
+    }
+    for tensor in model.graph.initializer:
+        values = _onnx().numpy_helper.to_array(tensor)
+        bad = np.zeros(values.shape, bool)
+        if values.dtype.kind == "f":
+            of = [user for name, user in users if name == tensor.name]
+            bad = np.isnan(values) | (np.isinf(values) & (not _MAY_BE_INFINITE.issuperset(of)))
+            bad |= (values == 0.0) & ("Div 1" in of)
+        if bad.any():
+            raise BadInputError(
+                f"{path}: {tensor.name}: expected finite numbers, and none of 0 that divides, "
+                f"found {values[bad][0]:g}"
+            )
 
 
 def _save(model: Any, contract: Contract, path: Path) -> Path:

@@ -44,6 +44,7 @@ class Episode:
         limit_s: Time limit [s].
         progress_m: How far the head came [m].
         overturned: Whether the robot lies on its back at the end.
+        void_decisions: Decisions of a learned policy whose answer was no number: it held.
         given: What the simulation gave to the controller, in words; empty for its readings alone.
         drawn: Whether the seed was drawn when the run began, so that nobody knew it.
         version: Version of antennate.
@@ -61,6 +62,7 @@ class Episode:
     limit_s: float = TIME_LIMIT
     progress_m: float = 0.0
     overturned: bool = False
+    void_decisions: int = 0
     given: str = ""
     drawn: bool = False
     version: str = __version__
@@ -120,6 +122,7 @@ def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
         limit_s=row.limit_s,
         progress_m=row.progress_m,
         overturned=row.overturned,
+        void_decisions=row.void_decisions,
         given=given,
         drawn=draw.drawn,
         engine=versions()["mujoco"],

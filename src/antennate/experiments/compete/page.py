@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from antennate.control.loop import void_sentence
 from antennate.control.readings import short_names
 from antennate.control.registry import about
 from antennate.experiments.compete.checking import ENOUGH, refusal
@@ -157,9 +158,10 @@ def sentence(result: Result) -> str:
     kind = f"{'hidden' if result['hidden'] else known} seed{'s' * (len(seeds) > 1)}"
     ranks = ", ".join(entries) or "none, as none lives on its readings"
     lost = (f" No episode of {short[n]} is valid: {why}." for n, why in none_valid(result).items())
+    void = void_sentence({short[name]: rows[name].get("void_decisions", 0) for name in names})
     return (
         f"Ranks in {scenes} scene{'s' * (scenes > 1)} (95 % interval; successes), {kind} "
-        f"{', '.join(map(str, seeds))}: {ranks}.{''.join(lost)}"
+        f"{', '.join(map(str, seeds))}: {ranks}.{''.join(lost)}{f' {void}' * bool(void)}"
     )
 
 

@@ -140,6 +140,7 @@ def _controller(rows: Rows) -> dict[str, Any]:
         "restricted_mean_share": share,
         "restricted_mean_share_95": share_ends,
         **summarise(CONTROLLER, rows),
+        "void_decisions": total("void_decisions", rows),
         "speed_m_s": speed if speeds else None,
         "speed_95": ends,
         "first_reason": next((row.reason for row in rows if row.reason), None),

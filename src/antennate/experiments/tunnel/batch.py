@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 
 from antennate.control.knowledge import Kind, given_to
-from antennate.control.loop import CheckedController, run_loop
+from antennate.control.loop import CheckedController, run_loop, void_decisions
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
@@ -216,6 +217,7 @@ class _Rows:
         self._monitors: dict[int, Monitor] = {}
         self._watches = monitor or self._usual
         self._every: Ints = np.arange(batch)
+        self._made: Controller | None = None
         self._known: tuple[Kind, ...] = ()
         self._truths: Truths | None = None
         self._ticks, self._begun, self._blocked = 0, dict[int, int](), dict[int, str]()
@@ -233,7 +235,7 @@ class _Rows:
         phases = [self._place(row) for row in range(self._batch)]
         if not self._monitors:
             return
-        made = self._make(make)
+        made = self._made = self._make(make)
         control = CheckedController(made, config.robot, self._batch)
         decisions = Decisions(config.robot, control, self._batch)
         nothing = [np.full((1, 2), np.nan)] * self._batch
@@ -409,5 +411,8 @@ class _Rows:
         if self._read is not None and (ticks := self._counts[begun:]):
             self._read[monitor.trial] = np.array([counts[row] for counts in ticks])
         path = monitor.path(world) if monitor.trial < SHOWN_TRIALS else None
-        self._emit((monitor.result(world, outcome, reason, self._maneuvers[row]), path))
+        result = monitor.result(world, outcome, reason, self._maneuvers[row])
+        if isinstance(result, TrialResult) and (void := void_decisions(self._made, row)):
+            result = replace(result, void_decisions=void)
+        self._emit((result, path))
         self._robot.unload(row)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.control.loop import void_sentence
 from antennate.control.readings import short_names
 from antennate.control.registry import RIVAL, about, compared
 from antennate.experiments.tunnel.physics import TrialResult
@@ -147,6 +148,7 @@ def summary(rows: Sequence[TrialResult], limit: float | None) -> dict[str, Any]:
         "invalid": len(rows) - len(valid),
         "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
         **summarise([*CONTROLLER, *lost], valid),
+        "void_decisions": total("void_decisions", rows),
         "success_share": len(won) / len(valid) if valid else None,
         "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
         "speed_m_s": speed if won else None,
@@ -290,7 +292,9 @@ def sentence(result: Mapping[str, Any]) -> str:
     text += f" {so_few or _undecided(result)}".rstrip() if passed else ""
     for name, reason in without.items():
         text += f" No trial of {name} is valid: {reason}."
-    return f"{text}{why}".strip()
+    rows = result["controllers"].items()  # results of older versions have none
+    void = void_sentence({short[name]: row.get("void_decisions", 0) for name, row in rows})
+    return f"{text}{why} {void}".strip()
 
 
 def _against_rival(result: Mapping[str, Any], short: Mapping[str, str]) -> str:

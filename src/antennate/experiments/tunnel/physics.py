@@ -166,6 +166,7 @@ class TrialResult:
         spring_high_n_m: That largest torque [N·m], of looks at every tick.
         spring_cycles: Load cycles of that spring, see `largest_load`.
         overturned: Whether the robot lies on its back at the end.
+        void_decisions: Decisions of a learned policy whose answer was no number: it held.
         reason: Why a trial is invalid, with the physics step; empty otherwise.
     """
 
@@ -190,6 +191,7 @@ class TrialResult:
     spring_high_n_m: float = 0.0
     spring_cycles: int = 0
     overturned: bool = False
+    void_decisions: int = 0
     reason: str = ""
 
     def __post_init__(self) -> None:
@@ -330,6 +332,7 @@ class TrialMonitor:
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,
             overturned=world.overturned,
+            void_decisions=0,  # known where the controller is
             reason=reason,
         )
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from antennate.control.loop import void_decisions
 from antennate.hardware.safety.causes import DATA, Active, Cause, State
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.supervisor import Outputs
@@ -293,6 +294,7 @@ class Report:
             "commands_sent": session.tally.sent,
             "commands_limited": session.tally.limited,
             "commands_refused": session.control.refused,
+            "void_decisions": void_decisions(session.control.controller),
             "tracebacks": [
                 *session.control.tracebacks.kept,
                 *session.actuators.state.tracebacks.kept,
