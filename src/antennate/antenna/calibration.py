@@ -219,8 +219,8 @@ def _impossible(calibration: Calibration) -> str:
         return f"kind: expected sigmoid without knots, or another with, found {calibration.kind}"
     width, name = _RISE * span / calibration.slope, "slope"
     if calibration.knots:
-        way = calibration.polarity
-        levels, counts = calibration.knot_levels[::way], calibration.knots[::way]
+        curve = calibration.curve()
+        levels, counts = curve.knot_levels[:: curve.polarity], curve.knots[:: curve.polarity]
         width, name = float(np.ptp(np.interp([0.1, 0.9], levels, counts))), "knots"
     if width < NARROWEST_RISE:
         return (
