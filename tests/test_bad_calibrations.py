@@ -70,9 +70,13 @@ def _everywhere() -> Iterator[tuple[str, str, str]]:
             "schema_version",
             "reach",
             "noise_counts",
+            "kind",
+            "knots",
+            "knot_levels",
+            "misfit",
         ):  # they have a default, like no other
             yield f"no {field}", json.dumps({k: v for k, v in CONTENT.items() if k != field}), field
-        if field not in ("slope_95", "midpoint_95", "noise_counts"):  # not always known
+        if field not in ("slope_95", "midpoint_95", "noise_counts", "misfit"):  # not always known
             yield f"null {field}", raw(field, "null"), field
         yield f"table {field}", raw(field, '{"a": 1}'), field
         again = f", {json.dumps(field)}: {json.dumps(CONTENT[field])}}}"

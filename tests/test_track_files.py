@@ -292,7 +292,10 @@ def test_what_is_truncated_or_no_such_file_is_one_line(
     [
         ("frame,head_x\n1,2\n", "expected a column l0_x"),
         ("{header}\n0,{row}\n", "expected a frame rate, found none in the file; give --rate"),
-        ("{header}\n1,{row}\n0,{row}\n1,{row}\n", "in rising order or each once, found 0 after 1"),
+        (
+            "{header}\n1,{row}\n0,{row}\n1,2{row}\n",
+            "one place for each point in a frame, found more",
+        ),
         ("{header}\n0.5,{row}\n", "expected whole numbers of frames"),
         ("{header}\n0,{row}\n1,2\n", "row 3: expected 21 cells, found 2"),
         ("{header}\n0,{word}\n", "row 2: expected a number or nothing in l0_x, found here"),

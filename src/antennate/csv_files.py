@@ -72,7 +72,7 @@ def csv_rows(
         header = [name.strip() for name in header]
         sample = list(itertools.islice(rows, _SAMPLE))
         header = _named(header, [cells for _, cells in sample])
-        _check_header(path, line, header, needed, error, cure)
+        _check_header(path, line, header, needed, error, cure, sample)
         if ended and not data.endswith((b"\n", b"\r")):
             raise error(
                 f"{path}: row {len(data.splitlines())}: expected a line break at its end, found "
@@ -169,12 +169,14 @@ def _check_header(
     needed: Sequence[str],
     error: type[BadInputError],
     cure: str,
+    sample: Sequence[Row],
 ) -> None:
+    """Refuse a header that lacks a column, or is all one where no single column serves."""
     missing = [name for name in needed if column(header, name) is None]
-    if not missing:
+    if not missing and (needed or len(header) != 1):
         return
     line = ",".join(header)
-    other = next((what for mark, what in _SEPARATORS.items() if mark in line), None)
+    mark, other = next(((m, what) for m, what in _SEPARATORS.items() if m in line), ("", ""))
     if "\0" in line:
         why = "UTF-8 text, found a zero byte; save it as CSV in UTF-8"
     elif line.startswith("#"):
@@ -182,8 +184,13 @@ def _check_header(
     elif header and all(map(_is_number, header)):
         wanted = ", ".join(needed)
         why = f"the names of the columns, such as {wanted}, found numbers; add that row"
-    elif len(header) == 1 and other is not None:
+    elif len(header) == 1 and other:
         why = f"columns separated by commas, and points as decimal marks, found {other}"
+        cells = (cell for _, row in sample for cell in ",".join(row).split(mark))
+        if any(map(_DECIMAL_COMMA.fullmatch, cells)):
+            why += f" and decimal commas; replace commas by points, then {other} by commas"
+    elif not missing:
+        why = f"the names of several columns, found {shortened(line)}"
     else:
         found = shortened(", ".join(header)) if line else "nothing"
         why = f"a column {missing[0]}, found {found}{cure}"

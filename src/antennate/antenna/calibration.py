@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -21,6 +21,8 @@ from antennate.params.faults import describe
 from antennate.types import Floats
 
 SCHEMA = 1
+Kind = Literal["sigmoid", "line", "isotonic"]
+"""Curves that a calibration may be."""
 REACH = 0.8
 """How far sensors of the robot bend beyond a calibration up to a right angle [spans]: 0.70 in
 simulation (measured), and a tenth for drift."""
@@ -45,9 +47,11 @@ class SpeedFit(Strict):
 
 
 class Calibration(Strict):
-    """The content of a calibration file: a sigmoid from counts to level, and how well it fits.
+    """The content of a calibration file: a curve from counts to level, and how well it fits.
 
         level = 1 / (1 + exp(-polarity slope (x - midpoint))),  x = (counts - low) / (high - low)
+
+    or, where `kind` is no sigmoid, straight lines between `knots`.
 
     Attributes:
         schema_version: Version of this format.
@@ -55,8 +59,8 @@ class Calibration(Strict):
         sensor_id: Which flex sensor: letters, digits, dots, hyphens, underscores.
         data_sha256: Hash of the recording.
         polarity: 1 if readings rise with the flex, -1 if they fall.
-        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval, over pushes. None with
-            fewer than three pushes, or where they are alike.
+        slope: Slope of the sigmoid over x; `slope_95` its 95 % interval, over pushes, of noise
+            alone where there is a `misfit`. None with fewer than three pushes, or all alike.
         midpoint: x at which the level is 0.5; `midpoint_95` likewise.
         counts_low: Reading at x = 0 [counts]; `counts_high` at x = 1.
         threshold: Level from which on there is contact (theta of the paper).
@@ -69,6 +73,10 @@ class Calibration(Strict):
             fewer than three pushes on unseen tenths of the recording.
         reach: How far beyond the bent end of this range readings are still those of the sensor
             [spans].
+        kind: Which curve: the paper's sigmoid, a line, or isotonic.
+        knots: Rising readings of a line or an isotonic curve [counts]; `knot_levels` its levels.
+        misfit: What the curve errs by in the same way in all pushes: root mean square over readings
+            and both ways [b]. None if nothing beyond noise, or not known.
         noise_counts: Standard deviation of single readings in the recording [counts]; None if it is
             not known.
         better_than_sigmoid: Models that were better on these readings beyond noise: the 95 %
@@ -100,10 +108,14 @@ class Calibration(Strict):
     r2: float = Field(le=1)
     rmse: float = Field(ge=0)
     speeds: tuple[SpeedFit, ...]
-    cross_validated_rmse: dict[Literal["sigmoid", "line", "isotonic"], float]
+    cross_validated_rmse: dict[Kind, float]
     better_than_sigmoid: tuple[Literal["line", "isotonic"], ...]
     reach: float = Field(default=REACH, ge=0, le=200)
     noise_counts: float | None = Field(default=None, ge=0, le=4095)
+    kind: Kind = "sigmoid"
+    knots: tuple[float, ...] = ()
+    knot_levels: tuple[float, ...] = ()
+    misfit: float | None = Field(default=None, ge=0)
 
     @model_validator(mode="after")
     def _possible(self) -> Calibration:
@@ -117,18 +129,15 @@ class Calibration(Strict):
         Raises:
             ConfigError: That time is out of bounds.
         """
-        return ConditioningParams(
-            averaging_time=averaging_time,
-            midpoint=self.midpoint,
-            slope=self.slope,
-            polarity=self.polarity,
-            counts_low=self.counts_low,
-            counts_high=self.counts_high,
-        )
+        return ConditioningParams(averaging_time=averaging_time, **self._of_curve())
 
     def curve(self) -> CurveParams:
         """The same without the running mean, as of one antenna of two."""
-        return CurveParams(**{n: getattr(self, n) for n in CurveParams.model_fields})
+        return CurveParams(**self._of_curve())
+
+    def _of_curve(self) -> dict[str, Any]:
+        unread = ("midpoint", "slope") if self.knots else ("knots", "knot_levels")
+        return {n: getattr(self, n) for n in CurveParams.model_fields if n not in unread}
 
     def level(self, counts: Floats) -> Floats:
         """Flex level, 0 to 1, of readings [counts], same shape; NaN stays NaN.
@@ -206,10 +215,17 @@ def _impossible(calibration: Calibration) -> str:
     low, high = calibration.valid_counts
     if not (0 <= low < high <= FULL_SCALE):
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
-    if (width := _RISE * span / calibration.slope) < NARROWEST_RISE:
+    if (calibration.kind == "sigmoid") != (not calibration.knots):
+        return f"kind: expected sigmoid without knots, or another with, found {calibration.kind}"
+    width, name = _RISE * span / calibration.slope, "slope"
+    if calibration.knots:
+        curve = calibration.curve()
+        levels, counts = curve.knot_levels[:: curve.polarity], curve.knots[:: curve.polarity]
+        width, name = float(np.ptp(np.interp([0.1, 0.9], levels, counts))), "knots"
+    if width < NARROWEST_RISE:
         return (
-            f"slope: expected a level that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts or "
-            f"more, found {width:.3g}"
+            f"{name}: expected a level that rises from 0.1 to 0.9 over {NARROWEST_RISE:g} counts "
+            f"or more, found {width:.3g}"
         )
     levels = calibration.level(np.array([calibration.counts_low, calibration.counts_high]))
     straight, bent = levels if calibration.polarity > 0 else levels[::-1]

@@ -1,16 +1,19 @@
-"""Curves from readings to the flex level, fitted to samples: a sigmoid and what rivals it.
+"""Curves from readings to the flex level, fitted to samples: a sigmoid and what may replace it.
 
     b = 1 / (1 + exp(-s k (x - x0))),   x = (counts - low) / (high - low)
 
 b is the level, 0 straight and 1 full; s the polarity, found from the data; x0 the midpoint and k
 the slope. The fit minimises the squared error of b. A straight line and an isotonic regression
-stand beside it: how they do on pushes that served no fit, beyond noise or not. Readings of one push
+stand beside it: how they do on pushes that served no fit, beyond noise or not. The steps of the
+latter are joined by straight lines between their middles (Oron and Flournoy 2017, Statistics in
+Biopharmaceutical Research 9, 258-267): so it rises throughout. Readings of one push
 err together, so whole pushes are left out in turn. Readings that stand at their highest code, as of
 a converter that saturates below its rail, are a plateau.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -99,16 +102,85 @@ def predict(model: str, x: Floats, level: Floats, at: Floats, sign: int) -> Floa
         at: Other readings, shape (m,).
         sign: Polarity, 1 or -1.
     """
-    from scipy.optimize import isotonic_regression  # takes long; only where it is needed
-
     if model == "sigmoid":
         slope, midpoint = fit_sigmoid(x, level, sign)
         return curve(sign * at, slope, sign * midpoint)
     if model == "line":
         straight = np.polyval(np.polyfit(x, level, 1), at)
         return np.asarray(np.clip(straight, 0.0, 1.0), dtype=np.float64)
-    z, b = _sorted(sign * x, level)
-    return np.asarray(np.interp(sign * at, z, isotonic_regression(b).x), dtype=np.float64)
+    return np.asarray(np.interp(sign * at, *_centred(sign * x, level)), dtype=np.float64)
+
+
+def _centred(z: Floats, level: Floats) -> tuple[Floats, Floats]:
+    """Centred isotonic regression: mean reading and level of each step, both rising."""
+    from scipy.optimize import isotonic_regression  # takes long; only where it is needed
+
+    readings, place, weights = np.unique(z, return_inverse=True, return_counts=True)
+    steps = isotonic_regression(np.bincount(place, level) / weights, weights=weights)
+    starts = steps.blocks[:-1]
+    sizes = np.add.reduceat(weights, starts)
+    return np.add.reduceat(readings * weights, starts) / sizes, steps.x[starts]
+
+
+def knots(
+    model: Literal["line", "isotonic"], counts: Floats, level: Floats, sign: int
+) -> tuple[Floats, Floats]:
+    """Rising readings and their levels, 0 to 1, between which a fitted line or isotonic curve runs.
+
+    Args:
+        model: Which.
+        counts: Readings [counts], shape (n,).
+        level: Their levels, shape (n,).
+        sign: Polarity, 1 or -1.
+    """
+    if model == "line":
+        slope, start = np.polyfit(counts, level, 1).tolist()
+        ends = np.array([0.0, 1.0])[::sign]
+        return (ends - start) / slope, ends
+    z, b = _centred(sign * counts, level)
+    picked = np.unique(np.linspace(0, len(z) - 1, MOST_KNOTS).round().astype(np.int64))[::sign]
+    return sign * z[picked], np.clip(b[picked], 0.0, 1.0)
+
+
+MOST_KNOTS = 256
+"""Knots of an isotonic curve: one a count of the simulated sensor's range."""
+FEWEST_PUSHES = 3
+"""Of fewer pushes slope and midpoint have no intervals, nor is a misfit told from noise."""
+_PARTS, _CHANCE, _LEAST = 10, 0.01, 0.005
+"""Parts of the readings in which errors are averaged, chance that noise alone is called a misfit,
+and the least mean error that is one [b], about a count of the simulated sensor."""
+
+
+def misfit(samples: Samples, error: Floats, way: Ints | int = 0) -> float | None:
+    """Root mean square of the errors of b that all pushes share; None if noise explains them.
+
+    Readings of one push err together. So its errors are averaged in tenths of all readings, loading
+    and unloading apart, and the means are compared over pushes: by Student's t, with the level of
+    all tenths together (Bonferroni).
+
+    Args:
+        samples: The readings.
+        error: Errors of b, shape (n,).
+        way: -1 where the antenna is released, shape (n,); 0 if that is not known.
+    """
+    from scipy.special import stdtrit  # scipy.stats takes half a second longer
+
+    edges = np.quantile(samples.counts, np.arange(1, _PARTS) / _PARTS)
+    part = np.digitize(samples.counts, edges) + _PARTS * (np.asarray(way) < 0)
+    names, push = np.unique(samples.trial, return_inverse=True)
+    shape, place = (2 * _PARTS, len(names)), part * len(names) + push
+    size = np.bincount(place, minlength=math.prod(shape)).reshape(shape)
+    total = np.bincount(place, error, math.prod(shape)).reshape(shape)
+    shared, beyond = list[float](), False
+    for sums, counted in zip(total, size, strict=True):
+        means = sums[counted > 0] / counted[counted > 0]
+        if len(means) < FEWEST_PUSHES:
+            continue
+        mean, square = float(means.mean()), float(means.var(ddof=1)) / len(means)
+        half = float(stdtrit(len(means) - 1, 1 - _CHANCE / len(total) / 2)) * math.sqrt(square)
+        beyond |= abs(mean) > max(half, _LEAST)
+        shared.append(max(0.0, mean**2 - square))
+    return math.sqrt(float(np.mean(shared))) if beyond else None
 
 
 MOST_GROUPS = 30

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from antennate import __version__, checks
-from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, SpeedFit
+from antennate.antenna.calibration import FEWEST, NARROWEST_SPAN, REACH, Calibration, Kind, SpeedFit
 from antennate.antenna.curves import (
     BOUNDS,
+    FEWEST_PUSHES,
     MODELS,
     MOST_GROUPS,
     PLATEAU_SHARE,
@@ -23,7 +24,9 @@ from antennate.antenna.curves import (
     ends,
     fit_sigmoid,
     gain_of,
+    knots,
     left_out,
+    misfit,
     plateau_of,
     polarity,
     predict,
@@ -36,8 +39,6 @@ from antennate.types import Floats, Ints
 
 REVERSAL = 0.15
 """Share of the span by which mean readings may fall back while the level rises."""
-FEWEST_PUSHES = 3
-"""Of fewer pushes slope and midpoint have no intervals."""
 _BINS = 10
 _FOLDS = 10
 """Folds of the cross-validation."""
@@ -115,6 +116,8 @@ def fit(
     full_scale: bool = False,
     least_r2: float = 0.5,
     noise_counts: float | None = None,
+    kind: Kind = "sigmoid",
+    way: Ints | int = 0,
 ) -> Calibration:
     """Calibrate recorded samples.
 
@@ -126,21 +129,26 @@ def fit(
         full_scale: Normalise readings by 0 to 4095 and not by the recording's extremes.
         least_r2: A fit that explains a smaller share of the variance is refused.
         noise_counts: Noise of the readings as they came [counts], None if it is not known.
+        kind: Which curve.
+        way: -1 where the antenna is released, shape (n,); 0 if that is not known.
 
     Raises:
-        CalibrationError: The data cannot be calibrated, or the sigmoid does not fit them.
+        CalibrationError: The data cannot be calibrated, or the curve does not fit them.
     """
     check(samples)
     sign = polarity(samples)
     low, high = (0.0, float(FULL_SCALE)) if full_scale else ends(samples)
     x = (samples.counts - low) / (high - low)
     slope, midpoint = fit_sigmoid(x, samples.level, sign)
-    predicted = curve(sign * x, slope, sign * midpoint)
+    predicted, ends_of = curve(sign * x, slope, sign * midpoint), (np.zeros(0), np.zeros(0))
+    if kind != "sigmoid":
+        ends_of = knots(kind, samples.counts, samples.level, sign)
+        predicted = np.interp(samples.counts, *ends_of)
     r2 = _r2(predicted, samples.level)
     if r2 < least_r2 or not -1 < midpoint < 2 or slope >= 999:
         raise CalibrationError(
-            f"expected a sigmoid that explains at least {100 * least_r2:.0f} % of the level, found "
-            f"{100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
+            f"expected a curve ({kind}) that explains at least {100 * least_r2:.0f} % of the "
+            f"level, found {100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
             "check that time and flex belong together"
         )
     slopes, midpoints = _intervals(samples, x, sign, slope, midpoint)
@@ -169,6 +177,10 @@ def fit(
         better_than_sigmoid=_better(samples, full_scale),
         reach=_reach(low, high, sign),
         noise_counts=noise_counts,
+        kind=kind,
+        knots=tuple(ends_of[0].tolist()),
+        knot_levels=tuple(ends_of[1].tolist()),
+        misfit=misfit(samples, predicted - samples.level, way),
     )
 
 
@@ -189,6 +201,7 @@ def fit_calibration(
     speed: Floats | None = None,
     sensor_id: str = "unnamed",
     threshold: float = 0.5,
+    kind: Kind = "sigmoid",
 ) -> Calibration:
     """Calibrate a flex sensor from arrays: the curve of `Calibration`, by least squares.
 
@@ -199,6 +212,7 @@ def fit_calibration(
         speed: Pushing speed of each [m/s], shape (n,); None if unknown.
         sensor_id: Name of the flex sensor: letters, digits, dots, hyphens and underscores.
         threshold: Flex level that counts as contact.
+        kind: Which curve: the sigmoid, a line, or isotonic.
 
     Raises:
         CalibrationError: Shapes differ, a value is not finite (only a speed may be NaN), a level is
@@ -218,7 +232,7 @@ def fit_calibration(
     threshold = checks.real("threshold", threshold, error=CalibrationError)
     samples = Samples(counts, level, trials, speeds, np.arange(1, n + 1))
     digest = hashlib.sha256(np.stack([counts, level]).tobytes()).hexdigest()
-    return fit(samples, sensor_id, digest, threshold)
+    return fit(samples, sensor_id, digest, threshold, kind=kind)
 
 
 def _column(name: str, values: Any, n: int | str, finite: bool = True) -> Floats:

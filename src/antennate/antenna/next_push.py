@@ -255,7 +255,7 @@ def assess(samples: Samples, calibration: Calibration, t: Floats | None = None) 
     return Assessment(
         pushes.count,
         hysteresis(samples, pushes, calibration),
-        _new_push(checks[RECORDED]["sigmoid"]),
+        _new_push(checks[RECORDED][calibration.kind]),
         rivals,
         named,
         None

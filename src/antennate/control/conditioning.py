@@ -1,9 +1,10 @@
 """From counts to what is felt: bending level, contact, and whether readings repeat.
 
-A running mean over T_avg, then one sigmoid give the level b in [0, 1]. A sample that cannot be
-used, one that is missing or at a rail of the converter, makes the level of its side NaN as long as
-it is in the window of the mean, and its contact UNKNOWN. So a broken wire is UNKNOWN in simulation,
-too; on a robot the diagnosis of each channel finds more.
+A running mean over T_avg, then one curve give the level b in [0, 1]: the paper's sigmoid, or
+straight lines between knots. A sample that cannot be used, one that is missing or at a rail of the
+converter, makes the level of its side NaN as long as it is in the window of the mean, and its
+contact UNKNOWN. So a broken wire is UNKNOWN in simulation, too; on a robot the diagnosis of each
+channel finds more.
 
 Is the robot stuck? It is if its readings repeat from one gait cycle to the next. A robot that
 advances touches new things in every cycle, so its readings change. A robot that walks on the spot
@@ -49,13 +50,17 @@ def sigmoid(z: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """The curves of both antennae, left before right: what `CurveParams` has, shapes (2,)."""
+    """The curves of both antennae, left before right: what `CurveParams` has, shapes (2,).
+
+    `knotted` has both where one of them has knots.
+    """
 
     midpoint: Floats
     slope: Floats
     polarity: Floats
     counts_low: Floats
     counts_high: Floats
+    knotted: tuple[CurveParams, ...] = ()
 
 
 def curves(control: ControlParams) -> CurveParams | Curves:
@@ -63,29 +68,31 @@ def curves(control: ControlParams) -> CurveParams | Curves:
     left, right = control.conditioning, control.conditioning_right
     if right is None:
         return left
-    pairs = ([getattr(one, f.name) for one in (left, right)] for f in fields(Curves))
-    return Curves(*(np.array(pair, float) for pair in pairs))
+    both = (left, right)
+    names = (field.name for field in fields(Curves)[:-1])
+    pairs = {name: np.array([getattr(one, name) for one in both], float) for name in names}
+    return Curves(**pairs, knotted=both if left.knots or right.knots else ())
 
 
 def bending_level(params: CurveParams | Curves, counts: Floats) -> Floats:
-    """Sigmoid calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x.
+    """Calibration, b = 1 / (1 + exp(-s k (x - x0))), s the polarity of the reading x; or by knots.
 
     Args:
-        params: Slope k, midpoint x0, polarity and normalisation.
+        params: Slope k, midpoint x0, polarity and normalisation, or knots and their levels.
         counts: Readings [counts], any shape, (..., 2) for two curves; NaN passes through.
 
     Returns:
         b in [0, 1], same shape.
     """
-    return _level(params, _share(params, counts))
+    return _level(params, counts, _share(params, counts))
 
 
 def level_and_fraction(params: CurveParams | Curves, counts: Floats) -> tuple[Floats, Floats]:
     """`bending_level`, and flex as a fraction of the calibrated range: 0 straight, 1 fully bent."""
     x = _share(params, counts)
     if isinstance(params, Curves):
-        return _level(params, x), np.where(params.polarity > 0, x, 1.0 - x)
-    return _level(params, x), x if params.polarity > 0 else 1.0 - x
+        return _level(params, counts, x), np.where(params.polarity > 0, x, 1.0 - x)
+    return _level(params, counts, x), x if params.polarity > 0 else 1.0 - x
 
 
 def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
@@ -93,7 +100,14 @@ def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
     return (counts - params.counts_low) / (params.counts_high - params.counts_low)
 
 
-def _level(params: CurveParams | Curves, x: Floats) -> Floats:
+def _level(params: CurveParams | Curves, counts: Floats, x: Floats) -> Floats:
+    """Level of readings [counts], and as shares x; the one place where a curve is evaluated."""
+    if not isinstance(params, Curves):
+        if params.knots:
+            return np.asarray(np.interp(counts, params.knots, params.knot_levels), np.float64)
+    elif params.knotted:
+        sides = (bending_level(one, counts[..., i]) for i, one in enumerate(params.knotted))
+        return np.stack([*sides], axis=-1)
     return sigmoid(params.polarity * params.slope * (x - params.midpoint))
 
 

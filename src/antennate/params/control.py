@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, require_default
 from antennate.params.climb import ClimbParams
 from antennate.params.gaits import GaitParams
 
@@ -108,6 +109,28 @@ class CurveParams(Params):
         le=4095,
     )
     """Reading that normalises to 1."""
+
+    knots: tuple[float, ...] = number((), "counts", "paper: a sigmoid, no knots", max_length=4096)
+    """Rising readings of a curve of straight lines in place of the sigmoid, such as a line."""
+    knot_levels: tuple[Annotated[float, Field(ge=0, le=1)], ...] = number(
+        (), "1", "assumed: as knots", max_length=4096
+    )
+    """Bending level at each of the knots; beyond the outer ones it stays."""
+
+    @model_validator(mode="after")
+    def _knots(self) -> CurveParams:
+        rises = all(b > a for a, b in pairwise(self.knots))
+        one_way = all((b - a) * self.polarity >= 0 for a, b in pairwise(self.knot_levels))
+        pairs = len(self.knots) == len(self.knot_levels) != 1
+        if not (rises and one_way and pairs):
+            raise ValueError(
+                "knots: expected two rising readings or more, and as many knot_levels that go one "
+                f"way, by polarity {self.polarity}, found {len(self.knots)} and "
+                f"{len(self.knot_levels)}{', in order' if rises and one_way else ', out of order'}"
+            )
+        if self.knots:
+            require_default(self, "with knots it is not read", "midpoint", "slope")
+        return self
 
     @model_validator(mode="after")
     def _span(self) -> CurveParams:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
+from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Plateau, Samples
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.next_push import RECORDED, Pushes, branches
@@ -27,17 +28,20 @@ if TYPE_CHECKING:
 _95 = "  95 %"
 _MUCH = 0.1
 """Hysteresis over the span beyond which a poor fit is partly its work."""
-CURVE = (
+SIGMOID = (
     Measure("slope", "slope", form=".3f"),
     Measure("slope_95", _95, form=".3f"),
     Measure("midpoint", "midpoint", form=".4f"),
     Measure("midpoint_95", _95, form=".4f"),
+)
+CURVE = (
     Measure("polarity", "polarity", form="+d"),
     Measure("counts_low", "0 at", "counts", form=".0f"),
     Measure("counts_high", "1 at", "counts", form=".0f"),
     Measure("threshold", "theta"),
     Measure("r2", "R²", form=".3f"),
     Measure("rmse", "RMSE of b", form=".4f"),
+    Measure("misfit", "  alike in all pushes", form=".4f"),
     Measure("noise_counts", "noise", "counts", form=".1f"),
     Measure("valid_counts", "valid for", "counts", form=".0f"),
     Measure("valid_bend", "valid for levels"),
@@ -73,11 +77,18 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         for row in curve["speeds"]
     }
     over = _no_interval(curve).capitalize() or f"Intervals are over {_pushes(curve)}"
+    if (kind := curve.get("kind", "sigmoid")) != "sigmoid":
+        ends = zip(curve["knots"], curve["knot_levels"], strict=True)
+        first, *_, last = (f"{level:.2f} at {counts:.0f} counts" for counts, level in ends)
+        many = len(curve["knots"])
+        over = f"Curve: {kind}, straight between {many} knots, from b = {first} to {last}"
+        over += f";\n{_missed(curve)}" if curve["misfit"] else ""
+    withheld = {"slope_95": None, "midpoint_95": None} if _no_interval(curve) else {}
     return (
         Table.of(
             "Calibration",
-            {curve["sensor_id"]: curve},
-            CURVE,
+            {curve["sensor_id"]: {**curve, **withheld}},
+            (*(SIGMOID if kind == "sigmoid" else ()), *CURVE),
             f"Readings {way} with flex. Readings: {curve['samples']}, pushes: {curve['trials']}.\n"
             f"{over}.\n{_file(result)}".rstrip(),
         ),
@@ -125,11 +136,23 @@ def _handled(result: Mapping[str, Any]) -> str:
 
 
 def _no_interval(curve: Mapping[str, Any]) -> str:
-    """Why slope or midpoint has none, empty if both have."""
+    """Why slope or midpoint has none that says how sure it is, empty if both have.
+
+    Where the curve itself misses the readings, the interval of the file is that of noise alone.
+    """
     if curve["trials"] < FEWEST_PUSHES:
         return f"no interval: {_pushes(curve)}; it takes {FEWEST_PUSHES} or more"
+    if curve.get("misfit"):
+        return f"no interval: {_missed(curve)}"
     both = curve["slope_95"] and curve["midpoint_95"]
     return "" if both else f"no interval: {_pushes(curve)} all alike"
+
+
+def _missed(curve: Mapping[str, Any]) -> str:
+    """By how much the curve misses the readings, in words; empty if by no more than noise."""
+    if not curve.get("misfit"):  # results of older versions have none
+        return ""
+    return f"the curve errs by {curve['misfit']:.3f} in b alike in all pushes, which is no noise"
 
 
 def _pushes(curve: Mapping[str, Any]) -> str:
@@ -139,10 +162,12 @@ def _pushes(curve: Mapping[str, Any]) -> str:
 def _next_push(result: Mapping[str, Any]) -> Table:
     """What a user meets: a push that served no fit."""
     curve, known = result["calibration"], result["assessment"]
-    ends = curve["midpoint_95"] and sorted(
-        -curve["slope"] * curve["polarity"] * (end - curve["midpoint"]) / 4
-        for end in curve["midpoint_95"]
-    )
+    ends = None
+    if curve.get("kind", "sigmoid") == "sigmoid" and not _no_interval(curve):
+        ends = sorted(
+            -curve["slope"] * curve["polarity"] * (end - curve["midpoint"]) / 4
+            for end in curve["midpoint_95"]
+        )
     notes = []
     if known["new_push"] is None:
         notes.append("One push only: nothing is known about the next one; record more pushes.")
@@ -165,7 +190,10 @@ def _rival(name: str, checks: Mapping[str, Any]) -> str:
     if lost:
         return f"{name}: better here by {by} in b, but not with: {', '.join(lost)}."
     others = ", ".join(check for check in checks if check != RECORDED)
-    return f"{name}: better than the sigmoid by {by} in b; also with {others}."
+    return (
+        f"{name}: better than the sigmoid by {by} in b; also with {others}. "
+        f"--curve {name} saves that curve."
+    )
 
 
 def sentence(result: Mapping[str, Any]) -> str:
@@ -178,12 +206,16 @@ def sentence(result: Mapping[str, Any]) -> str:
         ahead = f"in a new push b errs by {errors} (95 %)"
         if following["error_95"] is None:
             ahead = "two pushes say too little about the next one"
+    kind, missed = curve.get("kind", "sigmoid"), _missed(curve)
     interval = _no_interval(curve) or f"95 % interval {shown(curve['slope_95'], '.1f')}"
+    of = f", with a slope of {curve['slope']:.1f} ({interval})"
+    if kind != "sigmoid":
+        of = missed and f"; {missed}"
     plateau = result.get("plateau")
     saturated = f"; {Plateau(**plateau).text('the readings')}" if plateau else ""
     return (
-        f"One sigmoid explains R² {curve['r2']:.2f} of {_pushes(curve)}, with a slope of "
-        f"{curve['slope']:.1f} ({interval}); {ahead}{saturated}{_poor(result)}.{_handled(result)}"
+        f"One {kind}{' curve' * (kind == 'isotonic')} explains R² {curve['r2']:.2f} of "
+        f"{_pushes(curve)}{of}; {ahead}{saturated}{_poor(result)}.{_handled(result)}"
     )
 
 
@@ -243,7 +275,7 @@ def figures(outcome: CalibrateOutcome) -> dict[str, Figure]:
     upper, *lower = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     above, below = upper.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     _draw_speeds(above, below, samples, outcome.levels())
-    _draw_curve(above, result["calibration"])
+    _draw_curve(above, outcome.calibration)
     if known["new_push"] is not None and known["new_push"]["error_95"] is not None:
         ends = known["new_push"]["error_95"]
         below.axhspan(*ends, color=style.FAINT, alpha=0.6, linewidth=0, zorder=0)
@@ -271,21 +303,13 @@ def _draw_speeds(above: Axes, below: Axes, s: Samples, level: Floats) -> None:
         _draw_bins(below, s.counts[rows], (level - s.level)[rows], colour, "")
 
 
-def _draw_curve(panel: Axes, curve: Mapping[str, Any]) -> None:
-    low, high = curve["valid_counts"]
-    axis = np.linspace(low, high, 300)
-    x = (axis - curve["counts_low"]) / (curve["counts_high"] - curve["counts_low"])
-    z = curve["polarity"] * curve["slope"] * (x - curve["midpoint"])
-    panel.plot(
-        axis,
-        1 / (1 + np.exp(-z)),
-        color=style.INK,
-        label=f"one sigmoid, R² {curve['r2']:.3f}",
-        zorder=3,
-    )
+def _draw_curve(panel: Axes, curve: Calibration) -> None:
+    axis = np.linspace(*curve.valid_counts, 300)
+    label = f"one {curve.kind}, R² {curve.r2:.3f}"
+    panel.plot(axis, curve.level(axis), color=style.INK, label=label, zorder=3)
     panel.set_ylabel("bend, 0 straight, 1 full")
     panel.set_title(
-        f"{curve['sensor_id']}: {curve['trials']} pushes;\nmean ± standard deviation of each bin"
+        f"{curve.sensor_id}: {curve.trials} pushes;\nmean ± standard deviation of each bin"
     )
     panel.legend(fontsize=8)
 

@@ -179,6 +179,7 @@ def to_counts(
             f"{cure}"
         )
     how = "the divider and the board's converter" if len(used) > 1 else "the board's converter"
+    how += f", {(~apart).sum()} of them held at an end of its range" if not apart.all() else ""
     counts = np.clip(np.interp(volts, corners, readings), 0.0, FULL_SCALE)
     return counts, Conversion(unit, how, used)
 

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.antenna import fitting
-from antennate.antenna.calibration import Calibration
+from antennate.antenna.calibration import Calibration, Kind
 from antennate.antenna.curves import Samples, plateau_of, white_noise
 from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.sensor import reading_noise
@@ -73,6 +73,8 @@ class CalibrateConfig(Params):
     """Mean over readings before fitting."""
     full_scale: bool = number(False, "1", "assumed: the paper's numbers do not tell")
     """Normalise by 0 to 4095 counts and not by the recording's ends."""
+    curve: Kind = number("sigmoid", "1", "paper: one sigmoid")
+    """Curve of the file: the sigmoid, a straight line, or isotonic (any that goes one way)."""
     threshold: float = number(0.5, "1", "assumed: middle of the sigmoid", gt=0, lt=1)
     """Theta of the file."""
     least_r2: float = number(0.5, "1", "assumed: half of the bend explained", ge=0, lt=1)
@@ -174,8 +176,10 @@ class CalibrateOutcome(Outcome):
     def conditioning_toml(self) -> str:
         """The curve as keys of a configuration file, with the kind of a simulated fsr sensor."""
         curve = self.calibration.conditioning()
-        keys = ("midpoint", "slope", "polarity", "counts_low", "counts_high")
-        lines = [f"{key} = {getattr(curve, key)!r}" for key in keys]
+        of_curve = ("knots", "knot_levels") if curve.knots else ("midpoint", "slope")
+        keys = (*of_curve, "polarity", "counts_low", "counts_high")
+        values = {key: getattr(curve, key) for key in keys}
+        lines = [f"{k} = {list(v) if isinstance(v, tuple) else v!r}" for k, v in values.items()]
         kind = self.config.antenna.sensor.kind
         if self.config.recording is None and kind != SensorParams().kind:
             lines += ["", "[robot.antenna.sensor]", f'kind = "{kind}"']
@@ -292,6 +296,8 @@ def run(
             config.full_scale,
             config.least_r2,
             noise if np.isfinite(noise) else None,
+            config.curve,
+            pushes.way,
         )
     except CalibrationError as error:
         where = f"{config.recording}: " if config.recording else ""

@@ -159,7 +159,8 @@ def slope(result: Mapping[str, Any]) -> Finding:
     )
     return Finding(
         f"slope {curve['slope']:.1f} ({shown(slope_95, '.1f')}), midpoint "
-        f"{curve['midpoint']:.2f} ({shown(midpoint_95)})",
+        f"{curve['midpoint']:.2f} ({shown(midpoint_95)})"
+        + ("; by noise alone, the curve itself misses the readings" if curve.get("misfit") else ""),
         all_of(
             agrees(curve["slope"], slope_95, _SLOPE, _SLOPE_NEAR),
             agrees(curve["midpoint"], midpoint_95, _MIDPOINT, _MIDPOINT_NEAR),

@@ -135,7 +135,8 @@ def _each_frame_once(
     """Points with a row for each frame from first to last; what is not known is NaN."""
     first = np.concatenate([[True], np.diff(track.frames) > 0])
     cutoff = track.cutoff if params.likelihood is None else params.likelihood
-    counts["unsorted"], counts["duplicated"] = track.unsorted, int((~first).sum())
+    counts["unsorted"] = track.unsorted
+    counts["duplicated"] = int((~first).sum()) + track.replaced
     counts["absent"] = int(track.frames[-1] - track.frames[0] + 1 - first.sum())
     points: dict[str, Floats] = {}
     for name, raw in track.points.items():

@@ -13,6 +13,7 @@ from antennate.experiments.tracks import measures
 from antennate.experiments.tracks.config import TracksConfig
 from antennate.experiments.tracks.measures import FREE, MOST_BEYOND, NAMES, SHAPES, UNKNOWN, Antenna
 from antennate.experiments.tracks.run import TracksOutcome, run
+from antennate.messages import shortened
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import NONE, Table, few, shown
 from antennate.types import Ints
@@ -164,17 +165,20 @@ def _beyond(result: Mapping[str, Any]) -> str:
 
 
 def _unseen(result: Mapping[str, Any]) -> str:
-    """Which antennae were hardly ever seen."""
+    """Which animals were left out, and which antennae were hardly ever seen."""
     antennae = result.get("unseen")
     if not antennae:
         return ""
+    gone = dict.fromkeys(a["animal"] or a["file"] for a in antennae if a.get("left_out"))
+    count, skipped = result["animals"] + result["skipped"], result["skipped"]
+    left = f" Of {count} animals {skipped} left out: {shortened(', '.join(gone))}." if gone else ""
     first = antennae[0]
     empty = f", as {', '.join(first['empty'])} never has a value" if first["empty"] else ""
     others = f"; {len(antennae) - 1} more in result.json" if len(antennae) > 1 else ""
     of = f" of {first['animal']}" if first["animal"] else ""
     return (
-        f" The {first['side']} antenna{of} in {first['file']} is known in {first['known']} of "
-        f"{first['frames']} frames{empty}{others}."
+        f"{left} The {first['side']} antenna{of} in {first['file']} is known in "
+        f"{first['known']} of {first['frames']} frames{empty}{others}."
     )
 
 

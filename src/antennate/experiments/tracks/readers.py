@@ -8,7 +8,9 @@ import math
 import pickle
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from antennate.errors import BadInputError, MissingPackageError
 from antennate.experiments.tracks.config import ColumnsParams
 from antennate.experiments.tracks.track import (
     LARGEST,
+    SLEAP_CUTOFF,
     Track,
     from_columns,
     numbered,
@@ -44,8 +47,6 @@ _DAMAGES = (
 _TREX = "an npz file of TRex with poseX0, poseY0 and so on"
 _LONGEST_HEADER = 1 << 14
 """More than NumPy takes of an array's header [byte]; one may say of itself that it has 4 GB."""
-_SLEAP_CUTOFF = 0.2
-"""Height of a peak below which SLEAP's inference leaves a point out by default."""
 _SLEAP_AXES = ("track", "xy", "node", "frame")
 
 
@@ -123,9 +124,12 @@ def _sleap_analysis(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
         heights = file["point_scores"]
         axes = [axis for axis in np.argsort(where) if axis != 1]  # those of tracks without xy
         order = [axes.index(axis) for axis in (0, 2, 3)]
-        if heights.shape == tuple(np.delete(shape, where[1])):
-            _require_room(path, heights, len(wanted) / max(1, len(nodes)))
-            scores = np.moveaxis(_picked(heights, wanted, order[1]), order, (0, 2, 1))
+        if heights.shape != (each := tuple(np.delete(shape, where[1]).tolist())):
+            raise BadInputError(
+                f"{path}: expected point_scores of shape {each}, found {heights.shape}"
+            )
+        _require_room(path, heights, len(wanted) / max(1, len(nodes)))
+        scores = np.moveaxis(_picked(heights, wanted, order[1]), order, (0, 2, 1))
     titles = _texts(file["track_names"]) if "track_names" in file else []
     titles = titles if len(titles) == len(points) else [str(i) for i in range(len(points))]
     animals = [
@@ -146,7 +150,7 @@ def _sleap_tracks(
             None,
             {n: points[:, k] for k, n in enumerate(names)},
             {} if scores is None else {n: scores[:, k] for k, n in enumerate(names)},
-            _SLEAP_CUTOFF,
+            SLEAP_CUTOFF,
         )
         for title, points, scores in animals
     ]
@@ -199,8 +203,11 @@ def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
     shift = 0.5 if float(file["metadata"].attrs.get("format_id", 1.2)) < 1.1 else 0.0
     last = int(frames["frame_idx"].max()) + 1 if len(frames) else 0
     tracks: dict[int, tuple[Floats, Floats]] = {}
+    corrected, replaced = _corrected(instances), Counter[int]()
     for frame in frames:
-        for instance in instances[int(frame["instance_id_start"]) : int(frame["instance_id_end"])]:
+        taken = set[int]()
+        for place in range(int(frame["instance_id_start"]), int(frame["instance_id_end"])):
+            instance = instances[place]
             source = sources[int(instance["instance_type"])]
             part = source[int(instance["point_id_start"]) : int(instance["point_id_end"])]
             number, at, seen = int(instance["track"]), int(frame["frame_idx"]), part["visible"]
@@ -211,11 +218,16 @@ def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
                     np.zeros((last, len(nodes))),
                 )
             points, scores = tracks[number]
-            if number < 0 and scores[at].any():
+            if place in corrected or not seen.any():
+                replaced[number] += place in corrected
+                continue
+            if number in taken:
+                which = f"of track {number}" if number >= 0 else "without a track"
                 raise BadInputError(
-                    f"{path}: expected tracked animals, found several without a track in frame "
-                    f"{at}; track them in SLEAP"
+                    f"{path}: expected tracked animals, found several {which} in frame {at}; track "
+                    "them in SLEAP"
                 )
+            taken.add(number)
             points[at, seen, 0], points[at, seen, 1] = (
                 part["x"][seen] - shift,
                 part["y"][seen] - shift,
@@ -226,7 +238,15 @@ def _sleap_labels(path: Path, file: Any, names: Sequence[str]) -> list[Track]:
         (str(number), points[:, wanted], scores[:, wanted])
         for number, (points, scores) in sorted(tracks.items())
     ]
-    return _sleap_tracks(path, names, animals)
+    found = _sleap_tracks(path, names, animals)
+    return [replace(t, replaced=replaced[n]) for t, n in zip(found, sorted(tracks), strict=True)]
+
+
+def _corrected(instances: Any) -> set[int]:
+    """Predictions that a person corrected: SLEAP keeps each beside the instance made from it."""
+    if "from_predicted" not in instances.dtype.names:
+        return set()
+    return set(instances["from_predicted"].tolist())
 
 
 class _Plain(pickle.Unpickler):
@@ -275,7 +295,8 @@ def _pandas_table(path: Path, group: Any, names: Sequence[str]) -> list[Track]:
         (key[1] if len(key) == 4 else "", str(key[-2]), str(key[-1])): values[:, i].astype(float)
         for i, key in enumerate(columns)
     }
-    return from_columns(path, np.asarray(index, np.float64), by_name, names)
+    animals = [animal for animal, _, _ in by_name]
+    return from_columns(path, np.asarray(index, np.float64), by_name, names, animals)
 
 
 def _trex(path: Path, names: Sequence[str]) -> list[Track]:

@@ -37,6 +37,7 @@ class Unseen:
         animal: Whose, empty if the file has one alone.
         side: `left` or `right`.
         frames: Frames of the animal, `known` those in which the antenna was known.
+        left_out: Whether the animal was left out, as it has no other antenna.
         empty: Points of the antenna and the body axis that never have a value.
     """
 
@@ -46,6 +47,7 @@ class Unseen:
     frames: int
     known: int
     empty: tuple[str, ...]
+    left_out: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +136,9 @@ class TracksOutcome:
                 parts = {part for name in config.points.of(side) for part in name.split("+")}
                 of = parts | {*config.points.tail.split("+"), *config.points.head.split("+")}
                 empty = tuple(name for name in antennae.empty if name in of)
-                frames = antennae.frames
-                self.unseen.append(Unseen(track.file, track.animal, side, frames, count, empty))
+                numbers = antennae.frames, count
+                gone = len(few) == len(known)
+                self.unseen.append(Unseen(track.file, track.animal, side, *numbers, empty, gone))
             if len(few) == len(known):
                 self.skipped += 1
             else:

@@ -32,6 +32,12 @@ UNPACKED = 2 * 10**8
 """Nor does what is read of it unpack to more [bytes]: 1.4 million frames of the eight points of two
 antennae and a body axis (two coordinates, frame and `missing`, 8 bytes each). That is 6 h at 60 Hz,
 at which TRex tracks while it films (Walter and Couzin 2021, eLife 10:e64000)."""
+DEEPLABCUT_CUTOFF, SLEAP_CUTOFF = 0.6, 0.2
+"""Likelihood, and height of a peak, below which these programs leave a point out by default."""
+_SLEAP = {
+    "x": "{}.x", "y": "{}.y", "likelihood": "{}.score", "frame": "frame_idx", "trial": "track",
+}  # fmt: skip
+"""Columns of SLEAP's analysis CSV; those that a user names go before."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,7 @@ class Track:
         cutoff: Likelihood below which a point is usually left out in this format.
         contact: Whether each side's antenna touches, 0 or 1, shape (n,), where the file has it.
         unsorted: Rows that stood after one of a later frame.
+        replaced: Instances that were left out, as another of the animal stands in the same frame.
     """
 
     file: str
@@ -56,33 +63,24 @@ class Track:
     rate: float | None
     points: Mapping[str, Floats]
     scores: Mapping[str, Floats]
-    cutoff: float = 0.6
+    cutoff: float = DEEPLABCUT_CUTOFF
     contact: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
     unsorted: int = 0
+    replaced: int = 0
 
     def in_order(self) -> Track:
         """The same with its frames in rising order.
 
         Raises:
-            BadInputError: They do not rise, and some stand twice: then it may be several animals.
+            BadInputError: A frame stands twice with different points: it may be several animals.
         """
-        latest = np.maximum.accumulate(self.frames)
-        late = self.frames < latest
-        if not late.any():
-            return self
-        order = np.argsort(self.frames)
-        if (np.diff(self.frames[order]) == 0).any():
-            at = int(np.argmax(late))
-            raise BadInputError(
-                f"{self.file}: expected frames in rising order or each once, found "
-                f"{self.frames[at]} after {latest[at]}, and some twice; name the column of trials "
-                "with --columns.trial"
-            )
+        late = self.frames < np.maximum.accumulate(self.frames)
+        order = np.argsort(self.frames, kind="stable")
 
         def sort(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {name: values[order] for name, values in columns.items()}
 
-        return replace(
+        track = replace(
             self,
             frames=self.frames[order],
             points=sort(self.points),
@@ -90,6 +88,22 @@ class Track:
             contact=sort(self.contact),
             unsorted=int(late.sum()),
         )
+        track._refuse_two_places()
+        return track
+
+    def _refuse_two_places(self) -> None:
+        """Refuse rows of one frame that differ where the later one has a value."""
+        same = np.flatnonzero(np.diff(self.frames) == 0)
+        places = np.hstack(list(self.points.values()))
+        later = places[same + 1]
+        moved = self.frames[same[(np.isfinite(later) & (later != places[same])).any(axis=1)]]
+        if len(moved):
+            raise BadInputError(
+                f"{self.file}: expected one place for each point in a frame, found more in "
+                f"{len(np.unique(moved))} frames{f' of {self.animal}' if self.animal else ''}, the "
+                f"first of them {moved[0]}; if these are several animals, name each in the column "
+                "of --columns.trial"
+            )
 
 
 def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> None:
@@ -129,19 +143,26 @@ def refuse_labels(path: Path, index: str) -> NoReturn:
 
 
 def from_columns(
-    path: Path, frames: Floats, columns: Mapping[tuple[str, str, str], Floats], names: Sequence[str]
+    path: Path,
+    frames: Floats,
+    columns: Mapping[tuple[str, str, str], Floats],
+    names: Sequence[str],
+    animals: Sequence[str],
 ) -> list[Track]:
-    """DeepLabCut's columns, by individual, bodypart and coordinate, as tracks."""
+    """DeepLabCut's columns, by individual, bodypart and coordinate, as tracks of its animals.
+
+    One with none of the points is never known: `single`, of points that belong to no animal.
+    """
     known = [part for _, part, _ in columns]
     require_points(path, names, known)
-    tracks = []
-    for animal in dict.fromkeys(animal for animal, _, _ in columns):
-        if (animal, names[0], "x") not in columns:
-            continue  # `single`: points that belong to no animal, such as corners of the arena
+    tracks, unknown = list[Track](), np.full(len(frames), np.nan)
+    for animal in dict.fromkeys(animals):
         lacking = [n for n in names for c in "xy" if (animal, n, c) not in columns]
-        if lacking:
+        if 0 < len(lacking) < 2 * len(names):
             raise BadInputError(f"{path}: {animal}: expected x and y of {lacking[0]}, found none")
-        points = {n: np.stack([columns[animal, n, c] for c in "xy"], axis=1) for n in names}
+        points = {
+            n: np.stack([columns.get((animal, n, c), unknown) for c in "xy"], axis=1) for n in names
+        }
         scores = {n: columns[key] for n in names if (key := (animal, n, "likelihood")) in columns}
         tracks.append(Track(str(path), animal, numbered(path, frames), None, points, scores))
     return tracks
@@ -247,7 +268,7 @@ def _deeplabcut(
     require_points(path, names, levels["bodyparts"][1:])
     table, _ = _table(path, body, levels["bodyparts"], [0, *columns.values(), -1])
     values = dict(zip(columns, table.T[1:], strict=True))
-    return from_columns(path, table[:, 0], values, names)
+    return from_columns(path, table[:, 0], values, names, animals[1:])
 
 
 def _without_images(path: Path, rows: Iterator[Row]) -> Iterator[Row]:
@@ -266,6 +287,10 @@ def _plain(
     columns: ColumnsParams,
 ) -> list[Track]:
     """A column for each coordinate of a point, and one that tells trials or animals apart."""
+    theirs = _SLEAP if {"track", "frame_idx"} <= set(header) else {}
+    own = columns.model_fields_set
+    columns = columns.model_copy(update={k: v for k, v in theirs.items() if k not in own})
+    cutoff = SLEAP_CUTOFF if theirs else DEEPLABCUT_CUTOFF
     wanted = {(n, c): getattr(columns, c).format(n) for n in names for c in "xy"}
     scores = {n: columns.likelihood.format(n) for n in names}
     touch = {side: columns.contact.format(side) for side in ("left", "right")}
@@ -297,7 +322,7 @@ def _plain(
         likely = {n: part[name] for n, name in scores.items() if name in part}
         rate = _rate(path, numbers, part[columns.time]) if columns.time in part else None
         contact = {side: part[name] for side, name in touch.items() if name in part}
-        tracks.append(Track(str(path), trial, numbers, rate, points, likely, contact=contact))
+        tracks.append(Track(str(path), trial, numbers, rate, points, likely, cutoff, contact))
     return tracks
 
 
