@@ -52,7 +52,7 @@ _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 _OBEYED = (
     *("angle", "eulerseq", "autolimits", "coordinate", "usethread"),
-    *("inertiafromgeom", "inertiagrouprange", "fitaabb", "alignfree", "discardvisual"),
+    *("inertiafromgeom", "inertiagrouprange", "alignfree", "discardvisual"),
     *("fusestatic", *_DIRECTORIES),
 )
 """Attributes of `<compiler>` that mean the same in a scene, in its export, and alone."""
