@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate import envs
 from antennate.cli import main
 from antennate.control.controllers import open_loop
 from antennate.control.loop import CheckedController, run_loop
@@ -194,6 +193,9 @@ def test_empty_parts_of_frames_are_not_shared() -> None:
 
 def test_an_episode_goes_on_whatever_is_written_into_its_arrays() -> None:
     def walk(writes: bool) -> list[Any]:
+        pytest.importorskip("gymnasium", reason="environments need Gymnasium")
+        from antennate import envs
+
         env = envs.AntennaVectorEnv(2, "flat", time_limit=0.5)
         kept = list[Any]()
         observation, infos = env.reset(seed=3)
@@ -244,6 +246,9 @@ def test_what_is_seen_after_the_limit_is_a_timeout(
     (row,) = antennate.run("tunnel", trials=1, controllers=("open",), **settings).rows
     assert (row.outcome, row.time_s) == (outcome, limit)
     assert antennate.simulate("open", **settings).meta["outcome"] == outcome
+    pytest.importorskip("gymnasium", reason="environments need Gymnasium")
+    from antennate import envs
+
     env = envs.AntennaEnv(**settings)
     env.reset(seed=0)
     info, ended, cut = {}, False, False

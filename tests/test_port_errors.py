@@ -91,6 +91,7 @@ def test_every_command_says_it_and_ends_with_2(
 ) -> None:
     """Before anything is asked of a person."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")  # no cell of a table is broken
     (tmp_path / "robot.toml").touch()
     both = ["--esp32", path, "--bus", "/dev/another"]
     ports = both if command == "drive" else ["--bus", path]
@@ -138,4 +139,4 @@ def test_json_is_the_result_alone_and_out_keeps_it(
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((out / "result.json").read_text())
     assert (result["schema"], result["command"], result["grade"]) == (1, "doctor", "bad")
-    assert result["rows"][0]["check"] == "port"
+    assert "port" in [row["check"] for row in result["rows"] if row["grade"] == "bad"]

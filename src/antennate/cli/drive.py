@@ -80,9 +80,7 @@ class DriveOptions(ResultOptions, PortOptions, PageOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
-    until: Path | None = option(
-        None, "end once this file exists, as of a light gate, or of `twin --passed FILE`", "FILE"
-    )
+    until: Path | None = option(None, "end once this file exists, as of a light gate", "FILE")
 
 
 def command(argv: Sequence[str]) -> int:

@@ -30,7 +30,7 @@ _LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--
 _LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
 _LATER += ("--readings", "--knows", "--json", "--overwrite")
 """Options that nobody uses first: they come last on the short page."""
-_FIRST = ("--arm", "--until")
+_FIRST = ("--config", "--esp32", "--bus", "--arm", "--until")
 """Options that the pages use: they come first on it, in this order."""
 
 

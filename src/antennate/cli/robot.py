@@ -47,9 +47,7 @@ class RobotFileOptions(FromFile):
 class RobotOptions(RobotFileOptions):
     """Where the robot is."""
 
-    esp32: str = option(
-        "", "antenna board: a serial port, tcp://HOST:PORT, udp://HOST:PORT", "PORT"
-    )
+    esp32: str = option("", "antenna board: serial port, tcp:// or udp://HOST:PORT", "PORT")
     key: Path | None = option(
         None, "file with the key of a board behind udp://, mode 0600; else ANTENNATE_KEY", "FILE"
     )

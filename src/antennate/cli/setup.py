@@ -14,7 +14,7 @@ from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
 from antennate.cli.options import option
 from antennate.cli.results import print_table
 from antennate.cli.robot import USUAL, BusOptions, parse_robot, parse_writer, require_bus
-from antennate.cli.terminal import StatusLine, stop_signals, write
+from antennate.cli.terminal import StatusLine, stop_signals, today, write
 from antennate.dxl.bus import Bus
 from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
@@ -219,7 +219,7 @@ def zero(argv: Sequence[str]) -> int:
 def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, path: Path) -> int:
     robot, clock = config.robot, HostClock()
     unknown = {*robot.unstated("directions"), *config.zeros.missing}
-    require_changeable(path, measured(robot, robot.zeros, robot.directions, ()))
+    require_changeable(path, measured(robot, robot.zeros, robot.directions, (), today()))
     with master(opener_of(options.bus, "--bus"), robot.baud, clock.now) as bus:
         require_servos(bus, robot)
         if left := torque.disable(bus, robot.ids):
@@ -232,7 +232,7 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
         keep = options.keep_directions
         directions = list(robot.directions) if keep else zeroing.directions(person)
     missing = [name for name in robot.joint_names if name in unknown - zeroing.measured]
-    change(path, measured(robot, zeros, directions, missing))
+    change(path, measured(robot, zeros, directions, missing, today()))
     person.close()
     _show_zeros(robot, zeros, directions, zeroing.measured)
     named = () if path == USUAL else ("--config", str(path))

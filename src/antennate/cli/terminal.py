@@ -167,6 +167,11 @@ def write(text: str) -> None:
             sys.stderr.flush()
 
 
+def today() -> str:
+    """The date, as files of a robot have it."""
+    return time.strftime("%Y-%m-%d")
+
+
 def is_drawable(stream: Any) -> bool:
     """Whether a stream is a terminal on which a line can be written over the last one."""
     return bool(stream and stream.isatty() and os.environ.get("TERM", "dumb") != "dumb")

@@ -22,7 +22,7 @@ from antennate.cli.exit_codes import OK
 from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
-from antennate.cli.terminal import progress, stop_signals, write
+from antennate.cli.terminal import progress, stop_signals, today, write
 from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
@@ -196,7 +196,7 @@ def _write_robot(path: Path, robot: RobotSpec, paths: dict[str, str]) -> None:
         )
     own = robot.model_dump(mode="json", exclude_defaults=True)
     known = {("ports", name): port for name, port in paths.items()}
-    known |= measured(robot, robot.zeros, robot.directions, ())
+    known |= measured(robot, robot.zeros, robot.directions, (), today())
     text = edited(_HEAD + tomlkit.dumps({"robot": own}), known)
     write_whole(path, text.encode(), overwrite=True)
 

@@ -103,8 +103,9 @@ def _share(params: CurveParams | Curves, counts: Floats) -> Floats:
 def _level(params: CurveParams | Curves, counts: Floats, x: Floats) -> Floats:
     """Level of readings [counts], and as shares x; the one place where a curve is evaluated."""
     if not isinstance(params, Curves):
-        if params.knots:
-            return np.asarray(np.interp(counts, params.knots, params.knot_levels), np.float64)
+        knots, levels = params.knots, params.knot_levels
+        if knots:
+            return np.asarray(np.interp(counts, knots, levels), np.float64)
     elif params.knotted:
         sides = (bending_level(one, counts[..., i]) for i, one in enumerate(params.knotted))
         return np.stack([*sides], axis=-1)

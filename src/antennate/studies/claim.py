@@ -102,12 +102,15 @@ def _begin(
     goes_on = bool(resume) and not others and (place / STORE) in held
     if (held or others) and not goes_on:
         raise holds_run(place, [*others, *held], resume)
-    add_to_list(place, (PARTIAL, STORE, ROOM))
+    if not goes_on:
+        add_to_list(place, (PARTIAL, STORE, ROOM))
     lock = _locked(place / FILES)
     try:
         store = open_store(place, identity, tasks if goes_on else None)
         sound = store is not None and not store.damaged and store.holds_all(tasks)
         finished = goes_on and not retry and sound and is_finished(place)
+        if goes_on and not finished:
+            add_to_list(place, (PARTIAL, STORE, ROOM))
         for file in outdated(held, finished) if goes_on else ():
             file.unlink()
         partial = None if finished else (place / PARTIAL).open("x", encoding="utf-8")

@@ -97,7 +97,10 @@ def trim_list(place: Path, handle: int) -> None:
     Raises:
         OSError: It cannot be written.
     """
-    names = [name for name in listed(place) or () if os.path.lexists(place / name)]
+    before = listed(place) or []
+    names = [name for name in before if os.path.lexists(place / name)]
+    if names == before:
+        return
     text = "".join(f"{line}\n" for line in (_TITLE, *names)).encode()
     os.pwrite(handle, text, 0)
     os.ftruncate(handle, len(text))

@@ -310,6 +310,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     figures=figures,
     body=body,
-    captions={claim.name: claim.claim for claim in CLAIMS},
+    captions={claim.name: f"{claim.claim}." for claim in CLAIMS},
     parts="% of 9 experiments",
 )

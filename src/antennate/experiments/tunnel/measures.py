@@ -76,7 +76,7 @@ CONTROLLER = (
     Measure("force_max_n", "contact force, largest", "N", of=largest, form=".1f", least=0.0),
     Measure("offset_m", "off the middle", "m", form=".3f", least=0.0, interval="offset_95"),
     Measure("spring_low_n_m", of=smallest),
-    Measure("spring_high_n_m", "spring torque, most (to its stop)", "N·mm", of=largest, scale=1e3),
+    Measure("spring_high_n_m", "spring torque, most", "N·mm", of=largest, scale=1e3),
     Measure("spring_cycles", "  load cycles, most", of=largest, form="d", least=0.0),
 )
 TIME = Measure(
@@ -227,6 +227,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         {short[name]: row for name, row in controllers.items()},
         one,
         f"{many} a controller, seed {result['seed']}. A failure counts as {until}.\n"
+        "The largest spring torque is bounded by the stop of its hinge.\n"
         f"Invalid trials do not count in the rows below "
         f"`invalid`.{'' if few(_valid(result)) else f' {_JOINED}'}",
         about(controllers),

@@ -8,7 +8,6 @@ its positive sense. Nothing here moves anything.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -270,14 +269,18 @@ def by_group(
 
 
 def measured(
-    robot: RobotSpec, zeros: Sequence[int], directions: Sequence[int], missing: Sequence[str]
+    robot: RobotSpec,
+    zeros: Sequence[int],
+    directions: Sequence[int],
+    missing: Sequence[str],
+    date: str,
 ) -> dict[tuple[str, ...], Any]:
-    """Keys of a robot's file that say where its joints are, from today on."""
+    """Keys of a robot's file that say where its joints are, since a date."""
     return {
         **by_group(robot, "ids", robot.ids),
         **by_group(robot, "zeros", zeros),
         **by_group(robot, "directions", directions),
-        ("zeros", "measured"): time.strftime("%Y-%m-%d"),
+        ("zeros", "measured"): date,
         ("zeros", "missing"): missing,
     }
 
