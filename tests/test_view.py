@@ -122,7 +122,7 @@ def stays_here(tab: Tab, view: Shown) -> None:
 
 def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_path: Path) -> None:
     """θ goes from 0.98 to 0.3: until then all is as without a page, then contact begins at 0.3."""
-    words = "tunnel --controllers paper --trials 1 --control.rule.threshold 0.98 --time-limit 40"
+    words = "tunnel --controllers paper --trials 1 --control.rule.threshold 0.98 --time-limit 12"
     more = ("--log", "--view", "--view-port", "0", "--view-speed", "0.25", "--out", "run")
     with shown(*words.split(), *more, "--view-paused", folder=tmp_path) as view:
         opened(tab, view)
@@ -149,7 +149,7 @@ def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_pa
     ticks, changed = read_log(run / "logs" / "paper-0.mcap")
     assert 0 < changed < len(ticks)
     control = ControlParams(rule=RuleParams(threshold=0.98))
-    alone = simulate("paper", control=control, time_limit=40.0)
+    alone = simulate("paper", control=control, time_limit=12.0)
     assert [tick.maneuver for tick in ticks[:changed]] == alone.maneuver[:changed].tolist()
     held = control.rule.hysteresis
     for number, tick in enumerate(ticks):
