@@ -97,9 +97,9 @@ def trim_list(place: Path, handle: int) -> None:
     Raises:
         OSError: It cannot be written.
     """
-    before = listed(place) or []
-    names = [name for name in before if os.path.lexists(place / name)]
-    if names == before:
+    before = listed(place)
+    names = [name for name in before or () if os.path.lexists(place / name)]
+    if before is None or names == before:
         return
     text = "".join(f"{line}\n" for line in (_TITLE, *names)).encode()
     os.pwrite(handle, text, 0)

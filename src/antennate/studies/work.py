@@ -268,9 +268,10 @@ def pack_whole(each: Any) -> bytes:
     """An object for workers that have not imported the program; with it where its file is."""
     dumps = by_value() or pickle.dumps
     path = os.path.abspath(getattr(sys.modules["__main__"], "__file__", None) or "")  # noqa: PTH100
-    if getattr(each, "__module__", None) != "__main__" or not Path(path).is_file():
+    name = getattr(each, "__qualname__", None)  # an instance has none
+    if getattr(each, "__module__", None) != "__main__" or not name or not Path(path).is_file():
         return dumps(each)
-    program = _OfProgram(path, Path(path).read_bytes(), each.__qualname__, dumps(each))
+    program = _OfProgram(path, Path(path).read_bytes(), name, dumps(each))
     return pickle.dumps(program)
 
 

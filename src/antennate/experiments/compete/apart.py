@@ -63,6 +63,7 @@ class Apart:
     maneuver: Ints
     contact: Ints
     level: Floats
+    void_decisions: Ints | None = None
 
     def __init__(self, make: Callable[[], Controller], limit: float) -> None:
         self._limit, self._begun = limit, False
@@ -76,7 +77,11 @@ class Apart:
         theirs.close()
         self.knows: tuple[Kind, ...]
         self.needs: tuple[Kind, ...]
-        self.knows, self.needs = self._ask(float("inf"), "make")
+        try:
+            self.knows, self.needs = self._ask(float("inf"), "make")
+        except BaseException:
+            self.close()
+            raise
 
     def know(self, knowledge: Knowledge) -> None:
         """As of `Knowing`."""
@@ -89,7 +94,8 @@ class Apart:
     def step(self, frame: AntennaFrame) -> JointCommand:
         """As of a `Controller`."""
         limit = self._limit * (1.0 if self._begun else WAITING)
-        command, self.maneuver, self.contact, self.level = self._ask(limit, "step", frame)
+        command, self.maneuver, self.contact, self.level, void = self._ask(limit, "step", frame)
+        self.void_decisions = void
         self._begun = True
         return command
 
@@ -113,6 +119,8 @@ class Apart:
             wrong, answer, told = _Plain(io.BytesIO(self._pipe.recv_bytes(_LARGEST))).load()
         except (EOFError, OSError):
             raise ControllerError(f"its process ended in {call[0]}") from None
+        except ControllerError:  # it was given up
+            raise
         except Exception as error:  # noqa: BLE001  (it may send anything)
             raise ControllerError(f"expected plain arrays, found {error}") from None
         programs = self._look(told)
@@ -233,7 +241,8 @@ def _serve(pipe: Connection, make: Callable[[], Controller]) -> None:
             else:
                 answer = getattr(made, name)(*values)
             if name == "step":
-                answer = answer, made.maneuver, made.contact, made.level
+                void = getattr(made, "void_decisions", None)
+                answer = answer, made.maneuver, made.contact, made.level, void
         except BaseException as error:  # noqa: BLE001  (it may raise anything)
             ours = isinstance(error, AntennateError)
             wrong = type(error).__name__
