@@ -285,18 +285,24 @@ def jog(argv: Sequence[str]) -> int:
         StopOnce(last=True) as stop,
     ):
         stop.within = _move  # no signal keeps the torque from going off
-        off, last = True, ""
+        off, last, stood = True, "", dict[int, int | None]()
         while off and last not in ("q", END) and not stop.received:
-            off, last = _one_joint(bus, config, at, keys, clock)
+            off, last = _one_joint(bus, config, at, keys, clock, stood)
             at = (at + _OTHERS.get(last, 0)) % len(names)
     return OK if off else BAD_INPUT
 
 
 def _one_joint(
-    bus: Bus, config: JogConfig, at: int, keys: ReadKeys, clock: HostClock
+    bus: Bus,
+    config: JogConfig,
+    at: int,
+    keys: ReadKeys,
+    clock: HostClock,
+    stood: dict[int, int | None],
 ) -> tuple[bool, str]:
     """One joint until another is wanted: whether its torque is off, and the last key.
 
+    `stood` keeps where joints without a zero stood at first, so that visits do not add up.
     What became of the torque is written in any case, above the error if there is one.
     """
     status, last, left = StatusLine(), "q", list[int]()
@@ -306,12 +312,14 @@ def _one_joint(
         way = f"at most {math.degrees(config.jog.reach):.0f} deg from where it stands, + adds ticks"
         write(f"{one.name}: its zero or direction is not measured: {way}\n")
     joint = Jog(bus, robot, one, config.jog, known)
+    joint.stood = stood.get(at)
     try:
         last = _move(joint, config.jog.speed, keys, clock, status)
     except KeyboardInterrupt:
         pass
     finally:
         left = joint.end()
+        stood[at] = joint.stood
         status.close()
         write(
             f"torque is NOT confirmed off: servos {left}; switch their supply off\n"

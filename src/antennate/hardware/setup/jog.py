@@ -75,6 +75,7 @@ class Jog:
         self._sign, self._limit = robot.directions[at], robot.limits[at]
         self._zero, self._lost = float(robot.zeros[at]), 0
         self._full, self._measured = 0, measured
+        self.stood: int | None = None  # of one that is not measured, when it was first moved
         self._newest = JogState(0.0, 0.0, 0, 0)
 
     def begin(self) -> None:
@@ -99,7 +100,8 @@ class Jog:
         stands = torque.enable(bus, [servo])[servo]
         if not self._measured:
             reach = min(self._params.reach, self._limit)
-            self._zero, self._sign, self._limit = float(stands), 1, reach
+            self.stood = stands if self.stood is None else self.stood
+            self._zero, self._sign, self._limit = float(self.stood), 1, reach
         elif math.isinf(self._limit):  # a leg counts its turns from where it stands
             self._zero += TICKS_A_TURN * round((stands - self._zero) / TICKS_A_TURN)
         angle = self._angle(stands)
