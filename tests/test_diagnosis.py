@@ -16,11 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, norm
 
+import antennate
 from antennate.antenna.sensor import reading_noise
 from antennate.errors import CalibrationError
 from antennate.hardware.safety import channel as diagnosis
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding, Reading
+from antennate.params.control import CurveParams
 from antennate.robots.antenna import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
@@ -371,6 +373,22 @@ def test_S11_beyond_the_calibrated_range_is_flagged_and_kept_as_in_simulation(
     found = after_rest([edge] * 3 + [round(beyond) + n % 2 for n in range(20)])
     assert all(r.finding is Finding.OUT_OF_CAL for r in found[-10:])
     assert {r.counts for r in found[-10:]} == {round(beyond), round(beyond) + 1}
+
+
+def test_S11_the_antennae_of_a_good_twin_stay_within_their_default_curve() -> None:
+    """As the tunnel bends them; a recording up to a right angle covers less than that."""
+    counts = antennate.simulate(time_limit=20.0, seed=1).counts
+    model, recorded = CurveParams(), CurveParams(counts_low=1400.0)
+    flagged = []
+    for curve in (model, recorded):
+        films = [channel(Band.of(curve)) for _ in range(2)]
+        for film, readings in zip(films, counts.T, strict=True):
+            feed(film, readings.tolist())
+        flagged.append(sum(film.counted[Finding.OUT_OF_CAL] for film in films))
+    assert flagged[0] == 0
+    assert flagged[1] > 100
+    straight = after_rest([BAND.high + 30.0 + n % 2 for n in range(20)], Band.of(model))
+    assert straight[-1].finding is Finding.OUT_OF_CAL
 
 
 def test_S11_readings_beyond_the_range_are_counted() -> None:

@@ -165,6 +165,7 @@ class Finding(Enum):
         return self in _BROKEN
 
 
+_MODEL = CurveParams()
 _BROKEN = {Finding.STUCK, Finding.NOISE, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
 _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
@@ -174,18 +175,27 @@ class Band:
     """Calibrated range of a channel [counts]; polarity is 1 if readings rise with flex, else -1.
 
     Readings are believed up to BEYOND outside it, to the bent side up to `reach` if given [spans].
+    The curve holds up to `covered` beyond its bent end [spans].
     """
 
     low: float
     high: float
     polarity: int
     reach: float | None = None
+    covered: float = 0.0
 
     @classmethod
     def of(cls, conditioning: CurveParams, reach: float | None = None) -> Band:
-        """The range of a calibration."""
+        """The range of a calibration; the default curve is of a model, which bends to REACH."""
         low, high = conditioning.counts_low, conditioning.counts_high
-        return cls(low, high, conditioning.polarity, reach)
+        model = (low, high) == (_MODEL.counts_low, _MODEL.counts_high)
+        return cls(low, high, conditioning.polarity, reach, REACH if model else 0.0)
+
+    def covers(self, counts: float) -> bool:
+        """Whether a reading [counts] is within the range, but for noise."""
+        bent = MARGIN + self.covered * self.span
+        below, above = (bent, MARGIN) if self.polarity < 0 else (MARGIN, bent)
+        return self.low - below <= counts <= self.high + above
 
     def believes(self, counts: float) -> bool:
         """Whether a flex sensor can give a reading [counts], as far as is known."""
@@ -324,7 +334,7 @@ class ChannelDiagnosis:
             self._good = counts
             self._doubted = []
         self._bad_run = 0 if good else self._bad_run + 1
-        outside = good and not band.low - MARGIN <= counts <= band.high + MARGIN
+        outside = good and not band.covers(counts)
         self._outside.append(outside)
         self.outside += outside
         self.bad += not good
