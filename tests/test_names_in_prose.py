@@ -139,7 +139,12 @@ class Index:
 
 def imported(parts: list[str]) -> bool:
     """Whether the parts of a name lead to something, from its package on."""
-    value, place = importlib.import_module(parts[0]), parts[0]
+    try:
+        value, place = importlib.import_module(parts[0]), parts[0]
+    except ModuleNotFoundError:
+        if parts[0] not in FOREIGN:
+            raise
+        return True  # as below; where all extras are, it is looked at
     for part in parts[1:]:
         place += f".{part}"
         if not hasattr(value, part):
