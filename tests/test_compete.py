@@ -207,7 +207,7 @@ def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
 
 
 ESCAPES = """
-import ctypes, os, resource, signal, subprocess, sys, threading, time
+import ctypes, os, resource, signal, stat, struct, subprocess, sys, threading, time
 from antennate.control.controllers import open_loop
 
 clock = time.process_time
@@ -273,6 +273,33 @@ class Clocks(Entry):
         resource.getrusage = lambda who: resource.struct_rusage([0.0] * 16)
         signal.setitimer = lambda *how: None
         work(0.2)
+class Stops(Entry):
+    def escape(self):
+        os.kill(os.getppid(), signal.SIGSTOP)
+        time.sleep(60.0)
+class Half(Entry):
+    def escape(self):
+        for file in map(int, os.listdir("/proc/self/fd")):
+            try:
+                if stat.S_ISSOCK(os.fstat(file).st_mode):
+                    os.write(file, struct.pack("!i", 100) + b"half")
+            except OSError:  # the folder's own
+                pass
+        time.sleep(60.0)
+class Ended(Entry):
+    def escape(self):  # as a cluster ends a job: all of its processes
+        for number in (signal.SIGUSR2, signal.SIGTERM):
+            os.kill(os.getppid(), number)
+            os.kill(os.getpid(), number)
+class Program(Entry):
+    def escape(self):
+        self.program = subprocess.Popen(["true"])
+        while b") Z " not in open(f"/proc/{self.program.pid}/stat", "rb").read():
+            time.sleep(0.001)
+DATA = open(__file__)
+class Reads(Entry):
+    def escape(self):
+        assert "class Reads" in DATA.read()
 class Picks(Entry):
     def step(self, frame):
         class Answer:
@@ -305,6 +332,11 @@ class Slow:
         ("Ignored", "controller: a decision took longer than 50 ms"),
         ("Between", "controller: a decision took longer than 50 ms"),
         ("Clocks", "controller: a decision took longer than 50 ms"),
+        ("Stops", "controller: a decision took longer than 50 ms"),
+        ("Half", "controller: a decision took longer than 50 ms"),
+        ("Ended", ""),
+        ("Program", ""),
+        ("Reads", ""),
         ("Picks", "controller: expected plain arrays, found posix.system"),
     ],
 )

@@ -11,17 +11,19 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import fcntl
 import io
-import multiprocessing
 import os
 import pickle
 import resource
 import signal
+import socket
+import stat
+import struct
 import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
 from antennate.control.knowledge import Kind, Knowing, Knowledge
@@ -35,8 +37,14 @@ _LOOK = 0.005
 """Time between two looks at what works for a decision [s]."""
 _LARGEST = 2**26
 """Most bytes of an answer."""
+_HEAD = struct.Struct("!I")
+"""What an answer begins with: how many bytes follow."""
 _SUBREAPER, _DIES_WITH_PARENT = 36, 1
 """Numbers of prctl(2)."""
+_END = getattr(signal, "SIGRTMIN", signal.SIGUSR1) + 7
+"""Signal by which the judge ends the warden; a cluster sends others to all processes of a job."""
+_PATIENCE = 2.0
+"""Time in which the warden ends all [s]."""
 _PLAIN = {("numpy", name) for name in ("ndarray", "dtype", "_reconstruct", "_frombuffer", "scalar")}
 _PLAIN |= {("antennate", "JointCommand")}
 """What an answer may hold beside plain values: a package and a name in it."""
@@ -68,11 +76,12 @@ class Apart:
     def __init__(self, make: Callable[[], Controller], limit: float) -> None:
         self._limit, self._begun = limit, False
         self._seen, self._used, self._answered = dict[int, float](), 0.0, 0.0
-        self._pipe, theirs = multiprocessing.Pipe()
+        self._pipe, theirs = socket.socketpair()
         with warnings.catch_warnings():  # of threads, from Python 3.12 on; a judge's hold no lock
             warnings.simplefilter("ignore", DeprecationWarning)
             self._warden = os.fork()
         if not self._warden:
+            self._pipe.close()
             _guard(theirs, make)
         theirs.close()
         self.knows: tuple[Kind, ...]
@@ -103,20 +112,24 @@ class Apart:
         """End it, and all that it began: that does the warden, also when the judge is killed."""
         self._pipe.close()
         with contextlib.suppress(ProcessLookupError, ChildProcessError):
-            os.kill(self._warden, signal.SIGTERM)
-            os.waitpid(self._warden, 0)
+            os.kill(self._warden, _END)
+            os.kill(self._warden, signal.SIGCONT)
+            end = time.monotonic() + _PATIENCE
+            while not os.waitpid(self._warden, os.WNOHANG)[0]:
+                if time.monotonic() > end:
+                    os.kill(self._warden, signal.SIGKILL)
+                time.sleep(1e-3)
 
     def _ask(self, limit: float, *call: Any) -> Any:
         """What it answers; refused if it took longer on the processor [s], or waits for long."""
         end = time.monotonic() + WAITING * (self._limit if limit < float("inf") else limit)
         before = self._answered
         try:
-            self._pipe.send(call)
-            while not self._pipe.poll(_LOOK):
-                self._look()
-                if time.monotonic() > end:
-                    self._give_up()
-            wrong, answer, told = _Plain(io.BytesIO(self._pipe.recv_bytes(_LARGEST))).load()
+            self._pipe.settimeout(WAITING * self._limit)
+            self._pipe.sendall(pickle.dumps(call, pickle.HIGHEST_PROTOCOL))
+            wrong, answer, told = _Plain(io.BytesIO(self._answer(end))).load()
+        except TimeoutError:
+            self._give_up()
         except (EOFError, OSError):
             raise ControllerError(f"its process ended in {call[0]}") from None
         except ControllerError:  # it was given up
@@ -133,6 +146,25 @@ class Apart:
             raise ControllerError("a program that it began runs on after a decision")
         return answer
 
+    def _answer(self, end: float) -> bytes:
+        """The bytes of an answer, looked for until a time [s]."""
+        self._pipe.settimeout(_LOOK)
+        data, size = bytearray(), _HEAD.size
+        while len(data) < size:
+            try:
+                if not (piece := self._pipe.recv(2**16)):
+                    raise EOFError
+                data += piece
+            except TimeoutError:
+                self._look()
+            if size == _HEAD.size <= len(data):
+                size += _HEAD.unpack_from(data)[0]
+            if size > _LARGEST:
+                raise ControllerError(f"expected an answer of at most {_LARGEST} bytes")
+            if time.monotonic() > end:
+                self._give_up()
+        return bytes(data[_HEAD.size :])
+
     def _look(self, told: float = 0.0) -> bool:
         """Note the processor time used by now; whether there is another process beside its own.
 
@@ -144,9 +176,11 @@ class Apart:
         self._seen |= clocks
         ended = sum(map(_ended, [self._warden, *below]))
         self._used = max(told, sum(clocks.values()) + ended, sum(self._seen.values()))
-        return len(below) > 1
+        return len(below) > 1 and sum(map(_runs, below)) > 1
 
     def _give_up(self) -> NoReturn:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._warden, signal.SIGCONT)  # where the controller stopped it
         raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
 
 
@@ -175,12 +209,22 @@ def _clock(pid: int) -> float:
     return 0.0
 
 
-def _ended(pid: int) -> float:
-    """Processor time of the programs for whose end a process has waited [s]: proc_pid_stat(5)."""
+def _stat(pid: int) -> list[bytes]:
+    """What the system tells of a process, from its state on: proc_pid_stat(5); empty of none."""
     with contextlib.suppress(OSError):
-        words = _text(f"/proc/{pid}/stat").rpartition(b")")[2].split()
-        return (int(words[13]) + int(words[14])) / os.sysconf("SC_CLK_TCK")
-    return 0.0
+        return _text(f"/proc/{pid}/stat").rpartition(b")")[2].split()
+    return []
+
+
+def _ended(pid: int) -> float:
+    """Processor time of the programs for whose end a process has waited [s]."""
+    words = _stat(pid)
+    return sum(map(int, words[13:15])) / os.sysconf("SC_CLK_TCK") if words else 0.0
+
+
+def _runs(pid: int) -> bool:
+    """Whether a process has not ended; one that has is there until its parent asks for it."""
+    return _stat(pid)[:1] not in ([], [b"Z"])
 
 
 def _text(path: str) -> bytes:
@@ -192,7 +236,7 @@ def _text(path: str) -> bytes:
         os.close(file)
 
 
-def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
+def _guard(pipe: socket.socket, make: Callable[[], Controller]) -> NoReturn:
     """What the warden does: it begins the controller, waits for all that is left to it, ends it."""
     ending, begun = list[int](), list[int]()
 
@@ -204,15 +248,16 @@ def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
 
     with contextlib.suppress(BaseException):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, end)
+        _stay()
+        signal.signal(_END, end)
         _prctl(_SUBREAPER)
-        _prctl(_DIES_WITH_PARENT, signal.SIGTERM)
+        _prctl(_DIES_WITH_PARENT, _END)
         begun.append(os.fork())
         if not begun[0]:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            signal.signal(_END, signal.SIG_DFL)
             _prctl(_DIES_WITH_PARENT, signal.SIGKILL)
-            os.closerange(3, pipe.fileno())  # those of the judge
-            os.closerange(pipe.fileno() + 1, 1024)
+            _stay()
+            _close_others(pipe.fileno())
             _serve(pipe, make)
         pipe.close()
         while True:
@@ -222,16 +267,40 @@ def _guard(pipe: Connection, make: Callable[[], Controller]) -> NoReturn:
     os._exit(0)
 
 
+def _stay() -> None:
+    """Let this process survive what a cluster sends to all of a job; what it begins does not."""
+    own = os.getpid()
+
+    def stay(number: int, *_: object) -> None:
+        if os.getpid() != own:
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+
+    for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
+        signal.signal(number, stay)
+
+
+def _close_others(pipe: int) -> None:
+    """Close the judge's files; what its modules have open to read alone, data of theirs, stays."""
+    for file in map(int, os.listdir("/dev/fd")):  # noqa: PTH208
+        with contextlib.suppress(OSError):
+            kind, way = os.fstat(file).st_mode, fcntl.fcntl(file, fcntl.F_GETFL) & os.O_ACCMODE
+            data = way == os.O_RDONLY and (stat.S_ISREG(kind) or stat.S_ISCHR(kind))
+            if file > 2 and file != pipe and not data:
+                os.close(file)
+
+
 def _prctl(what: int, value: int = 1) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
 
 
-def _serve(pipe: Connection, make: Callable[[], Controller]) -> None:
+def _serve(pipe: socket.socket, make: Callable[[], Controller]) -> None:
     """What the controller's process does: it answers each call."""
     made: Any = None
+    calls = pipe.makefile("rb")
     while True:
-        name, *values = pipe.recv()
+        name, *values = pickle.load(calls)  # noqa: S301  (of its judge)
         wrong, answer = "", None
         try:
             if name == "make":
@@ -249,4 +318,5 @@ def _serve(pipe: Connection, make: Callable[[], Controller]) -> None:
             answer = str(error) if ours else f"{name} raised {raised(error)}"
         ended = resource.getrusage(resource.RUSAGE_CHILDREN)
         told = time.process_time() + ended.ru_utime + ended.ru_stime
-        pipe.send_bytes(pickle.dumps((wrong, answer, told), pickle.HIGHEST_PROTOCOL))
+        data = pickle.dumps((wrong, answer, told), pickle.HIGHEST_PROTOCOL)
+        pipe.sendall(_HEAD.pack(len(data)) + data)
