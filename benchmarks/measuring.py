@@ -16,7 +16,7 @@ from typing import Any
 Spread = dict[str, float]
 """Median, smallest and largest of several repetitions, and their number."""
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # programs start as on a computer that keeps it
-PACKAGES = ("antennate", "mujoco", "mujoco-core", "numpy", "numba", "distributed")
+PACKAGES = ("antennate", "mujoco", "mujoco-core", "numpy", "distributed")
 
 
 def spread(values: Sequence[float], digits: int = 4) -> Spread:

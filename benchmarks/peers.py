@@ -7,7 +7,6 @@ Its script `peers/run_NAME.py` stays open and does its job whenever it is asked,
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -27,7 +26,6 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import RobotSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.sim.chain import ChainBench, warm_up
 from antennate.types import Floats
 
 FOLDER = Path(__file__).with_name("peers")
@@ -96,16 +94,6 @@ def antenna(seconds: float) -> float:
             bench.flex()
 
     return cpu_seconds(go)
-
-
-def antenna_chain(seconds: float) -> float:
-    """CPU time of our antenna as a compiled chain [s]."""
-    physics = BenchPhysicsParams(timestep=STEP, contact_time=2 * STEP)
-    bench, angles = ChainBench(physics, AntennaSpec(), [BALL]), base_angles(seconds)
-    bench.place(0.0, 0.0, 0.0)
-    still = np.zeros((len(angles), 2))
-    commands = bench.commands(still, still, angles)
-    return cpu_seconds(lambda: bench.drive(commands, round(COMMAND / STEP)))
 
 
 def installed(name: str) -> Path:
@@ -189,9 +177,6 @@ def measure(quick: bool) -> dict[str, Any]:
         "walk": lambda: growth.flat(lengths["walk"]) / lengths["walk"],
         "antenna": lambda: antenna(lengths["antenna"]) / lengths["antenna"],
     }
-    if importlib.util.find_spec("numba") is not None:
-        warm_up("chain")
-        ours["antenna_chain"] = lambda: antenna_chain(lengths["antenna"]) / lengths["antenna"]
     cases: dict[Any, Callable[[], float]] = {("antennate", job): run for job, run in ours.items()}
     peers: dict[str, dict[str, Any]] = {}
     with ExitStack() as stack:

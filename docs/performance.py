@@ -325,8 +325,7 @@ One core each, CPU time, ours and theirs in turn; every peer in an environment o
 
 OURS = {
     "walk": "the robot walks on a flat floor, 2 ms, sensing and gait included",
-    "antenna": "one antenna of six hinges swings into a sphere, 1 ms, on the engine",
-    "antenna_chain": "the same on the chain solver (`--solver chain`)",
+    "antenna": "one antenna of six hinges swings into a sphere, 1 ms",
 }
 
 

@@ -114,7 +114,6 @@ def _the_engine_leaves_no_log() -> Iterator[None]:
 
 
 OPTIONAL = {
-    "test_chain.py": "numba",
     "test_design.py": "optuna",
     "test_design_measures.py": "optuna",
     "test_design_resume.py": "optuna",

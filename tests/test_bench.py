@@ -110,6 +110,41 @@ def test_a_bar_stops_what_a_gap_lets_through() -> None:
         assert held.touching() is touches
 
 
+@pytest.mark.parametrize("friction", [0.1, 0.3, 0.8])
+def test_it_slides_on_the_edge_of_the_friction_cone_and_sticks_inside(friction: float) -> None:
+    antenna, physics, period = AntennaSpec(friction=friction), BenchPhysicsParams(), 0.002
+    held = Bench(compile_bench(physics, antenna, [Bar(-1.0, 0.08, 1.0, 0.08, 0.01)]), antenna)
+    held.place(0.0, 0.0, 0.5)
+
+    def pressed(way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of contact and places of the tip along the bar, in the last half second."""
+        seen: list[tuple[float, float, float]] = []
+
+        def watch(held: Bench) -> None:
+            seen.append((*held.contact_force(), held.tip()[0]))
+
+        for (x, y), (u, v) in zip(way, np.gradient(way, period, axis=0), strict=True):
+            held.command(x, y, u, v, 0.5)
+            held.step(round(period / physics.timestep), watch)
+        last = np.array(seen[-1000:])
+        forces = last[:, :2]
+        return forces[np.hypot(*forces.T) > 0], last[:, 2]  # it is not on in every step
+
+    def line(x0: float, x1: float, y0: float, y1: float, count: int) -> np.ndarray:
+        return np.column_stack([np.linspace(x0, x1, count), np.linspace(y0, y1, count)])
+
+    pressed(line(0.0, 0.0, 0.0, 0.02, 500))
+    force, tips = pressed(line(0.0, -0.05, 0.02, 0.02, 2000))
+    assert len(force) > 10
+    assert abs(np.diff(tips)).min() > 0.5 * 0.05 / 8000
+    assert force[:, 0] / -force[:, 1] == pytest.approx(friction, rel=1e-4)
+    pressed(line(-0.05, -0.049, 0.02, 0.02, 200))  # unloads the contact along the wall
+    force, tips = pressed(line(-0.049, -0.049, 0.02, 0.02, 800))
+    assert len(force) > 10
+    assert (abs(force[:, 0]) < 0.98 * friction * -force[:, 1]).all()
+    assert np.ptp(tips) < 1e-5
+
+
 def test_a_command_that_is_no_number_ends_the_bench() -> None:
     held = bench()
     held.place(0.0, 0.0, 0.0)

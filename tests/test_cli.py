@@ -122,7 +122,7 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),
         ("drive", "--robot --controller --calibration --duration --esp32 --bus --arm --until"),
-        ("bench wall", "--trials --seed --profiles --solver --out"),
+        ("bench wall", "--trials --seed --profiles --out"),
     ],
 )
 def test_the_short_help_shows_what_the_command_is_about(capsys, monkeypatch, command, flags):

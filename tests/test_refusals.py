@@ -31,6 +31,9 @@ tunnel --tunnel.free_widht=1 :: did you mean --tunnel.free-width?
 tunnel --free-width 1 :: did you mean --tunnel.free-width or --corridors.free-width?
 tunnel --arms open :: did you mean --controllers? :: found '--arms'
 bench wall --arms stiff :: did you mean --profiles? :: found '--arms'
+bench wall --solver chain :: expected a known flag (it is gone: leave it out), found '--solver'
+bench sweep --solver mujoco :: it is gone: leave it out
+calibrate --solver=mujoco :: it is gone: leave it out
 tunnel --bogus :: expected a known flag, found '--bogus'
 gait --tunnel.free-width 1 :: expected a known flag
 antenna springs --video :: expected a flag of this command, found --video

@@ -255,20 +255,16 @@ def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
 
 
 def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Path) -> None:
-    """numba steps the compiled chain, Optuna proposes designs; neither does anything else."""
-    for package, command, config in [
-        ("numba", "study", StudyConfig(experiment="wall", vary={"solver": ["mujoco", "chain"]})),
-        ("optuna", "design", StudyConfig()),
-    ]:
-        pytest.importorskip(package)
-        used = packages_used(command, config)
-        assert used == (package,)
-        assert identity(command, config)["versions"][package] == metadata.version(package)
-        assert package not in identity("study", StudyConfig())["versions"]
-        theirs = environment(command, config)
-        theirs["versions"][package] = "0.1"
-        with pytest.raises(WorkerError, match=rf'{package} "0\.1", now'):
-            job_of(tmp_path / "job.jsonl", Part(trial, {}, False, 9.0), theirs).carry_out()
+    """Optuna proposes designs, and does nothing else."""
+    pytest.importorskip("optuna")
+    config = StudyConfig()
+    assert packages_used("design", config) == ("optuna",)
+    assert identity("design", config)["versions"]["optuna"] == metadata.version("optuna")
+    assert "optuna" not in identity("study", config)["versions"]
+    theirs = environment("design", config)
+    theirs["versions"]["optuna"] = "0.1"
+    with pytest.raises(WorkerError, match=r'optuna "0\.1", now'):
+        job_of(tmp_path / "job.jsonl", Part(trial, {}, False, 9.0), theirs).carry_out()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -194,14 +195,19 @@ def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (out / "figures" / "sticks.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["bench", "wall", "--solver", "mujoco"],
-        ["bench", "wall", "--solver", "chain"],
-        ["bench", "touch"],
-    ],
-)
+def test_the_configuration_of_a_run_with_a_solver_is_refused_with_what_to_do(
+    there: Path, refused: Callable[..., str]
+) -> None:
+    """`config.toml` of each run of 0.1.0 names one, `mujoco` unless told otherwise."""
+    (there / "config.toml").write_text('trials = 1\nsolver = "mujoco"\n')
+    (there / "plan.toml").write_text(
+        'experiment = "wall"\nvary = { solver = ["mujoco", "chain"] }\n'
+    )
+    for words in (["bench", "wall", "--config", "config.toml"], ["study", "plan.toml"]):
+        assert "(it is gone: leave it out), found 'solver'" in refused(*words)
+
+
+@pytest.mark.parametrize("words", [["bench", "wall"], ["bench", "touch"]])
 def test_an_antenna_too_light_for_the_physics_is_refused_in_one_line(
     words: list[str],
     capsys: pytest.CaptureFixture[str],

@@ -4,7 +4,7 @@ Parts: `map` (link mass, overlap, base angle and gravity, five profiles), `windo
 map tells profiles apart), `cells` (the best cells of both on fresh seeds), `sticks` (how long a tip
 stays behind, over the base angle), `scaling` (stiff against compliant without a second force scale)
 and `convergence` (half the timestep). Each writes docs/science/wall_PART.json; `map`, `window` and
-`sticks` a picture as well. `--solver chain` takes the chain solver, which needs `antennate[fast]`.
+`sticks` a picture as well.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,7 +25,6 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.wall.experiment import run
 from antennate.experiments.wall.physics import WallConfig, passage
-from antennate.params.bench import Solver
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
@@ -68,23 +67,21 @@ def _cell(mass: float, overlap: float, angle: float, gravity: str) -> dict[str, 
     }
 
 
-def whole_map(workers: int, solver: Solver) -> dict[str, Any]:
+def whole_map(workers: int) -> dict[str, Any]:
     """All cells; parameters stand above."""
-    return _grid(itertools.product(MASSES_G, OVERLAPS_MM, ANGLES_DEG, GRAVITIES), workers, solver)
+    return _grid(itertools.product(MASSES_G, OVERLAPS_MM, ANGLES_DEG, GRAVITIES), workers)
 
 
-def window(workers: int, solver: Solver) -> dict[str, Any]:
+def window(workers: int) -> dict[str, Any]:
     """The stretch of angles in which the map goes from passing to jamming."""
     where = itertools.product((WINDOW_MASS_G,), WINDOW_OVERLAPS_MM, WINDOW_ANGLES_DEG, GRAVITIES)
-    return _grid(where, workers, solver)
+    return _grid(where, workers)
 
 
-def _grid(
-    places: Iterable[tuple[float, float, float, str]], workers: int, solver: Solver
-) -> dict[str, Any]:
+def _grid(places: Iterable[tuple[float, float, float, str]], workers: int) -> dict[str, Any]:
     cells = []
     for where in places:
-        config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED, solver=solver)
+        config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED)
         cells.append({**_cell(*where), "profiles": run(config, workers).result()["profiles"]})
         print(where, file=sys.stderr)
     return {"trials": MAP_TRIALS, "seed": MAP_SEED, "cells": cells}
@@ -106,7 +103,7 @@ def lead(cell: dict[str, Any]) -> float:
     return passed["descending"] - max(passed["stiff"], passed["compliant"])
 
 
-def best_cells(workers: int, solver: Solver) -> dict[str, Any]:
+def best_cells(workers: int) -> dict[str, Any]:
     """On fresh seeds: the cell that fits the paper best by each count, and that of most lead."""
     cells = [
         cell
@@ -124,7 +121,7 @@ def best_cells(workers: int, solver: Solver) -> dict[str, Any]:
         tied = [cell for cell in cells if score(cell) == best]
         cell = tied[len(tied) // 2]
         where = [cell[k] for k in ("link_mass_g", "overlap_mm", "base_angle_deg", "gravity")]
-        config = _config(*where, trials=FRESH_TRIALS, seed=FRESH_SEED, solver=solver)
+        config = _config(*where, trials=FRESH_TRIALS, seed=FRESH_SEED)
         result = run(config, workers).result()
         out[name] = {
             **_cell(*where),
@@ -138,13 +135,13 @@ def best_cells(workers: int, solver: Solver) -> dict[str, Any]:
     return out
 
 
-def sticks(workers: int, solver: Solver) -> dict[str, Any]:
+def sticks(workers: int) -> dict[str, Any]:
     """Longest sticks over the base angle, at the default mass, overlap and gravity."""
     rows = []
     for angle in STICK_ANGLES_DEG:
         wall = {"base_angle": math.radians(angle)}
         config = WallConfig.model_validate(
-            {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED, "solver": solver}
+            {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED}
         )
         outcome = run(config, workers)
         rows += [
@@ -159,7 +156,7 @@ def sticks(workers: int, solver: Solver) -> dict[str, Any]:
     return {"trials": STICK_TRIALS, "seed": FRESH_SEED, "rows": rows}
 
 
-def scaling(workers: int, solver: Solver) -> dict[str, Any]:
+def scaling(workers: int) -> dict[str, Any]:
     """Difference of the hinge angles of stiff and compliant over a whole passage."""
     out = {}
     for gravity in GRAVITIES:
@@ -169,7 +166,6 @@ def scaling(workers: int, solver: Solver) -> dict[str, Any]:
                 "wall": {"gravity": gravity},
                 "variation": still,
                 "antenna": {"sensor_stiffness_n_mm_per_deg": 0.0},
-                "solver": solver,
             }
         )
         stiff, soft = (passage(config, profile, 0) for profile in ("stiff", "compliant"))
@@ -184,12 +180,12 @@ def scaling(workers: int, solver: Solver) -> dict[str, Any]:
     return out
 
 
-def convergence(workers: int, solver: Solver) -> dict[str, Any]:
+def convergence(workers: int) -> dict[str, Any]:
     """The default run at its timestep and at half of it, contacts as stiff as each allows."""
     rows = {}
     for timestep in (5e-4, 2.5e-4):
         physics = {"timestep": timestep, "contact_time": 2 * timestep}
-        config = WallConfig.model_validate({"physics": physics, "solver": solver})
+        config = WallConfig.model_validate({"physics": physics})
         rows[timestep] = run(config, workers)
     coarse, fine = rows.values()
     return {
@@ -326,9 +322,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", choices=tuple(PARTS))
     parser.add_argument("--workers", type=int, default=core_count())
-    parser.add_argument("--solver", choices=get_args(Solver), default="mujoco")
     options = parser.parse_args()
-    result = {"solver": options.solver} | PARTS[options.part](options.workers, options.solver)
+    result = PARTS[options.part](options.workers)
     (HERE / f"wall_{options.part}.json").write_text(json.dumps(result, indent=1) + "\n")
     if options.part in ("map", "window"):
         picture = style.render(outcome_map(result["cells"]))["png"]

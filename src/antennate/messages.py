@@ -87,10 +87,12 @@ def shown(value: Any) -> str:
 
 _RENAMED = {"arms": ("controllers", "profiles")}
 """New names of what had another one in version 1."""
+_GONE = ("solver",)
+"""Parameters that are no more; all is done as with their defaults."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """A hint at the choice that was perhaps meant, or nothing.
+    """A hint at the choice that was perhaps meant or at what to do instead, or nothing.
 
     A flag or key is also found by its last part: `--free-width` by `--tunnel.free-width`.
 
@@ -100,6 +102,8 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """
     choices = {choice.lstrip("-"): choice for choice in known}
     wanted = word.lstrip("-").lower()
+    if wanted in _GONE:
+        return " (it is gone: leave it out)"
     ends = [name for name in choices if name.endswith(f".{wanted}")]
     renamed = [name for name in _RENAMED.get(wanted, ()) if name in choices]
     close = (

@@ -208,7 +208,7 @@ def carry_out(
 def _require_possible(options: Options, config: Params) -> None:
     """Refuse options that exclude one another, before the folder is touched.
 
-    What is run beside a view is run by the engine, in this process.
+    What is run beside a view is run in this process.
     """
     if options.view or options.foxglove:
         for name in OF_WORKERS:
@@ -219,11 +219,6 @@ def _require_possible(options: Options, config: Params) -> None:
                     f"{flag_of((name,))}: expected none beside --view or --foxglove, which show "
                     f"one trial after the other, found {words}"
                 )
-        if getattr(config, "solver", "mujoco") != "mujoco":
-            raise ConfigError(
-                "--solver: expected mujoco beside --view or --foxglove, as nothing else draws, "
-                "found chain"
-            )
     finished = options.out is not None and (options.out / RESULT).exists()
     if options.shard is not None and finished and not options.overwrite:
         raise ConfigError(

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from antennate.params.base import Params, number
-
-Solver = Literal["mujoco", "chain"]
-"""What steps the physics of the bench: the engine, or the chain solver of the extra `fast`."""
-
-
-def solver() -> Any:
-    """The parameter that chooses it."""
-    return number(
-        "mujoco", "1", "assumed: needs no further package; docs/science/chain.md compares them"
-    )
 
 
 class WallParams(Params):

@@ -40,10 +40,9 @@ def identity(command: str, config: Params) -> dict[str, Any]:
 
 
 def packages_used(command: str, config: Params) -> tuple[str, ...]:
-    """Optional packages that its numbers depend on: of chain solver, policies, GPU, search."""
+    """Optional packages that its numbers depend on: of policies, GPU, search."""
     words, values = command.split(), _names(config)
     return (
-        *(("numba",) if "chain" in values else ()),
         *(("onnxruntime",) if any(text.endswith(".onnx") for text in values) else ()),
         *(("mujoco-warp", "warp-lang") if "warp" in words else ()),
         *(("optuna",) if "design" in words else ()),

@@ -16,7 +16,6 @@ from antennate.experiments.calibrate import recording
 from antennate.experiments.calibrate import run as calibrate
 from antennate.experiments.calibrate.readings import conversion_sentence
 from antennate.experiments.calibrate.run import CalibrateOutcome
-from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment
 from antennate.studies.measures import Measure, Table, shown
 from antennate.types import Floats
@@ -381,7 +380,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     films=calibrate.films,
     files=_files,
-    check=require_solver,
     parts="pushes",
     figures=figures,
     captions={

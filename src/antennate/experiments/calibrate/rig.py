@@ -9,11 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from antennate.params.base import Params, number
-from antennate.params.bench import Solver
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bench, Slider, Watch, compile_bench
-from antennate.sim.chain import ChainBench
 from antennate.types import Floats
 
 _Speed = Annotated[float, Field(gt=0, le=1)]
@@ -58,20 +56,16 @@ class Push:
     speed: float
     gap: float
 
-    def run(
-        self, ticks: int, solver: Solver, watch: Watch | None = None
-    ) -> tuple[Floats, Floats, Floats]:
+    def run(self, ticks: int, watch: Watch | None = None) -> tuple[Floats, Floats, Floats]:
         """Time [s], flex [rad] and way of the rod from the first touch [m], each shape (ticks,).
 
-        `watch` looks at the bench of the engine after each physics step; the chain has none.
+        `watch` looks at the bench after each physics step.
 
         Raises:
-            MissingPackageError: The solver needs a package that is not installed.
             SimulationError: The physics became invalid.
         """
         t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
-        rod = self._commands(t)
-        flex, y = self._on_chain(rod) if solver == "chain" else self._on_engine(rod, watch)
+        flex, y = self._pushed(self._commands(t), watch)
         return t, flex, y + self._touch
 
     @property
@@ -93,7 +87,7 @@ class Push:
         y = -self._touch - self.gap + np.where(back, 2 * whole - way, way)
         return np.stack([y, np.where(back, -self.speed, self.speed)], axis=-1)
 
-    def _on_engine(self, places: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
+    def _pushed(self, places: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
         """Flex [rad] and place of the rod [m] before the commands of each tick."""
         model = compile_bench(self.physics, self.antenna, probe_radius=self.rig.rod_radius)
         for i, factor in enumerate(self.factors):
@@ -110,19 +104,3 @@ class Push:
                 bench.step(self._steps, watch)
         flex, y = np.array(rows).T
         return flex, y
-
-    def _on_chain(self, places: Floats) -> tuple[Floats, Floats]:
-        """As `_on_engine`, all commands at once."""
-        bench = ChainBench(
-            self.physics, self.antenna, (), (0.0, 0.0), self.rig.rod_radius, self.factors
-        )
-        start = -self._touch - self.gap
-        bench.place_probe(self.rig.place, start)
-        y, speed = places[:-1].reshape(-1, 2).T
-        still = np.zeros((len(y), 2))
-        rod = np.column_stack([np.full_like(y, self.rig.place), y])
-        speeds = np.column_stack([np.zeros_like(y), speed])
-        whole = bench.drive(bench.commands(still, still, 0.0, rod, speeds), self._steps)
-        ticks = whole[places.shape[1] - 1 :: places.shape[1]]
-        flex = ticks.hinges[:, : self.antenna.sensed_hinges].sum(axis=1)
-        return np.append(0.0, flex), np.append(start, ticks.probe[:, 1])

@@ -27,11 +27,10 @@ from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.params.base import Params, number, paths_of, require_default
-from antennate.params.bench import BenchVariationParams, Solver, solver
+from antennate.params.bench import BenchVariationParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Watch
-from antennate.sim.chain import require_read, warm_up
 from antennate.studies.experiment import OnStep, Outcome, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.types import Floats
@@ -40,7 +39,7 @@ _BETTER = 0.2
 """How much more of the level each direction alone explains where hysteresis is asked about."""
 _FILM_SPEED = 0.2
 """Speed of a film over that of the rod: the fastest push takes a third of a second."""
-_OF_THE_RIG = ("rig", "variation", "physics", "solver", "seed")
+_OF_THE_RIG = ("rig", "variation", "physics", "seed")
 
 
 class CalibrateConfig(Params):
@@ -81,8 +80,6 @@ class CalibrateConfig(Params):
     """A worse fit is refused."""
     good_r2: float = number(0.9, "1", "assumed: our rig reaches 0.98", ge=0, lt=1)
     """A worse fit is warned of."""
-    solver: Solver = solver()
-    """What steps the rig's physics: the engine, or the chain solver (extra `fast`)."""
     seed: int = number(1, "1", "assumed: any", ge=0)
     """Seed of all chance."""
     rig: RigParams = RigParams()
@@ -108,7 +105,6 @@ class CalibrateConfig(Params):
 
     @model_validator(mode="after")
     def _on_the_antenna(self) -> CalibrateConfig:
-        require_read(self.solver, self.physics)
         if self.rig.place + self.rig.rod_radius > self.antenna.length:
             raise ValueError(
                 f"rig.place must leave room for the rod on the antenna of {self.antenna.length:g} "
@@ -187,7 +183,7 @@ class CalibrateOutcome(Outcome):
 
 
 def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Recording:
-    """One push of the rig; `watch` looks at the bench of the engine after each physics step.
+    """One push of the rig; `watch` looks at the bench after each physics step.
 
     Raises:
         SimulationError: The physics became invalid.
@@ -200,9 +196,7 @@ def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Rec
     ways = 2 if rig.withdraw else 1
     ticks = ways * int(np.ceil((gap + rig.depth) / speed * config.antenna.sensor.rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
-    t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(
-        ticks, config.solver, watch
-    )
+    t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(ticks, watch)
     counts = recorded(config.antenna.sensor, flex, noise)
     bend = way / rig.depth
     inside = (bend >= 0) & (bend <= 1)
@@ -227,7 +221,6 @@ def record(
     Raises:
         SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
-    warm_up(config.solver)
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
     parts = gather(push, tasks, workers, on_step)
     fields = ("counts", "level", "trial", "speed", "row")

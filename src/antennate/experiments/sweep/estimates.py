@@ -247,7 +247,6 @@ def run_trial(config: SweepConfig, condition: str, split: str, number: int, side
         0.5,
         config.speed if condition == "moving" else 0.0,
         config.shape.gap,
-        config.solver,
     )
     if trace.reason:
         return Trial(condition, split, number, side, distance, sweep, None, None, trace.reason)

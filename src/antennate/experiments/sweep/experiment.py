@@ -24,9 +24,7 @@ from antennate.experiments.sweep.physics import (
     shares,
 )
 from antennate.params.bench import SweepParams
-from antennate.sim import chain
 from antennate.sim.bench import Watch
-from antennate.sim.chain import require_solver
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.measures import Table, shown
 from antennate.studies.pool import Workers, gather
@@ -168,7 +166,6 @@ def map_cell(
         config.sweeps + 1,
         config.speed if motion == "moving" else 0.0,
         config.shape.gap,
-        config.solver,
         watch,
     )
     shape: dict[str, Any] = {}
@@ -206,10 +203,8 @@ def run(
     """Sweep in every cell of the map and in every trial of the estimates.
 
     Raises:
-        MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process died.
     """
-    chain.warm_up(config.solver)
     grid = list(product(config.distances, config.centres, config.amplitudes))
     cells = [
         (map_cell, config, profile, motion, number, *cell)
@@ -306,7 +301,6 @@ EXPERIMENT = Experiment.of_folder(
     *(__name__, SweepConfig, run, tables, sentence),
     films=bench_films(lambda config: config.profiles, _film, "wall"),
     files=_files,
-    check=require_solver,
     parts="sweeps",
     captions={
         "sweep": "Shares of the time in each shape, with the base fixed and moving, and "

@@ -22,12 +22,11 @@ from antennate.antenna.statics import PROFILES, Profile
 from antennate.errors import SimulationError
 from antennate.experiments.force.physics import speed_at, way
 from antennate.params.base import Params, number, require_different, require_whole_steps
-from antennate.params.bench import EstimateParams, ShapeParams, Solver, SweepParams, solver
+from antennate.params.bench import EstimateParams, ShapeParams, SweepParams
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Bar, Bench, Watch, compile_bench
-from antennate.sim.chain import ChainBench, require_read
 from antennate.types import Bools, Floats
 
 
@@ -72,8 +71,6 @@ class SweepConfig(Params):
     """Speed of the base along the wall where it moves."""
     points: bool = number(False, "1", "assumed: a large file that few need")
     """Whether to save the points of the antenna of `profile` in every cell, for `tracks`."""
-    solver: Solver = solver()
-    """What steps the physics: the engine, or the chain solver (extra `fast`; compiles once)."""
     sweep: SweepParams = SweepParams()
     shape: ShapeParams = ShapeParams()
     estimate: EstimateParams = EstimateParams()
@@ -85,7 +82,6 @@ class SweepConfig(Params):
     def _agree(self) -> SweepConfig:
         require_whole_steps("antenna.sensor.rate", self.antenna.sensor.rate, self.physics.timestep)
         require_different("profiles", self.profiles)
-        require_read(self.solver, self.physics)
         least = self.antenna.radius / self.antenna.length
         for what, values in (
             ("distances", self.distances),
@@ -167,7 +163,6 @@ def record(
     sweeps: float,
     speed: float = 0.0,
     gap: float = 5e-4,
-    solver: Solver = "mujoco",
     watch: Watch | None = None,
 ) -> Trace:
     """Sweep beside a wall.
@@ -180,14 +175,8 @@ def record(
         sweeps: How many sweeps.
         speed: Speed of the base along the heading [m/s].
         gap: Distance to the wall that counts as touching [m].
-        solver: What steps the physics.
-        watch: Looks at the bench of the engine after each physics step; the chain has none.
-
-    Raises:
-        MissingPackageError: The solver needs a package that is not installed.
+        watch: Looks at the bench after each physics step.
     """
-    if solver == "chain":
-        return _record_chain(physics, antenna, sweep, wall, sweeps, speed, gap)
     bench, rate = Bench(compile_bench(physics, antenna, [wall.bar()]), antenna), antenna.sensor.rate
     bench.place(0.0, 0.0, 0.0)
     steps = round(1.0 / (rate * physics.timestep))
@@ -213,50 +202,6 @@ def record(
         return Trace(none, none, none, none, none, none > 0, str(error))
     t, base, flex, offset, reach, touching = np.array(rows, np.float64).T
     return Trace(t, base, flex, offset, reach, touching > 0.5, "", np.array(outlines))
-
-
-def _record_chain(
-    physics: BenchPhysicsParams,
-    antenna: AntennaSpec,
-    sweep: SweepParams,
-    wall: Wall,
-    sweeps: float,
-    speed: float,
-    gap: float,
-) -> Trace:
-    """As `record`, all commands at once."""
-    bench, rate = ChainBench(physics, antenna, [wall.bar()]), antenna.sensor.rate
-    steps = round(1.0 / (rate * physics.timestep))
-    end = _APPROACH + sweeps / sweep.frequency - 0.5 / rate
-    clock = np.cumsum(np.full(steps * math.ceil(end * rate + 1.0), physics.timestep))
-    after = clock[steps - 1 :: steps]  # summed up as the engine's clock is
-    begins = np.append(0.0, after)
-    targets = [
-        (way(t, speed), speed_at(t, speed), commanded(sweep, t))
-        for t in begins[begins < end].tolist()
-    ]
-    x, speeds, angles = np.array(targets).T
-    still = np.zeros_like(x)
-    commands = bench.commands(np.column_stack([x, still]), np.column_stack([speeds, still]), angles)
-    try:
-        seen = bench.drive(commands, steps)
-    except SimulationError as error:
-        none = np.zeros(0)
-        return Trace(none, none, none, none, none, none > 0, str(error))
-    base, joints = seen.base, seen.joints
-    tip = joints[:, -1] - joints[:, 0]
-    off = np.arctan2(tip[:, 1], tip[:, 0]) - base
-    heading = np.stack([np.cos(base), np.sin(base)], axis=-1)
-    return Trace(
-        after[: len(base)] - _APPROACH,
-        base,
-        seen.hinges[:, : antenna.sensed_hinges].sum(axis=1),
-        off - 2.0 * math.pi * np.round(off / (2.0 * math.pi)),
-        np.hypot(*tip.T),
-        wall.distance - (joints @ wall.normal).max(axis=1) - antenna.radius < gap,
-        "",
-        np.concatenate([joints[:, :1] - _BEFORE * heading[:, None], joints], axis=1),
-    )
 
 
 def commanded(sweep: SweepParams, t: float) -> float:

@@ -20,7 +20,6 @@ from antennate.experiments.wall.physics import (
     invalid,
     passage,
 )
-from antennate.sim import chain
 from antennate.sim.bench import Watch, unwatched
 from antennate.studies import statistics
 from antennate.studies.experiment import (
@@ -196,10 +195,8 @@ def run(
     """Run all trials of all profiles.
 
     Raises:
-        MissingPackageError: The solver needs a package that is not installed.
         WorkerError: A worker process failed.
     """
-    chain.warm_up(config.solver)
     passages, _ = TRIALS.gather(config, workers, on_step, on_row, view=view)
     examples = {row.profile: seen for row, seen in passages if seen is not None}
     return WallOutcome(config, [row for row, _ in passages], examples)
@@ -392,7 +389,6 @@ EXPERIMENT = Experiment.of_folder(
     trials=TRIALS,
     measures=PROFILE,
     shown=True,
-    check=chain.require_solver,
     failed=lambda result: any(  # all trials of a profile are invalid
         0 < p["trials"] == p["invalid"] for p in result["profiles"].values()
     ),

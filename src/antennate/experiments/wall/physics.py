@@ -19,10 +19,9 @@ from pydantic import model_validator
 
 from antennate.antenna.statics import PROFILES, Profile, with_profile
 from antennate.params.base import Params, number, require_different
-from antennate.params.bench import BenchVariationParams, Solver, WallParams, solver
+from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.scene import GRAVITY, BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
-from antennate.sim import chain
 from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
 from antennate.types import Floats
 
@@ -46,8 +45,6 @@ class WallConfig(Params):
         tuple(PROFILES), "1", "paper: its three; assumed: two controls it lacks", min_length=1
     )
     """Profiles to run."""
-    solver: Solver = solver()
-    """What steps the physics: the engine, or the chain solver (extra `fast`; compiles once)."""
     wall: WallParams = WallParams()
     antenna: AntennaSpec = AntennaSpec()
     variation: BenchVariationParams = BenchVariationParams()
@@ -73,7 +70,6 @@ class WallConfig(Params):
                 f"physics.timestep must divide {COMMAND_PERIOD:g} s, found "
                 f"{self.physics.timestep:g}"
             )
-        chain.require_read(self.solver, self.physics)
         return self
 
 
@@ -259,18 +255,13 @@ def draw(config: WallConfig, profile: str, trial: int) -> Passage:
 
 
 def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatched) -> Traverse:
-    """Move one antenna along the wall; `watch` looks at the bench of the engine, not at the chain.
+    """Move one antenna along the wall; `watch` looks at the bench.
 
     Raises:
-        MissingPackageError: The solver needs a package that is not installed.
         SimulationError: The physics became invalid.
     """
     drawn = draw(config, profile, trial)
-    return _on_chain(drawn) if config.solver == "chain" else _on_engine(drawn, watch)
-
-
-def _on_engine(drawn: Passage, watch: Watch) -> Traverse:
-    wall, physics = drawn.config.wall, drawn.config.physics
+    wall, physics = config.wall, config.physics
     base, approach = drawn.base, drawn.approach
     model = compile_bench(physics, drawn.antenna, drawn.balls, drawn.pull)
     for i, factor in enumerate(drawn.factors):
@@ -302,33 +293,6 @@ def _on_engine(drawn: Passage, watch: Watch) -> Traverse:
     crest = drawn.crest
     drawing = np.array(hinges), np.array(shapes) - [crest, 0.0], from_crest(drawn.balls, crest)
     return Traverse(base_y, tip_y, touching, forces, flex, *drawing)
-
-
-def _on_chain(drawn: Passage) -> Traverse:
-    """As `_on_engine`, all commands of a way at once."""
-    speed, physics = drawn.config.wall.speed, drawn.config.physics
-    bench = chain.ChainBench(physics, drawn.antenna, drawn.balls, drawn.pull, factors=drawn.factors)
-    substeps, base = round(COMMAND_PERIOD / physics.timestep), drawn.base
-    bench.place(0.0, 0.0, base)
-    still = bench.commands(np.zeros((1, 2)), np.zeros(2), base)
-    bench.drive(still, round(SETTLE / physics.timestep))
-    ahead = np.array(ramp(drawn.approach, speed))
-    path = np.array(ramp(drawn.config.wall.travel, speed))
-    there = np.column_stack([ahead, np.zeros_like(ahead)])
-    came = bench.drive(bench.commands(there, np.array([speed, 0.0]), base), substeps)
-    along = np.column_stack([np.full_like(path, drawn.approach), path])
-    motion = bench.drive(bench.commands(along, np.array([0.0, speed]), base), substeps)
-    seen, shown = motion[::SAMPLES], motion[sorted(marks(path))]
-    return Traverse(
-        path[::SAMPLES],
-        seen.joints[:, -1, 1] - came[-1:].joints[-1, -1, 1],
-        seen.touching.astype(float),
-        np.hypot(*seen.force.T),
-        seen.hinges[:, : drawn.antenna.sensed_hinges].sum(axis=1),
-        seen.hinges,
-        shown.joints - [drawn.crest, 0.0],
-        from_crest(drawn.balls, drawn.crest),
-    )
 
 
 def spheres(
