@@ -72,14 +72,24 @@ def test_swapping_the_sides_swaps_the_turns(left: int, right: int, bl: float, br
     assert decision((right, left), (br, bl)) == MIRROR.get(there, there)
 
 
-def held(wanted: list[Maneuver], duration: float, tick: float = 1 / 64) -> list[Maneuver]:
+def held(
+    wanted: list[Maneuver], duration: float, tick: float = 1 / 64, forward: bool = False
+) -> list[Maneuver]:
     """What the hold lets through, tick by tick; ticks are exact in binary."""
-    hold = Hold(1)
+    hold = Hold(1, forward)
     times = tick * np.arange(len(wanted))
     return [
         Maneuver(int(hold.step(times[i : i + 1], np.array([w]), duration)[0]))
         for i, w in enumerate(wanted)
     ]
+
+
+def test_forward_is_kept_too_where_that_is_wanted() -> None:
+    """By hand: two seconds of 64 ticks, each maneuver alike."""
+    wanted = [FORWARD] * 3 + [TURN_L] * 130 + [FORWARD] * 200
+    kept = [FORWARD] * 128 + [TURN_L] * 128 + [FORWARD] * 77
+    assert held(wanted, duration=2.0, forward=True) == kept
+    assert held(wanted, duration=2.0) == [FORWARD] * 3 + [TURN_L] * 256 + [FORWARD] * 74
 
 
 @pytest.mark.parametrize("kept", [TURN_L, TURN_R, REVERSE])

@@ -76,6 +76,19 @@ def test_a_spinning_cylinder_slides_further_than_one_that_does_not() -> None:
     assert pushed((0.5, 0.0), 6.0)[0] > 1.1 * pushed((0.5, 0.0), 0.0)[0]
 
 
+def test_an_inset_lining_stands_in_by_as_much_as_it_may() -> None:
+    """Uniform from 0 to 5 cm, so in a straight corridor the quartiles are 1.25 and 3.75 cm."""
+    params = TunnelParams(segments=(20.0,), turns_deg=(), strewn=0, lining_inset=0.05)
+    tunnel = draw(params, 3)
+    inset = 0.5 * params.free_width + RADIUS - np.abs(tunnel.cylinders[:, 1])
+    assert len(inset) > 200
+    assert 0.0 <= inset.min() < 0.003
+    assert 0.047 < inset.max() <= 0.0521  # cylinders begin 2 mm off the lining
+    assert np.quantile(inset, [0.25, 0.75]) == pytest.approx([0.0125, 0.0375], abs=0.006)
+    with pytest.raises(SceneError, match=r"robot's width of 0\.2 m, found 0\.4 m, less twice"):
+        draw(TunnelParams(lining_inset=0.11), 3)
+
+
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("params", [STRAIGHT, BENT, TunnelParams(corner_radius=0.15)])
 def test_cylinders_stand_clear_of_one_another_and_of_the_walls(

@@ -68,9 +68,13 @@ def decide(params: RuleParams, contact: Ints, level: Floats) -> Ints:
 
 
 class Hold:
-    """Keeps a maneuver for its time; FORWARD is left as soon as something touches, HOLD at once."""
+    """Keeps a maneuver for its time.
 
-    def __init__(self, batch: int) -> None:
+    HOLD is left at once; FORWARD as soon as something touches, or is kept (`forward`), too.
+    """
+
+    def __init__(self, batch: int, forward: bool = False) -> None:
+        self._forward = forward
         self.current: Ints = np.full(batch, int(Maneuver.FORWARD))
         self.until: Floats = np.full(batch, -np.inf)
 
@@ -84,7 +88,7 @@ class Hold:
         stop = wanted == Maneuver.HOLD
         held = (t < self.until) & (self.current != Maneuver.HOLD) & ~stop
         chosen = np.where(held, self.current, wanted)
-        renewed = ~held & (wanted != Maneuver.FORWARD) & ~stop
+        renewed = ~held & (self._forward | (wanted != Maneuver.FORWARD)) & ~stop
         self.until = np.where(renewed, t + duration, np.where(stop, -np.inf, self.until))
         self.current = chosen
         return chosen
@@ -217,7 +221,7 @@ class _PaperRule:
     def __init__(self, control: ControlParams, batch: int) -> None:
         self.turn_offset = control.gait.turn_offset
         self._params = control.rule
-        self._hold = Hold(batch)
+        self._hold = Hold(batch, control.rule.hold_forward)
 
     def reset(self, rows: Ints | Bools) -> None:
         self._hold.reset(rows)

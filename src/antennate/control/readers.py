@@ -142,7 +142,9 @@ _SIZES = (
     *("search.lost_turn", "search.return_time"),
 )
 """What `geometric` has in metres and degrees."""
-_TABLE = ("gait.turn_offset", *_BLOCKED, "rule.hold_time")
+_HOLD = ("rule.hold_time", "rule.hold_forward")
+"""How long the published table keeps a maneuver."""
+_TABLE = ("gait.turn_offset", *_BLOCKED, *_HOLD)
 """What the published table reads and a walk or an escape does not."""
 _TURNING = tuple(path for path in _ESCAPE if path != "escape.turn_offset")
 """All of an escape but how it turns."""
@@ -170,7 +172,7 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "closed": (*_TABLE, *_OTHERS, *_OTHER_ESCAPE, *_GEOMETRIC),
     "geometric": (*_TABLE, *_OTHERS, *_OTHER_ESCAPE, *_SIZES),
     "closed-1": (*_TABLE, *_OTHERS, *_SEARCH),
-    BY_CONTACT: ("gait.turn_offset", "rule.hold_time", *_REPEATED, *_OTHERS, *_SEARCH),
+    BY_CONTACT: ("gait.turn_offset", *_HOLD, *_REPEATED, *_OTHERS, *_SEARCH),
     "schedule": _without(_SCHEDULE, *_TURNING),
     "follow": _without(_FOLLOW, *_TURNING),
     "centre": _without(_CENTRE, *_TURNING),
@@ -184,7 +186,7 @@ UNREAD: Mapping[str, tuple[str, ...]] = {
     "rhythm": _without((*_RAISED, *_CARRY, *_RHYTHM), *_ESCAPE, *_SWEEP),
     "edges": _without((*_RAISED, "climb.pace"), *_ESCAPE, *_SWEEP),
     "map": (*_TABLE, *_OTHERS, *_SEARCH, *(path for path in _ESCAPE if path not in _MAP)),
-    TELEOP: (*_BLOCKED, "rule.hold_time", *_ESCAPE, *_OTHERS, *_SEARCH),
+    TELEOP: (*_BLOCKED, *_HOLD, *_ESCAPE, *_OTHERS, *_SEARCH),
 }
 """Parameters of `ControlParams`, dotted, that a controller of ours does not read."""
 _POLICY = ("rate", "gait.", "conditioning", "rule.threshold", "rule.hysteresis")

@@ -162,6 +162,8 @@ class RuleParams(Params):
     """Levels that differ by less are similar."""
     hold_time: float = number(2.0, "s", "assumed: over a gait cycle; all turns alike", gt=0, le=30)
     """T_hold, how long a maneuver is kept."""
+    hold_forward: bool = number(False, "1", "assumed: a touch is answered at once")
+    """Whether FORWARD is kept for T_hold, too, whatever touches meanwhile."""
 
 
 class RepetitionParams(Params):

@@ -53,6 +53,8 @@ class TunnelParams(Params):
     """Rounding of the outer wall at a turn."""
     lining_gap: float = number(0.02, "m", "assumed: cylinders set side by side by hand", ge=0)
     """Mean gap between neighbours of a lining."""
+    lining_inset: float = number(0.0, "m", "assumed: a lining is straight", ge=0, le=1)
+    """How far cylinders of a lining may stand in; there the way is narrower by so much."""
     strewn: int = number(4, "1", "assumed: some stand in the way", ge=0, le=400)
     """Cylinders standing in the corridor."""
     cylinder: CylinderParams = CylinderParams()

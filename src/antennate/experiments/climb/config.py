@@ -72,7 +72,8 @@ LEVEL = ("flat", BUMPY)
 _OF_OTHERS = tuple(
     f"control.{path}"
     for path in (
-        *("rule.strong", "rule.similar", "rule.hold_time", "gait.turn_offset"),
+        *("rule.strong", "rule.similar", "rule.hold_time", "rule.hold_forward"),
+        "gait.turn_offset",
         *("escape.reverse_time", "escape.turn_time", "escape.alternate", "escape.second_turn"),
         "timed.walk_time",
     )

@@ -53,6 +53,7 @@ class TouchConfig(Params):
 
     unread: ClassVar[tuple[str, ...]] = (
         "antenna.base_spacing",
+        "rule.hold_forward",
         "rule.hold_time",
         "rule.similar",
         "rule.strong",

@@ -63,10 +63,11 @@ class TunnelScene:
             SceneError: The robot does not fit, or the strewn cylinders do not.
         """
         params = self._params
-        if params.free_width < robot.width:
+        if params.free_width - 2 * params.lining_inset < robot.width:
+            inset = f", less twice an inset of {params.lining_inset} m" * (params.lining_inset > 0)
             raise SceneError(
                 f"tunnel.free_width must be at least the robot's width of {robot.width} m, found "
-                f"{params.free_width} m"
+                f"{params.free_width} m{inset}"
             )
         mirrored = params.mirror == "always"
         if params.mirror == "random":
@@ -187,6 +188,8 @@ def _place_cylinders(
         gaps = diameter + rng.uniform(0.0, 2.0 * params.lining_gap, size=1000)
         start = rng.uniform(0.0, diameter)
         for point in geometry.resample(line, start + np.cumsum(gaps)):
+            if params.lining_inset:
+                point = _inset(point, plan.centre, rng.uniform(0.0, params.lining_inset))
             if _is_free(point, placed, diameter):
                 placed.append(point)
     room = params.free_width / 2 - params.cylinder.radius
@@ -208,6 +211,14 @@ def _place_cylinders(
             "strew fewer"
         )
     return np.array(placed).reshape(-1, 2)
+
+
+def _inset(point: Floats, centre: Floats, way: float) -> Floats:
+    """A point moved towards the nearest one of a line, by a way [m]."""
+    length = float(np.linalg.norm(np.diff(centre, axis=0), axis=1).sum())
+    along = min(max(geometry.progress(centre, point), 0.0), length)
+    across = geometry.resample(centre, np.array([along]))[0] - point
+    return point + way * across / np.linalg.norm(across)
 
 
 def _is_free(point: Floats, placed: list[Floats], distance: float) -> bool:
