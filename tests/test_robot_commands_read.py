@@ -252,9 +252,8 @@ def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
         return
     robot = watched(config)[0]
     clock = LockstepClock(robot)
-    orders = DriveConfig(
-        dry_run=0.1, duration=0.3, touch_check=False, robot=fresh(config.robot), stand=0.0
-    )
+    known = stated(fresh(config.robot))
+    orders = DriveConfig(dry_run=0.1, duration=0.3, touch_check=False, robot=known, stand=0.0)
     walk(prepare(orders, BoardPort(robot, clock), clock, clock), orders, arm=True)
 
 

@@ -30,6 +30,7 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.driving import connect
 from antennate.hardware.driving.drive import drive
 from antennate.params.base import read_file
+from antennate.params.hardware import ZerosParams
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_toml
@@ -109,6 +110,32 @@ def test_a_session_of_such_a_robot_gets_no_torque() -> None:
     report = drive(made.session, config, arm=True)
     assert "NOT_READY: something speaks against arming (no zeros)" in report.refusal
     assert (report.on, made.session.touched) == (None, False)
+
+
+@pytest.mark.parametrize(
+    ("robot", "missing", "why"),
+    [
+        (RobotSpec(), (), "all joints, found none; `"),
+        (stated(), ("yaw3",), "all joints, found none of yaw3; `"),
+        (stated(), (), ""),
+    ],
+)
+def test_ports_that_python_opened_give_such_a_robot_no_torque(
+    robot: RobotSpec, missing: tuple[str, ...], why: str
+) -> None:
+    clock = LockstepClock(twin := watched(TwinConfig())[0])
+    config = DriveConfig(
+        robot=robot,
+        zeros=ZerosParams(missing=missing),
+        dry_run=0.3,
+        duration=0.5,
+        touch_check=False,
+        touch=TouchCheckParams(patience=0.5),
+    )
+    session = connect.prepare(config, BoardPort(twin, clock), clock, clock)
+    report = drive(session, config, arm=True)
+    assert why in report.refusal
+    assert (report.on is None, session.touched) == (bool(why), not why)
 
 
 @pytest.fixture
