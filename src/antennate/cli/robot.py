@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic.dataclasses import dataclass
 
@@ -23,13 +23,15 @@ from antennate.dxl.model import EXTENDED_MODE
 from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.check import same
+from antennate.hardware.joints import unmeasured
 from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
 from antennate.params.base import Config, Params, read_file
+from antennate.params.hardware import ZerosParams
 from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
-from antennate.studies.measures import Measure, Table
+from antennate.studies.measures import NONE, Measure, Table
 from antennate.studies.report import View
 
 USUAL = Path("robot.toml")
@@ -242,7 +244,10 @@ _RAIL = (
 class DescribedRobot(Params):
     """The robot that is described."""
 
+    unread: ClassVar[tuple[str, ...]] = ("zeros.measured",)
+    shared: ClassVar[bool] = True
     robot: RobotSpec = RobotSpec()
+    zeros: ZerosParams = ZerosParams()
 
 
 _MJCF = ("--export mjcf",)
@@ -271,7 +276,7 @@ def command(argv: Sequence[str]) -> int:
     """
 
     def take(file: RobotFile) -> DescribedRobot:
-        return DescribedRobot(robot=file.robot)
+        return DescribedRobot(robot=file.robot, zeros=file.zeros)
 
     config, options = parse_robot("robot", DESCRIPTION, take, argv, Options)
     robot = config.robot
@@ -282,7 +287,7 @@ def command(argv: Sequence[str]) -> int:
     with folder_for(VIEW, options, config, argv) as folder:
         folder.without_trials()
         if files is None:
-            files, result = _description(robot)
+            files, result = _description(robot, config.zeros)
             from antennate.robots.wiring import wiring  # slow to import
 
             folder.write_figures({"wiring": wiring(robot)})
@@ -293,27 +298,29 @@ def command(argv: Sequence[str]) -> int:
     return OK
 
 
-def _description(robot: RobotSpec) -> tuple[dict[str, str], dict[str, Any]]:
+def _description(robot: RobotSpec, zeros: ZerosParams) -> tuple[dict[str, str], dict[str, Any]]:
     """The bill as a file, and the result."""
     parts = [asdict(part) for part in bill(robot)]
     result = {
         "schema": 1,
         "command": "robot",
-        "joints": dict(_joints(robot)),
+        "joints": dict(_joints(robot, zeros)),
         "supply": asdict(supply(robot)),
         "bom": parts,
     }
     return {"bom.csv": to_csv(parts)}, result
 
 
-def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
-    servos, modes = servos_of(robot), robot.modes
-    for name, number, servo, zero, direction in zip(
-        robot.joint_names, robot.ids, servos, robot.zeros, robot.directions, strict=True
+def _joints(robot: RobotSpec, zeros: ZerosParams) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What is known of each joint; a zero or direction that is not measured is None."""
+    lists = {"zero": robot.zeros, "direction": robot.directions}
+    lacking = {what: unmeasured(robot, zeros, [f"{what}s"]) for what in lists}
+    for at, (name, number, servo) in enumerate(
+        zip(robot.joint_names, robot.ids, servos_of(robot), strict=True)
     ):
-        mode = "extended position" if modes[number] == EXTENDED_MODE else "position"
-        row = {"id": number, "servo": servo.product, "mode": mode, "zero": zero}
-        yield name, row | {"direction": direction}
+        mode = "extended position" if robot.modes[number] == EXTENDED_MODE else "position"
+        known = {w: None if name in lacking[w] else values[at] for w, values in lists.items()}
+        yield name, {"id": number, "servo": servo.product, "mode": mode, **known}
 
 
 def _supply(result: Mapping[str, Any]) -> Supply:
@@ -332,8 +339,13 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"A plug of a servo's cable carries at most 3 A: feed the chain for each {power.per_feed} "
         f"servos, at {power.feeds} places."
     )
-    rows = [(name, [str(row[key]) for key in _COLUMNS]) for name, row in joints.items()]
-    return Table("Joints", _COLUMNS, rows), Table.of("Supply", rails, _RAIL, note)
+    rows = [
+        (name, [NONE if row[key] is None else str(row[key]) for key in _COLUMNS])
+        for name, row in joints.items()
+    ]
+    lack = any(NONE in cells for _, cells in rows)
+    cure = f"{NONE} is not measured; `{typed('zero')}` measures it." if lack else ""
+    return Table("Joints", _COLUMNS, rows, cure), Table.of("Supply", rails, _RAIL, note)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:
