@@ -136,7 +136,9 @@ def test_an_isotonic_curve_runs_straight_between_the_middles_of_its_steps() -> N
         (np.linspace(1700.0, 1400.0, 60), np.linspace(0.05, 0.18, 60), 0.1, 1550.0),
         # a jump within 12 of 4000 counts: the slope of a sigmoid is 4.39 * 4000 / 12 at least
         (
-            np.r_[np.linspace(30, 1999, 30), np.linspace(2000, 2014, 15), np.linspace(2015, 4030, 30)],
+            np.r_[
+                np.linspace(30, 1999, 30), np.linspace(2000, 2014, 15), np.linspace(2015, 4030, 30)
+            ],
             np.r_[np.zeros(30), np.linspace(0, 1, 15), np.ones(30)],
             0.5,
             2007.0,

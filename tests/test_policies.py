@@ -15,10 +15,10 @@ import numpy as np
 import onnx
 import pytest
 from lockstep import BoardPort, LockstepClock
-from stated import stated
 from pages import blocks
 from policy_files import FORWARD, constant, contract, counting, drawn, failing
 from recorded import recorded
+from stated import stated
 
 from antennate.cli import main, viewer
 from antennate.control.policy.contract import Contract, contract_of, require_match

@@ -393,5 +393,8 @@ def test_the_file_of_a_robot_may_hold_what_a_command_does_not_read(
         assert main([*command_words(command).split(), "--config", str(file), "--no-such-flag"]) == 2
         assert "--no-such-flag" in capsys.readouterr().err
     known = read_file(file, RobotFile)
-    assert known.for_doctor().control.gait.frequency == known.for_teleop().control.gait.frequency
-    assert known.for_drive().robot.mass == known.for_jog().robot.mass == 3.0
+    assert (
+        known.part(DoctorConfig).control.gait.frequency
+        == known.part(TeleopConfig).control.gait.frequency
+    )
+    assert known.part(DriveConfig).robot.mass == known.part(JogConfig).robot.mass == 3.0

@@ -90,24 +90,26 @@ def usual_file(options: RobotFileOptions) -> Path | None:
 def parse_robot(
     command: str,
     description: str,
-    take: Callable[[RobotFile], Config],
+    model: type[Config],
     argv: Sequence[str],
     options: type[Chosen],
     file_of: Callable[[Chosen], Path | None] = usual_file,
     without: Sequence[str] = (),
     named: type[Config] | None = None,
+    take: Callable[[RobotFile], Config] | None = None,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command that talks to a robot.
 
     Args:
         command: Its name.
         description: What it does.
-        take: What it takes of a robot's file.
+        model: Its configuration.
         argv: Its words.
         options: Its other options; ports that no flag names are those of the file.
         file_of: Which file is read.
         without: Fields of the other options that this command has not.
         named: What the file of --config holds, if it is no robot's file.
+        take: What it takes of a robot's file, if not all that both have.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -120,9 +122,8 @@ def parse_robot(
         if named is not None and path is not USUAL:
             return read_file(path, named)
         robot = read_file(path, RobotFile)
-        return take(robot)
+        return take(robot) if take else robot.part(model)
 
-    model = type(take(robot))
     config, chosen = parse(command, description, model, argv, options, read, without, file_of)
     ports = {
         name: getattr(robot.ports, name)
@@ -135,7 +136,7 @@ def parse_robot(
 def parse_writer(
     command: str,
     description: str,
-    take: Callable[[RobotFile], Config],
+    model: type[Config],
     argv: Sequence[str],
     options: type[Chosen],
     may_make: bool = False,
@@ -159,7 +160,7 @@ def parse_writer(
         return path
 
     without = ["no_config"]
-    config, chosen = parse_robot(command, description, take, argv, options, file_of, without)
+    config, chosen = parse_robot(command, description, model, argv, options, file_of, without)
     return config, chosen, chosen.config or USUAL
 
 
@@ -274,11 +275,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The robot or the folder cannot be used.
     """
-
-    def take(file: RobotFile) -> DescribedRobot:
-        return DescribedRobot(robot=file.robot, zeros=file.zeros)
-
-    config, options = parse_robot("robot", DESCRIPTION, take, argv, Options)
+    config, options = parse_robot("robot", DESCRIPTION, DescribedRobot, argv, Options)
     robot = config.robot
     files, result = None, {}
     if options.export is not None:
