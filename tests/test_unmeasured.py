@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 import signal
 import subprocess
@@ -298,6 +299,16 @@ def test_a_number_is_stated_whatever_it_is_and_assumed_only_where_it_is_not(
     rows = found()
     assert (rows["supply limits"], rows["left calibration"]) == ("in its file", "in its file")
     assert rows["right calibration"] == "assumed: that of the left one"
+
+
+def test_steps_of_an_inertial_sensor_that_are_stated_are_not_assumed() -> None:
+    step = 0.035 * math.pi / 180  # the default: 35 mdeg/s
+    for more, lack in (({}, 4), ({"gyro_step": step}, 3)):
+        config = DoctorConfig.model_validate({"robot": {"imu": {"kind": "head", **more}}})
+        row = of_robot(config, Patient(robot=config.robot))["inertial axes"]
+        assert row.found.startswith("assumed: x, y, ")
+        assert ("gyro_step" in row.found, len(row.found.split(","))) == (not more, lack)
+        assert "accel_step 0.002" in row.found  # 0.244 mg
 
 
 def test_a_servo_that_the_doctor_gives_an_id_has_no_zero(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from antennate.hardware.config import DoctorConfig
-from antennate.hardware.doctor.check import Finding, Row, ids_text
+from antennate.hardware.doctor.check import Finding, Grade, Row, ids_text
 from antennate.hardware.joints import unmeasured
 from antennate.messages import typed
 from antennate.params.base import Params
@@ -28,9 +29,9 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
     supply = _unstated(config.limits, "supply_warn", "supply_hold", "supply_off")
     left, right = _curve(control.conditioning), control.conditioning_right
     other = _curve(right) if right else left or "that of the left one"
-    axes = ", ".join(("x", "y", *_unstated(robot.imu, "gyro_step", "accel_step")))
+    axes = ", ".join(["x", "y", *_unstated(robot.imu, "gyro_step", "accel_step")])
     sided, curve = esp32 and robot.antenna_count, f"`{typed('record')}`, `{typed('calibrate')}`, "
-    table = (  # looked at, check, what is assumed, grade, cure
+    table: tuple[tuple[Any, str, Any, Grade, str], ...] = (
         (bus, "ids", ids and f"{ids_text(ids)} in the order of the joints", "warn",
          f"`{typed('setup')}` and `{typed('zero')}` write them"),
         (bus, "joint limits", ", ".join(limits), "note",
@@ -53,21 +54,18 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
 
 def _zeros(config: DoctorConfig) -> Row:
     names, date = unmeasured(config.robot, config.zeros), config.zeros.measured
-    finding = Finding(f"measured on {date}" if date else "in its file, without a date")
-    if names:
-        some = f": {', '.join(names)}" if len(names) < len(config.robot.ids) else ""
-        finding = Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`")
-    return finding.row("robot", "zeros and directions", "measured")
+    some = f": {', '.join(names)}" if len(names) < len(config.robot.ids) else ""
+    known = Finding(f"measured on {date}" if date else "in its file, without a date")
+    lack = Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`")
+    return (lack if names else known).row("robot", "zeros and directions", "measured")
 
 
 def _unstated(group: Params, *names: str) -> list[str]:
     """Which of these parameters no file states, with the values that they have then."""
-    given = group.model_fields_set
-    return [f"{name} {getattr(group, name)}" for name in names if name not in given]
+    return [f"{n} {getattr(group, n)}" for n in names if n not in group.model_fields_set]
 
 
 def _curve(curve: CurveParams) -> str:
     """Numbers of a curve that no file states, in words."""
-    names = _unstated(curve, *_CURVE[: 3 if curve.knots else 5])
-    which = "that" if len(names) == 5 else ", ".join(names)
-    return f"{which} of a simulated antenna" if names else ""
+    lack = _unstated(curve, *_CURVE[: 3 if curve.knots else 5])
+    return f"{'that' if len(lack) == 5 else ', '.join(lack)} of a simulated antenna" if lack else ""
