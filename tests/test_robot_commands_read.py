@@ -96,7 +96,7 @@ def told(
     """Run a command with a configuration and options, in place of words."""
     module = sys.modules[command.__module__]
     if path is None:
-        patch.setattr(module, "parse_robot", lambda *_: (config, options))
+        patch.setattr(module, "parse_robot", lambda *_, **__: (config, options))
     else:
         patch.setattr(module, "parse_writer", lambda *_, **__: (config, options, path))
     return command([])
