@@ -31,7 +31,7 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
     table: tuple[tuple[Any, str, Any, Grade, str], ...] = (
         (bus, "ids", ids and f"{ids_text(ids)} in the order of the joints", "warn",
          f"`{typed('setup')}` and `{typed('zero')}` write them"),
-        (bus, "joint limits", ", ".join(limits), "note", "set robot.*.limit to where their stops are"),
+        (bus, "joint limits", ", ".join(limits), "note", "set robot.*.limit to where they stop"),
         (bus, "supply limits", supply and f"{', '.join(supply)} V, of three lithium cells", "note",
          "set limits.supply_warn, supply_hold and supply_off to what your supply needs"),
         (sided, "left calibration", left, "warn", f"{curve} = FILE"),
