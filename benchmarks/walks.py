@@ -79,6 +79,7 @@ def tick() -> Walk:
     sys.path.insert(0, str(ROOT / "tests"))
     rig = importlib.import_module("driven_rig")
     watched = importlib.import_module("twin_rig").Watch
+    stated = importlib.import_module("stated").stated
 
     from antennate.experiments.tunnel.physics import TunnelConfig
     from antennate.hardware.config import DriveConfig
@@ -87,8 +88,9 @@ def tick() -> Walk:
 
     config = TunnelConfig(seed=0)
     robot = TwinRobot(watched(config, "closed", 0).body, config.robot, 0.01, boot_id=1)
+    known = stated(config.robot)
     orders = DriveConfig(
-        controller="closed", dry_run=0.5, touch_check=False, robot=config.robot, duration=5.0
+        controller="closed", dry_run=0.5, touch_check=False, robot=known, duration=5.0
     )
     walk = Walk(lambda frame: frame.f_code.co_filename == WIRES)
     ticks = 0

@@ -21,8 +21,9 @@ from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
+lockstep, stated = import_module("lockstep"), import_module("stated")
 PICTURE = Path(__file__).parent / "images" / "replay.png"
-CONFIG = DriveConfig(dry_run=6.0, duration=18.0)
+CONFIG = DriveConfig(robot=stated.stated(), dry_run=6.0, duration=18.0)
 SILENT, AGAIN = 16.0, 16.5
 """Times from and to which the board is silent [s]."""
 
@@ -30,7 +31,6 @@ SILENT, AGAIN = 16.0, 16.5
 def log(path: Path) -> None:
     """Write the log of the drive."""
     robot, _ = watched(TwinConfig(touch=("left@1s", "right@3s"), trial=1))
-    lockstep = import_module("lockstep")
     clock = lockstep.LockstepClock(robot)
     session = prepare(CONFIG, lockstep.BoardPort(robot, clock), clock, clock)
     header = Header(controller="closed", params=CONFIG.control, robot=CONFIG.robot)

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from lockstep import BoardPort, LockstepClock
+from stated import stated
 from twin_rig import Watch
 
 from antennate.control.loop import run_loop
@@ -141,7 +142,7 @@ def driven(
         controller=name,
         dry_run=_DRY_RUN,
         touch_check=False,
-        robot=config.robot,
+        robot=stated(config.robot),
         control=config.control,
     )
     session = wired(orders, robot)

@@ -25,6 +25,7 @@ from guard_tools import Guard, around, before, constant, put
 
 from antennate.control import loop
 from antennate.hardware import joints
+from antennate.hardware.driving import connect
 from antennate.hardware.driving.stopping import StopOnce
 from antennate.hardware.dynamixel import actuators
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
@@ -95,6 +96,9 @@ def as_if_measured(old: Any, self: Any, *of_joint: Any) -> None:
     old(self, *of_joint[:-1], True)
 
 
+UNASKED = property(lambda _: "", lambda _, why: None)
+
+
 SESSION = [
     Guard(
         "zeros and directions that nobody measured",
@@ -103,8 +107,18 @@ SESSION = [
     ),
     Guard(
         "no torque without them, whoever asks",
-        put(session.Session, "unfit", property(lambda _: "", lambda _, why: None)),
+        lambda patch: patch.setattr(session.Session, "unfit", UNASKED, raising=False),
         test_unmeasured.test_a_session_of_such_a_robot_gets_no_torque,
+    ),
+    Guard(
+        "nor by ports that Python opened",
+        put(connect, "zeros_lack", constant("")),
+        partial(
+            test_unmeasured.test_ports_that_python_opened_give_such_a_robot_no_torque,
+            RobotSpec(),
+            (),
+            "all joints, found none; `",
+        ),
     ),
     Guard(
         "way of a joint moved by keys without them",

@@ -14,7 +14,7 @@ import antennate
 from antennate.antenna.calibration import Calibration
 from antennate.cli import main
 from antennate.control.conditioning import bending_level, curves
-from antennate.errors import BadInputError
+from antennate.errors import BadInputError, CalibrationError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.hardware.safety.channel import Band
@@ -127,6 +127,35 @@ def test_an_isotonic_curve_runs_straight_between_the_middles_of_its_steps() -> N
     assert found.knots == (1000.0, 1100.0, 1250.0, 1400.0)
     assert found.knot_levels == pytest.approx((0.0, 0.2, 0.6, 1.0))
     assert found.level(np.array([1175.0, 1325.0, 900.0])) == pytest.approx([0.4, 0.8, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("counts", "level", "threshold", "half"),
+    [
+        # bent to 0.18 of the full flex, so that a sigmoid has its half far outside the readings
+        (np.linspace(1700.0, 1400.0, 60), np.linspace(0.05, 0.18, 60), 0.1, 1550.0),
+        # a jump within 12 of 4000 counts: the slope of a sigmoid is 4.39 * 4000 / 12 at least
+        (
+            np.r_[
+                np.linspace(30, 1999, 30), np.linspace(2000, 2014, 15), np.linspace(2015, 4030, 30)
+            ],
+            np.r_[np.zeros(30), np.linspace(0, 1, 15), np.ones(30)],
+            0.5,
+            2007.0,
+        ),
+    ],
+)
+def test_a_recording_that_no_sigmoid_describes_has_another_curve(
+    counts: Floats, level: Floats, threshold: float, half: float, tmp_path: Path
+) -> None:
+    given = {"counts": counts, "level": level, "threshold": threshold}
+    with pytest.raises(CalibrationError, match=r"expected a curve \(sigmoid\)"):
+        antennate.fit_calibration(**given)
+    for kind in ("line", "isotonic"):
+        antennate.fit_calibration(**given, kind=kind).save(path := tmp_path / f"{kind}.json")
+        found = Calibration.load(path)
+        middle = (level[0] + level[-1]) / 2
+        assert found.level(np.array([half])) == pytest.approx([middle], abs=0.01)
 
 
 def test_a_curve_of_the_wrong_shape_has_its_size_and_no_interval(

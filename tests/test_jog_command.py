@@ -13,6 +13,7 @@ from test_jog import Ready
 
 from antennate.cli import main, setup
 from antennate.hardware.setup.jog import Jog
+from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.port import PortError
 
 Typed = Callable[[], list[str]]
@@ -38,15 +39,16 @@ class Typist:
         patch.setattr(setup, "opener_of", lambda *_: self.box.opener)
         patch.setattr(setup, "HostClock", lambda: HostTime(self.box))
 
-    def ran(self, typed: Typed) -> tuple[int, list[str]]:
-        """Exit code and lines of stderr."""
+    def ran(self, typed: Typed, *words: str) -> tuple[int, list[str]]:
+        """Exit code and lines of stderr; without words zeros and directions are known."""
 
         def keys(wait: float) -> list[str]:
             self.box.wire.sleep(wait)
             return typed()
 
         self._patch.setattr(setup, "typed_keys", lambda: contextlib.nullcontext(keys))
-        code = main(["setup", "jog", "--bus", "the bus", "--robot.baud", str(ROBOT.baud), *STATED])
+        told = ["--bus", "the bus", "--robot.baud", str(ROBOT.baud), *(words or STATED)]
+        code = main(["setup", "jog", *told])
         return code, self._capsys.readouterr().err.strip().splitlines()
 
 
@@ -59,6 +61,22 @@ def test_it_ends_with_the_torque_off_and_says_so(typist: Typist) -> None:
     keys = iter("++q")
     code, lines = typist.ran(lambda: [next(keys)])
     assert (code, lines[-1]) == (0, "yaw1: torque is off, verified")
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_joint_without_a_zero_goes_no_farther_on_a_later_visit(typist: Typist, way: int) -> None:
+    """0.35 rad are 228 ticks from where it stood at first, however often one comes back to it."""
+    box, yaw2 = typist.box, joints_of(ROBOT)[1]
+    box.plug("yaw2")
+    ServoSetup(box.opener, ROBOT, 0.02, box.wire.now).set_up(yaw2, ())
+    box.plug("yaw1", "yaw2")
+    typist.servo.place(2500.0)
+    visit = [["+" if way > 0 else "-"] * 9, *[[]] * 60]
+    keys = iter([*visit, ["n"], ["p"], *visit, ["n"], ["p"], *visit, ["q"]])
+    code, lines = typist.ran(lambda: next(keys), "--jog.reach", "0.35")
+    assert code == 0
+    assert sum("yaw1: its zero or direction is not measured" in line for line in lines) == 3
+    assert typist.servo.position == pytest.approx(2500 + way * 228, abs=12)
 
 
 def test_a_servo_in_pwm_mode_is_refused_without_torque(typist: Typist) -> None:

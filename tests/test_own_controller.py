@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lockstep import BoardPort, LockstepClock
+from stated import stated
 
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
@@ -234,7 +235,9 @@ def test_the_example_drives_the_twin() -> None:
     """By the code of `drive`, all of it through bytes, in lock-step."""
     robot = watched(TwinConfig())[0]
     clock = LockstepClock(robot)
-    config = DriveConfig(controller=EXAMPLE, dry_run=0.5, duration=3.0, touch_check=False)
+    config = DriveConfig(
+        robot=stated(), controller=EXAMPLE, dry_run=0.5, duration=3.0, touch_check=False
+    )
     session = prepare(config, BoardPort(robot, clock), clock, clock)
     maneuvers: list[int] = []
     goals: set[tuple[int, ...]] = set()

@@ -18,6 +18,7 @@ from lockstep import BoardPort, LockstepClock
 from pages import blocks
 from policy_files import FORWARD, constant, contract, counting, drawn, failing
 from recorded import recorded
+from stated import stated
 
 from antennate.cli import main, viewer
 from antennate.control.policy.contract import Contract, contract_of, require_match
@@ -202,7 +203,9 @@ def test_drive_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: Pat
     robot = watched(TwinConfig())[0]
     clock = LockstepClock(robot)
     path = str(failing(tmp_path / "p.onnx"))
-    config = DriveConfig(controller=path, dry_run=0.5, duration=4.0, touch_check=False)
+    config = DriveConfig(
+        robot=stated(), controller=path, dry_run=0.5, duration=4.0, touch_check=False
+    )
     session = prepare(config, BoardPort(robot, clock), clock, clock)
     held: list[bool] = []
 
@@ -261,7 +264,9 @@ def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:
     path = constant(tmp_path / "p.onnx", (0.0, 0.0, 5.0, 0.0), contract(servos=True))
     robot = watched(TwinConfig())[0]
     clock = LockstepClock(robot)
-    config = DriveConfig(controller=str(path), dry_run=0.5, duration=3.0, touch_check=False)
+    config = DriveConfig(
+        robot=stated(), controller=str(path), dry_run=0.5, duration=3.0, touch_check=False
+    )
     session = prepare(config, BoardPort(robot, clock), clock, clock)
     maneuvers: list[int] = []
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from itertools import combinations
 from pathlib import Path
 
@@ -38,6 +39,34 @@ def test_every_joint_is_listed_drawn_and_bought(
     stall = 1.3 * (joints - 2) + 2 * 1.47 * 5.0 / 11.1 / 0.9
     assert result["supply"]["stall"] == pytest.approx(stall)
     assert f"{stall:.1f} A if all of them stall" in said
+
+
+def test_what_no_file_states_and_nobody_measured_is_not_shown_as_a_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file has the zeros of the yaw joints and both lists of the antennae; yaw2 is lost."""
+    monkeypatch.chdir(tmp_path)
+    Path("robot.toml").write_text(
+        "[robot.yaw]\nzeros = [2001, 2002, 2003, 2004, 2005]\n"
+        "[robot.antennae]\nzeros = [2018, 2048]\ndirections = [1, -1]\n"
+        '[zeros]\nmeasured = "2026-11-29"\nmissing = ["yaw2"]\n'
+    )
+    assert main(["robot", "--out", "run"]) == 0
+    joints = json.loads(Path("run/result.json").read_text())["joints"]
+    found = {name: (joint["zero"], joint["direction"]) for name, joint in joints.items()}
+    assert [found.pop(f"yaw{n}") for n in range(1, 6)] == [
+        *((2001, None), (None, None)),
+        *((2003, None), (2004, None), (2005, None)),
+    ]
+    assert found.pop("antenna_l_base") == (2018, 1)
+    assert found.pop("antenna_r_base") == (2048, -1)
+    assert len(found) == 12
+    assert set(found.values()) == {(None, None)}
+    said = capsys.readouterr().out
+    ends = {line.split()[0]: line.split()[-2:] for line in said.splitlines() if line.strip()}
+    assert ends["leg_r5"] == ends["yaw2"] == ["-", "-"]
+    assert (ends["yaw1"], ends["antenna_r_base"]) == (["2001", "-"], ["2048", "-1"])
+    assert re.search("- is not measured; `.*antennate setup zero` measures it", said)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

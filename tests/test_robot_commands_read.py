@@ -96,7 +96,7 @@ def told(
     """Run a command with a configuration and options, in place of words."""
     module = sys.modules[command.__module__]
     if path is None:
-        patch.setattr(module, "parse_robot", lambda *_: (config, options))
+        patch.setattr(module, "parse_robot", lambda *_, **__: (config, options))
     else:
         patch.setattr(module, "parse_writer", lambda *_, **__: (config, options, path))
     return command([])
@@ -252,9 +252,8 @@ def run_twin(patch: Patch, config: TwinConfig, tmp_path: Path) -> None:
         return
     robot = watched(config)[0]
     clock = LockstepClock(robot)
-    orders = DriveConfig(
-        dry_run=0.1, duration=0.3, touch_check=False, robot=fresh(config.robot), stand=0.0
-    )
+    known = stated(fresh(config.robot))
+    orders = DriveConfig(dry_run=0.1, duration=0.3, touch_check=False, robot=known, stand=0.0)
     walk(prepare(orders, BoardPort(robot, clock), clock, clock), orders, arm=True)
 
 
@@ -394,5 +393,8 @@ def test_the_file_of_a_robot_may_hold_what_a_command_does_not_read(
         assert main([*command_words(command).split(), "--config", str(file), "--no-such-flag"]) == 2
         assert "--no-such-flag" in capsys.readouterr().err
     known = read_file(file, RobotFile)
-    assert known.for_doctor().control.gait.frequency == known.for_teleop().control.gait.frequency
-    assert known.for_drive().robot.mass == known.for_jog().robot.mass == 3.0
+    assert (
+        known.part(DoctorConfig).control.gait.frequency
+        == known.part(TeleopConfig).control.gait.frequency
+    )
+    assert known.part(DriveConfig).robot.mass == known.part(JogConfig).robot.mass == 3.0

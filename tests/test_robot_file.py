@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +15,22 @@ from test_bad_calibrations import GOOD
 
 from antennate.cli import BAD_INPUT, main
 from antennate.cli.robot import RobotOptions, parse_robot
-from antennate.hardware.config import RobotFile
+from antennate.hardware.config import DoctorConfig, DriveConfig, RecordConfig, RobotFile
 from antennate.hardware.doctor.checkup import examine
 from antennate.messages import command_words
 from antennate.params.base import read_file
 from antennate.studies.formats import to_toml
 
 PAGE = Path(__file__).parents[1] / "docs" / "hardware.md"
-TAKE: dict[str, Callable[[RobotFile], Any]] = {
-    "drive": RobotFile.for_drive,
-    "doctor": RobotFile.for_doctor,
-    "record": RobotFile.for_record,
-}
+MODELS = {"drive": DriveConfig, "doctor": DoctorConfig, "record": RecordConfig}
+
+
+def parsed(name: str, *words: str) -> Any:
+    """The configuration of a command by the file of this folder and these words."""
+    model: Any = MODELS[name]
+    take: Any = RobotFile.for_record if name == "record" else None
+    words = ("--config", "robot.toml", *words)
+    return parse_robot(name, "", model, words, RobotOptions, take=take)[0]
 
 
 @pytest.fixture
@@ -42,11 +45,11 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("robot.toml")
 
 
-@pytest.mark.parametrize("name", TAKE)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None:
     robot = read_file(file, RobotFile)
-    config, _ = parse_robot(name, "", TAKE[name], ["--config", str(file)], RobotOptions)
-    assert config == TAKE[name](robot)
+    config = parsed(name)
+    assert config == (robot.for_record() if name == "record" else robot.part(MODELS[name]))
     assert config.network == robot.network
     known = robot.record if name == "record" else robot
     for field in set(type(config).model_fields) - {"network"}:
@@ -54,9 +57,6 @@ def test_the_file_of_the_page_serves_each_command(name: str, file: Path) -> None
 
 
 def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -> None:
-    def parsed(name: str, *words: str) -> Any:
-        return parse_robot(name, "", TAKE[name], ["--config", str(file), *words], RobotOptions)[0]
-
     tables = "[doctor]\nlisten = 1.5\n[record]\nmarks = [0.0, 10.0]\nduration = 9.0\n"
     file.write_text("duration = 60.0\n" + tables)
     assert parsed("drive").duration == 60.0
@@ -65,7 +65,7 @@ def test_each_command_takes_its_own_numbers_and_a_flag_counts_more(file: Path) -
     assert parsed("record", "--marks", "0", "5").marks == (0.0, 5.0)
 
 
-@pytest.mark.parametrize("name", TAKE)
+@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -150,7 +150,7 @@ def test_twin_and_robot_take_the_robot_of_the_file(
 
 
 def test_doctor_judges_the_antennae_by_the_calibration_file(file: Path) -> None:
-    robot = read_file(file, RobotFile).for_doctor().calibrated()
+    robot = read_file(file, RobotFile).part(DoctorConfig).calibrated()
     patient = Patient()
     patient.robot.hold(0, 1700.0)
     checkup = examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now)
@@ -162,7 +162,7 @@ def test_doctor_judges_the_antennae_by_the_calibration_file(file: Path) -> None:
 
 def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) -> None:
     patient = Patient()
-    robot = RobotFile(sensor_id="0" * 16).for_doctor()
+    robot = RobotFile(sensor_id="0" * 16).part(DoctorConfig)
     row = wrong(examine(robot, None, ("/dev/esp32", patient.esp32), patient.clock.now))[
         "esp32: sensors"
     ]
@@ -172,11 +172,11 @@ def test_S9_doctor_names_the_board_to_which_the_films_do_not_belong(file: Path) 
 
 def test_what_a_run_keeps_is_a_robot_file_that_needs_no_calibration_file(file: Path) -> None:
     robot = read_file(file, RobotFile)
-    for take in (RobotFile.for_drive, RobotFile.for_doctor):
-        kept, config = Path("kept.toml"), take(robot).calibrated()
+    for model in (DriveConfig, DoctorConfig):
+        kept, config = Path("kept.toml"), robot.part(model).calibrated()
         kept.write_text(to_toml(config))
         again = read_file(kept, RobotFile)
-        assert take(again).calibrated() == config
+        assert again.part(model).calibrated() == config
         assert again.control.conditioning.counts_low == GOOD.counts_low
 
 

@@ -13,11 +13,12 @@ from twin_rig import on_twin, simulated
 
 from antennate.cli import BAD_INPUT, main
 from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.hardware.config import RobotFile
 from antennate.hardware.joints import Joints
 from antennate.params.base import read_file
 from antennate.params.scene import PhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.studies.formats import to_toml
 from antennate.testing import check_robot
@@ -146,6 +147,20 @@ def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:
     config.write_text('[robot]\nbase = "mine.toml"\nmass = 1.5\n[robot.yaw]\nfastest = 2.0\n')
     found = read_file(config, TunnelConfig).robot
     assert (found.links, found.mass, found.yaw.limit, found.yaw.fastest) == (4, 1.5, 0.4, 2.0)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("other", ROBOTS)
+def test_the_robot_of_a_flag_replaces_the_one_of_the_file(
+    name: str, other: str, tmp_path: Path
+) -> None:
+    """As a whole: nothing is left of the other one, also of one with an inertial sensor."""
+    config = tmp_path / "config.toml"
+    config.write_text(f'robot = "{other}"\n')
+    words = ["--config", str(config), "--robot", name, "--out", str(tmp_path / "run")]
+    assert main(["robot", *words]) == 0
+    made = read_file(tmp_path / "run" / "config.toml", RobotFile)
+    assert made.robot == RobotSpec.named(name)
 
 
 @pytest.mark.parametrize("other", ["scuttle", RobotSpec, None])

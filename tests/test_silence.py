@@ -13,6 +13,7 @@ from esp32_streams import BOOT, encoded, hello
 from hardware_rig import FREE
 from pty_server import PtyServer
 from servo_rig import servos
+from stated import stated
 
 from antennate.dxl.model import EXTENDED_MODE
 from antennate.dxl.servo_bus import ServoBus
@@ -30,6 +31,7 @@ from antennate.twin.serve import Terminal
 LIMIT = 0.1
 """Time from the last valid sample to the HOLD on the bus [s], as the row says."""
 CONFIG = DriveConfig(
+    robot=stated(),
     controller="open",
     dry_run=1.0,
     touch_check=False,

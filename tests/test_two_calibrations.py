@@ -11,7 +11,7 @@ from test_bad_calibrations import GOOD
 
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.hardware.config import RobotFile
+from antennate.hardware.config import DoctorConfig, DriveConfig, RobotFile
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.base import read_file
@@ -49,7 +49,7 @@ def level(counts: float, curve) -> float:
 
 
 def test_each_antenna_has_its_own_level(file: Path) -> None:
-    config = read_file(file, RobotFile).for_drive().calibrated()
+    config = read_file(file, RobotFile).part(DriveConfig).calibrated()
     assert (config.sensor_id, config.sensor_id_right) == ("left-1", "right-1")
     control = make_controller("closed", config.control, config.robot)
     for _ in range(20):
@@ -62,7 +62,7 @@ def test_each_antenna_has_its_own_level(file: Path) -> None:
 
 
 def test_each_channel_is_judged_by_its_own_range(file: Path) -> None:
-    config = read_file(file, RobotFile).for_doctor().calibrated()
+    config = read_file(file, RobotFile).part(DoctorConfig).calibrated()
     control = config.control
     quality = SignalQuality(control.conditioning, right=control.conditioning_right)
     for tick in range(20):
@@ -96,7 +96,7 @@ def test_the_right_curve_is_kept_in_files_and_equal_curves_change_nothing(tmp_pa
 
 def test_one_file_goes_on_serving_both(file: Path) -> None:
     file.write_text(file.read_text().splitlines()[0])
-    config = read_file(file, RobotFile).for_drive().calibrated()
+    config = read_file(file, RobotFile).part(DriveConfig).calibrated()
     assert config.control.conditioning_right is None
     assert config.control.conditioning == GOOD.conditioning()
 
@@ -120,7 +120,7 @@ def test_each_antenna_has_its_own_reach(
         each.save(tmp_path / f"{name}.json")
         words.append(f'{name} = "{tmp_path / name}.json"')
     (file := tmp_path / "robot.toml").write_text("\n".join(words))
-    config = read_file(file, RobotFile).for_drive().calibrated()
+    config = read_file(file, RobotFile).part(DriveConfig).calibrated()
     curves = config.control.conditioning, config.control.conditioning_right
     for extra, believed in ((-0.1, True), (0.1, False)):
         quality = SignalQuality(curves[0], reaches=config.reaches, right=curves[1])
@@ -137,9 +137,9 @@ def test_the_name_of_a_flex_sensor_without_its_file_is_refused(file: Path) -> No
     for line in ('sensor_id = "left-1"', 'sensor_id_right = "right-1"'):
         file.write_text(line)
         with pytest.raises(ConfigError, match=r"^sensor_id\w*: expected calibration\w* = FILE"):
-            read_file(file, RobotFile).for_drive().calibrated()
+            read_file(file, RobotFile).part(DriveConfig).calibrated()
     file.write_text('sensor_id = "0123456789abcdef"')
-    read_file(file, RobotFile).for_drive().calibrated()
+    read_file(file, RobotFile).part(DriveConfig).calibrated()
 
 
 @pytest.mark.parametrize(
@@ -156,4 +156,4 @@ def test_the_name_of_a_flex_sensor_without_its_file_is_refused(file: Path) -> No
 def test_what_contradicts_is_refused(file: Path, change: tuple[str, str], said: str) -> None:
     file.write_text(file.read_text().replace(*change, 1))
     with pytest.raises(ConfigError if "sensor" not in change[1] else Exception, match=said):
-        read_file(file, RobotFile).for_drive().calibrated()
+        read_file(file, RobotFile).part(DriveConfig).calibrated()

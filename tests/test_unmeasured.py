@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 import signal
 import subprocess
@@ -30,6 +31,7 @@ from antennate.hardware.doctor.checkup import examine
 from antennate.hardware.driving import connect
 from antennate.hardware.driving.drive import drive
 from antennate.params.base import read_file
+from antennate.params.hardware import ZerosParams
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_toml
@@ -44,6 +46,14 @@ DONE = f"[setup]\ndone = {json.dumps(NAMES)}\n"
 YAW = "[robot.yaw]\nids = [1, 2, 3, 4, 5]\n"
 LEGS = "[robot.legs]\nids = [6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]\n"
 ZEROS = {"yaw": [2048] * 5, "legs": [2048] * 12, "antennae": [2048] * 2}
+CURVE = {
+    "polarity": -1,
+    "counts_low": 1399.0,
+    "counts_high": 1872.0,
+    "midpoint": 0.305,
+    "slope": 18.3,
+}
+"""The default."""
 KNOWN = ("yaw", "legs", "antennae", "pitch", "elevation")
 ONES = {name: [1] * len(zeros) for name, zeros in ZEROS.items()}
 
@@ -111,6 +121,32 @@ def test_a_session_of_such_a_robot_gets_no_torque() -> None:
     assert (report.on, made.session.touched) == (None, False)
 
 
+@pytest.mark.parametrize(
+    ("robot", "missing", "why"),
+    [
+        (RobotSpec(), (), "all joints, found none; `"),
+        (stated(), ("yaw3",), "all joints, found none of yaw3; `"),
+        (stated(), (), ""),
+    ],
+)
+def test_ports_that_python_opened_give_such_a_robot_no_torque(
+    robot: RobotSpec, missing: tuple[str, ...], why: str
+) -> None:
+    clock = LockstepClock(twin := watched(TwinConfig())[0])
+    config = DriveConfig(
+        robot=robot,
+        zeros=ZerosParams(missing=missing),
+        dry_run=0.3,
+        duration=0.5,
+        touch_check=False,
+        touch=TouchCheckParams(patience=0.5),
+    )
+    session = connect.prepare(config, BoardPort(twin, clock), clock, clock)
+    report = drive(session, config, arm=True)
+    assert why in report.refusal
+    assert (report.on is None, session.touched) == (bool(why), not why)
+
+
 @pytest.fixture
 def twin(monkeypatch: pytest.MonkeyPatch) -> LockstepClock:
     """A twin in invented time at the ports that a drive opens."""
@@ -170,8 +206,9 @@ def test_the_doctor_names_every_number_that_nobody_has_measured() -> None:
     assert rows["ids"].found == "assumed: 1-19 in the order of the joints"
     # 2 atan(2 (60 - 33 - 1) mm / 200 mm) is 29.1 deg
     assert rows["joint limits"].found == "assumed: yaw 29 deg, antennae 90 deg"
-    assert rows["supply limits"].found == "assumed: three lithium cells, 10.8, 10.2, 9.6 V"
-    assert "simulated antenna" in rows["left calibration"].found
+    supply = "supply_warn 10.8, supply_hold 10.2, supply_off 9.6 V, of three lithium cells"
+    assert rows["supply limits"].found == f"assumed: {supply}"
+    assert rows["left calibration"].found == "assumed: that of a simulated antenna"
     assert all(row.cure for row in rows.values())
 
 
@@ -184,8 +221,8 @@ def test_what_is_stated_is_not_named() -> None:
         {
             "robot": spec | {"imu": {"kind": "head"}},
             "zeros": {"measured": "2026-11-29", "missing": ["leg_r2"]},
-            "limits": {"supply_warn": 11.5},
-            "control": {"conditioning": {"counts_low": 1300.0}},
+            "limits": {"supply_warn": 10.8, "supply_hold": 10.2, "supply_off": 9.6},
+            "control": {"conditioning": CURVE},
         }
     )
     rows = of_robot(config, Patient(robot=config.robot))
@@ -228,6 +265,50 @@ def test_the_doctor_lets_no_robot_walk_that_was_set_up_and_never_zeroed(
     assert examined() == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "no check is bad, 3 of 44 warn; numbers assumed: 2." in said
+
+
+@pytest.mark.parametrize("base", ["", 'base = "scuttle"\n', 'base = "mine.toml"\n'])
+def test_a_number_is_stated_whatever_it_is_and_assumed_only_where_it_is_not(
+    base: str, file: Path, examined: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each number of the file is the default, and none of them stands for its neighbour."""
+    Path("mine.toml").write_text("leg_width = 0.016\n[legs]\nfastest = 4.5\n")
+    known = lists(zeros=ZEROS, directions=ONES).replace(
+        "antennae]\n", "antennae]\nlimit = 1.5707963267948966\n"
+    )
+    file.write_text(
+        f"[robot]\n{base}{known}ids = [18, 19]\n[limits]\nsupply_hold = 10.2\n"
+        "[control.conditioning]\n"
+        + "".join(f"{name} = {value}\n" for name, value in CURVE.items() if name != "slope")
+    )
+
+    def found() -> dict[str, str]:
+        examined("--json")
+        said = json.loads(capsys.readouterr().out)["rows"]
+        return {row["check"]: row["found"] for row in said if row["part"] == "robot"}
+
+    rows = found()
+    assert rows["joint limits"] == "assumed: yaw 29 deg"
+    assert rows["ids"] == "assumed: 1-17 in the order of the joints"
+    of_cells = "assumed: supply_warn 10.8, supply_off 9.6 V, of three lithium cells"
+    assert rows["supply limits"] == of_cells
+    assert rows["left calibration"] == "assumed: slope 18.3 of a simulated antenna"
+    assert rows["right calibration"] == rows["left calibration"]
+    words = ("supply_hold = 10.2", "supply_warn = 10.8\nsupply_hold = 10.2\nsupply_off = 9.6")
+    file.write_text(file.read_text().replace(*words) + "slope = 18.3\n")
+    rows = found()
+    assert (rows["supply limits"], rows["left calibration"]) == ("in its file", "in its file")
+    assert rows["right calibration"] == "assumed: that of the left one"
+
+
+def test_steps_of_an_inertial_sensor_that_are_stated_are_not_assumed() -> None:
+    step = 0.035 * math.pi / 180  # the default: 35 mdeg/s
+    for more, lack in (({}, 4), ({"gyro_step": step}, 3)):
+        config = DoctorConfig.model_validate({"robot": {"imu": {"kind": "head", **more}}})
+        row = of_robot(config, Patient(robot=config.robot))["inertial axes"]
+        assert row.found.startswith("assumed: x, y, ")
+        assert ("gyro_step" in row.found, len(row.found.split(","))) == (not more, lack)
+        assert "accel_step 0.002" in row.found  # 0.244 mg
 
 
 def test_a_servo_that_the_doctor_gives_an_id_has_no_zero(

@@ -96,7 +96,7 @@ class Calibration(Strict):
     polarity: Literal[-1, 1]
     slope: float = Field(gt=0, le=1000)
     slope_95: tuple[float, float] | None
-    midpoint: float = Field(gt=-1, lt=2)
+    midpoint: float = Field(ge=-3, le=3)
     midpoint_95: tuple[float, float] | None
     counts_low: float = Field(ge=0, le=4095)
     counts_high: float = Field(ge=0, le=4095)
@@ -217,6 +217,8 @@ def _impossible(calibration: Calibration) -> str:
         return f"valid_counts: expected readings of 12 bits, found {low:g} to {high:g}"
     if (calibration.kind == "sigmoid") != (not calibration.knots):
         return f"kind: expected sigmoid without knots, or another with, found {calibration.kind}"
+    if not calibration.knots and not -1 < calibration.midpoint < 2:
+        return f"midpoint: expected a sigmoid's between -1 and 2, found {calibration.midpoint:g}"
     width, name = _RISE * span / calibration.slope, "slope"
     if calibration.knots:
         curve = calibration.curve()

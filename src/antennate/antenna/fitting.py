@@ -145,11 +145,11 @@ def fit(
         ends_of = knots(kind, samples.counts, samples.level, sign)
         predicted = np.interp(samples.counts, *ends_of)
     r2 = _r2(predicted, samples.level)
-    if r2 < least_r2 or not -1 < midpoint < 2 or slope >= 999:
+    if r2 < least_r2 or (kind == "sigmoid" and not (-1 < midpoint < 2 and slope < 999)):
+        how = f" with slope {slope:.3g} and midpoint {midpoint:.3g}" if kind == "sigmoid" else ""
         raise CalibrationError(
             f"expected a curve ({kind}) that explains at least {100 * least_r2:.0f} % of the "
-            f"level, found {100 * r2:.0f} % with slope {slope:.3g} and midpoint {midpoint:.3g}; "
-            "check that time and flex belong together"
+            f"level, found {100 * r2:.0f} %{how}; check that time and flex belong together"
         )
     slopes, midpoints = _intervals(samples, x, sign, slope, midpoint)
     errors = cross_validate(samples, x, sign)

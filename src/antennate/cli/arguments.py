@@ -18,7 +18,7 @@ from antennate.cli.help import Command, long_page, short_page
 from antennate.cli.options import Option, fields_of, flag_of, option, options_of
 from antennate.errors import ConfigError
 from antennate.messages import command_words, nearest, shortened, shown
-from antennate.params.base import Config, Params, changes, put_over, read_file
+from antennate.params.base import Config, Params, changes, put_over, read_file, stated
 from antennate.params.faults import describe, group_of
 
 
@@ -177,13 +177,11 @@ def _filled(model: type[_Model], base: Mapping[str, Any], values: Values) -> _Mo
 
 
 def _is_whole(base: Any, path: tuple[str, ...], table: Mapping[str, Any]) -> bool:
-    """Whether nested tables hold, at a path, every key that a table has."""
+    """Whether nested tables hold, at a path, every plain value that a table has."""
     for part in path:
         base = base.get(part) if isinstance(base, dict) else None
-    return isinstance(base, dict) and all(
-        key in base and (not isinstance(value, dict) or _is_whole(base, (key,), value))
-        for key, value in table.items()
-    )
+    plain = {key for key, value in table.items() if not isinstance(value, dict)}
+    return isinstance(base, dict) and plain <= base.keys()
 
 
 def _table(model: Any, path: tuple[str, ...], value: Any) -> dict[str, Any] | None:
@@ -191,7 +189,7 @@ def _table(model: Any, path: tuple[str, ...], value: Any) -> dict[str, Any] | No
     kind: Any = model
     for part in path:
         kind = group_of(fields_of(kind)[part].annotation)
-    return None if kind is None else kind.named(value).model_dump()
+    return None if kind is None else stated(kind.named(value))
 
 
 def _merged(base: Mapping[str, Any], values: Values) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from antennate.cli.results import ResultOptions, folder_for
 from antennate.cli.robot import USUAL, PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.terminal import console, stop_signals, write_result
 from antennate.errors import ConfigError
-from antennate.hardware.config import DoctorConfig, RobotFile
+from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
@@ -53,7 +53,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a change did not succeed.
     """
-    config, options = parse_robot("doctor", DESCRIPTION, RobotFile.for_doctor, argv, DoctorOptions)
+    config, options = parse_robot("doctor", DESCRIPTION, DoctorConfig, argv, DoctorOptions)
     if not (options.esp32 or options.bus):
         raise ConfigError(
             f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(options)}"

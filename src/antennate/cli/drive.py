@@ -22,7 +22,7 @@ from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.control.registry import BUILT_IN
 from antennate.errors import BadInputError, ConfigError, LogError, OutputError
-from antennate.hardware.config import DriveConfig, RobotFile, TeleopConfig
+from antennate.hardware.config import DriveConfig, TeleopConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import Operator, drive
 from antennate.hardware.driving.report import MANY, Recent
@@ -89,7 +89,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
     """
-    config, options = parse_robot("drive", DESCRIPTION, RobotFile.for_drive, argv, DriveOptions)
+    config, options = parse_robot("drive", DESCRIPTION, DriveConfig, argv, DriveOptions)
     require_antennae(config.robot, "drive")
     return _walk(VIEW, config, options, argv)
 
@@ -285,9 +285,7 @@ def teleop(argv: Sequence[str]) -> int:
         AntennateError: A port, a servo or the board is not what is needed, or no key can come;
             nothing moved then.
     """
-    config, options = parse_robot(
-        "teleop", TELEOP_DESCRIPTION, RobotFile.for_teleop, argv, TeleopOptions
-    )
+    config, options = parse_robot("teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions)
     if config.hold_to_run:
         raise ConfigError(
             "--hold-to-run: expected none with teleop, which stands without a key, found it"

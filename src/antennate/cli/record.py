@@ -21,7 +21,7 @@ from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.terminal import StatusLine, stop_signals
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.hardware.config import RobotFile
+from antennate.hardware.config import RecordConfig, RobotFile
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.clock import Timed
@@ -54,7 +54,9 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or the board is silent.
     """
-    params, options = parse_robot("record", DESCRIPTION, RobotFile.for_record, argv, RecordOptions)
+    params, options = parse_robot(
+        "record", DESCRIPTION, RecordConfig, argv, RecordOptions, take=RobotFile.for_record
+    )
     if not options.esp32:
         raise ConfigError(f"--esp32: expected a serial port, found none{at_hand(options)}")
     if options.out is None:

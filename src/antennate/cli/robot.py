@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic.dataclasses import dataclass
 
@@ -23,13 +23,15 @@ from antennate.dxl.model import EXTENDED_MODE
 from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.check import same
+from antennate.hardware.joints import unmeasured
 from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
 from antennate.params.base import Config, Params, read_file
+from antennate.params.hardware import ZerosParams
 from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
-from antennate.studies.measures import Measure, Table
+from antennate.studies.measures import NONE, Measure, Table
 from antennate.studies.report import View
 
 USUAL = Path("robot.toml")
@@ -88,24 +90,26 @@ def usual_file(options: RobotFileOptions) -> Path | None:
 def parse_robot(
     command: str,
     description: str,
-    take: Callable[[RobotFile], Config],
+    model: type[Config],
     argv: Sequence[str],
     options: type[Chosen],
     file_of: Callable[[Chosen], Path | None] = usual_file,
     without: Sequence[str] = (),
     named: type[Config] | None = None,
+    take: Callable[[RobotFile], Config] | None = None,
 ) -> tuple[Config, Chosen]:
     """Read the words of a command that talks to a robot.
 
     Args:
         command: Its name.
         description: What it does.
-        take: What it takes of a robot's file.
+        model: Its configuration.
         argv: Its words.
         options: Its other options; ports that no flag names are those of the file.
         file_of: Which file is read.
         without: Fields of the other options that this command has not.
         named: What the file of --config holds, if it is no robot's file.
+        take: What it takes of a robot's file, if not all that both have.
 
     Raises:
         ConfigError: A flag, the file or a value cannot be used.
@@ -118,9 +122,8 @@ def parse_robot(
         if named is not None and path is not USUAL:
             return read_file(path, named)
         robot = read_file(path, RobotFile)
-        return take(robot)
+        return take(robot) if take else robot.part(model)
 
-    model = type(take(robot))
     config, chosen = parse(command, description, model, argv, options, read, without, file_of)
     ports = {
         name: getattr(robot.ports, name)
@@ -133,7 +136,7 @@ def parse_robot(
 def parse_writer(
     command: str,
     description: str,
-    take: Callable[[RobotFile], Config],
+    model: type[Config],
     argv: Sequence[str],
     options: type[Chosen],
     may_make: bool = False,
@@ -157,7 +160,7 @@ def parse_writer(
         return path
 
     without = ["no_config"]
-    config, chosen = parse_robot(command, description, take, argv, options, file_of, without)
+    config, chosen = parse_robot(command, description, model, argv, options, file_of, without)
     return config, chosen, chosen.config or USUAL
 
 
@@ -242,7 +245,10 @@ _RAIL = (
 class DescribedRobot(Params):
     """The robot that is described."""
 
+    unread: ClassVar[tuple[str, ...]] = ("zeros.measured",)
+    shared: ClassVar[bool] = True
     robot: RobotSpec = RobotSpec()
+    zeros: ZerosParams = ZerosParams()
 
 
 _MJCF = ("--export mjcf",)
@@ -269,11 +275,7 @@ def command(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: The robot or the folder cannot be used.
     """
-
-    def take(file: RobotFile) -> DescribedRobot:
-        return DescribedRobot(robot=file.robot)
-
-    config, options = parse_robot("robot", DESCRIPTION, take, argv, Options)
+    config, options = parse_robot("robot", DESCRIPTION, DescribedRobot, argv, Options)
     robot = config.robot
     files, result = None, {}
     if options.export is not None:
@@ -282,7 +284,7 @@ def command(argv: Sequence[str]) -> int:
     with folder_for(VIEW, options, config, argv) as folder:
         folder.without_trials()
         if files is None:
-            files, result = _description(robot)
+            files, result = _description(robot, config.zeros)
             from antennate.robots.wiring import wiring  # slow to import
 
             folder.write_figures({"wiring": wiring(robot)})
@@ -293,27 +295,29 @@ def command(argv: Sequence[str]) -> int:
     return OK
 
 
-def _description(robot: RobotSpec) -> tuple[dict[str, str], dict[str, Any]]:
+def _description(robot: RobotSpec, zeros: ZerosParams) -> tuple[dict[str, str], dict[str, Any]]:
     """The bill as a file, and the result."""
     parts = [asdict(part) for part in bill(robot)]
     result = {
         "schema": 1,
         "command": "robot",
-        "joints": dict(_joints(robot)),
+        "joints": dict(_joints(robot, zeros)),
         "supply": asdict(supply(robot)),
         "bom": parts,
     }
     return {"bom.csv": to_csv(parts)}, result
 
 
-def _joints(robot: RobotSpec) -> Iterator[tuple[str, dict[str, Any]]]:
-    servos, modes = servos_of(robot), robot.modes
-    for name, number, servo, zero, direction in zip(
-        robot.joint_names, robot.ids, servos, robot.zeros, robot.directions, strict=True
+def _joints(robot: RobotSpec, zeros: ZerosParams) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What is known of each joint; a zero or direction that is not measured is None."""
+    lists = {"zero": robot.zeros, "direction": robot.directions}
+    lacking = {what: unmeasured(robot, zeros, [f"{what}s"]) for what in lists}
+    for at, (name, number, servo) in enumerate(
+        zip(robot.joint_names, robot.ids, servos_of(robot), strict=True)
     ):
-        mode = "extended position" if modes[number] == EXTENDED_MODE else "position"
-        row = {"id": number, "servo": servo.product, "mode": mode, "zero": zero}
-        yield name, row | {"direction": direction}
+        mode = "extended position" if robot.modes[number] == EXTENDED_MODE else "position"
+        known = {w: None if name in lacking[w] else values[at] for w, values in lists.items()}
+        yield name, {"id": number, "servo": servo.product, "mode": mode, **known}
 
 
 def _supply(result: Mapping[str, Any]) -> Supply:
@@ -332,8 +336,13 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"A plug of a servo's cable carries at most 3 A: feed the chain for each {power.per_feed} "
         f"servos, at {power.feeds} places."
     )
-    rows = [(name, [str(row[key]) for key in _COLUMNS]) for name, row in joints.items()]
-    return Table("Joints", _COLUMNS, rows), Table.of("Supply", rails, _RAIL, note)
+    rows = [
+        (name, [NONE if row[key] is None else str(row[key]) for key in _COLUMNS])
+        for name, row in joints.items()
+    ]
+    lack = any(NONE in cells for _, cells in rows)
+    cure = f"{NONE} is not measured; `{typed('zero')}` measures it." if lack else ""
+    return Table("Joints", _COLUMNS, rows, cure), Table.of("Supply", rails, _RAIL, note)
 
 
 def _sentence(result: Mapping[str, Any]) -> str:

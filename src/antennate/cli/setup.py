@@ -18,7 +18,7 @@ from antennate.cli.terminal import StatusLine, stop_signals, today, write
 from antennate.dxl.bus import Bus
 from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
-from antennate.hardware.config import JogConfig, RobotFile, SetupConfig, ZeroConfig
+from antennate.hardware.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.connect import require_servos
@@ -77,7 +77,7 @@ def command(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used, or no answer can come.
     """
     config, options, path = parse_writer(
-        "setup", DESCRIPTION, RobotFile.for_setup, argv, SetupOptions, may_make=True
+        "setup", DESCRIPTION, SetupConfig, argv, SetupOptions, may_make=True
     )
     if options.among and options.bus and options.esp32:
         raise ConfigError(
@@ -201,9 +201,7 @@ def zero(argv: Sequence[str]) -> int:
         AntennateError: Something given cannot be used, the servos are not fit, or no answer can
             come; nothing was written then.
     """
-    config, options, path = parse_writer(
-        "zero", ZERO_DESCRIPTION, RobotFile.for_zero, argv, ZeroOptions
-    )
+    config, options, path = parse_writer("zero", ZERO_DESCRIPTION, ZeroConfig, argv, ZeroOptions)
     require_bus(options.bus)
     person = TerminalPerson()
     try:
@@ -272,7 +270,7 @@ def jog(argv: Sequence[str]) -> int:
     Raises:
         AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
     """
-    config, options = parse_robot("jog", JOG_DESCRIPTION, RobotFile.for_jog, argv, JogOptions)
+    config, options = parse_robot("jog", JOG_DESCRIPTION, JogConfig, argv, JogOptions)
     names = config.robot.joint_names
     if options.joint:
         _require_joint("--joint: expected a joint", options.joint, config.robot)

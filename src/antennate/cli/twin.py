@@ -149,7 +149,7 @@ def command(argv: Sequence[str]) -> int:
         return places.config if places.servos else usual_file(places)  # servos have no robot
 
     config, places = parse_robot(
-        "twin", DESCRIPTION, take, argv, Places, file_of=file_of, named=TwinConfig
+        "twin", DESCRIPTION, TwinConfig, argv, Places, file_of, named=TwinConfig, take=take
     )
     orders = None if places.orders is None else Orders(str(places.orders), _say)
     if not places.servos:

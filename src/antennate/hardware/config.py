@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 from pydantic import field_validator, model_validator
 
@@ -22,7 +22,7 @@ from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.hardware.safety import deadlines
 from antennate.messages import shown
-from antennate.params.base import Params, number, paths_of
+from antennate.params.base import Config, Params, number, paths_of
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.hardware import (
     DeadManParams,
@@ -302,9 +302,6 @@ class TeleopConfig(DriveConfig):
         return TELEOP
 
 
-_Config = TypeVar("_Config", bound=RobotConfig)
-
-
 class RobotFile(DriveConfig):
     """What robot.toml may hold: what `drive` takes, and tables for other commands."""
 
@@ -315,33 +312,10 @@ class RobotFile(DriveConfig):
     jog: JogParams = JogParams()
     teleop: TeleopParams = TeleopParams()
 
-    def for_drive(self) -> DriveConfig:
-        """What `drive` takes: all but the tables of others."""
-        return self._part(DriveConfig)
-
-    def for_teleop(self) -> TeleopConfig:
-        """What `drive teleop` takes: what `drive` takes, and its own table."""
-        return self._part(TeleopConfig)
-
-    def for_doctor(self) -> DoctorConfig:
-        """What `antennate doctor` takes: the robot, and its own table."""
-        return self._part(DoctorConfig)
-
     def for_record(self) -> RecordConfig:
         """What `antennate record` takes: its own table, and the network."""
         return RecordConfig(**dict(self.record), network=self.network)
 
-    def for_setup(self) -> SetupConfig:
-        """What `antennate setup` takes: the robot, and its own table."""
-        return SetupConfig(robot=self.robot, zeros=self.zeros, setup=self.setup)
-
-    def for_zero(self) -> ZeroConfig:
-        """What `antennate setup zero` takes: the same."""
-        return ZeroConfig(robot=self.robot, zeros=self.zeros, setup=self.setup)
-
-    def for_jog(self) -> JogConfig:
-        """What `antennate setup jog` takes: the robot, and its own table."""
-        return JogConfig(robot=self.robot, zeros=self.zeros, jog=self.jog)
-
-    def _part(self, model: type[_Config]) -> _Config:
+    def part(self, model: type[Config]) -> Config:
+        """The configuration of one command: what the file holds of it."""
         return model(**{name: getattr(self, name) for name in model.model_fields})

@@ -10,7 +10,7 @@ legs are in extended mode, where position limits do not act.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -125,9 +125,11 @@ def _position_limits(robot: RobotSpec) -> tuple[dict[int, Setting], dict[int, Se
     return low, high
 
 
-def unmeasured(robot: RobotSpec, zeros: ZerosParams) -> tuple[str, ...]:
-    """Names of the joints whose zero or direction was neither measured nor stated."""
-    return tuple(dict.fromkeys((*robot.unstated("zeros", "directions"), *zeros.missing)))
+def unmeasured(
+    robot: RobotSpec, zeros: ZerosParams, lists: Sequence[str] = ("zeros", "directions")
+) -> tuple[str, ...]:
+    """Names of the joints of which one of these lists was neither measured nor stated."""
+    return tuple(dict.fromkeys((*robot.unstated(*lists), *zeros.missing)))
 
 
 def zeros_lack(robot: RobotSpec, zeros: ZerosParams) -> str:

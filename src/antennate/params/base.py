@@ -300,10 +300,18 @@ def with_bases(table: Mapping[str, Any], model: type[BaseModel], folder: Path) -
         if isinstance(value, dict):
             value = with_bases(cast("dict[str, Any]", value), group, folder)
             if named is not None and isinstance(base := value.get("base"), str):
-                known = named(base, folder).model_dump(mode="json")
+                known = stated(named(base, folder))
                 value = put_over(known, {k: v for k, v in value.items() if k != "base"})
             result[name] = value
     return result
+
+
+def stated(group: BaseModel) -> dict[str, Any]:
+    """Every value of a group that is named, and of the groups in it what its file states."""
+    return {
+        name: value.model_dump(exclude_unset=True) if isinstance(value, BaseModel) else value
+        for name, value in group
+    }
 
 
 def put_over(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:

@@ -329,16 +329,18 @@ def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
     return late if t >= limit else None
 
 
-def require_times(time: float, limit: float) -> None:
-    """Check that a row can have this time and this time limit [s].
+def require_times(time: float, limit: float, close: float = 0.0) -> None:
+    """Check that a row can have this time and this time limit [s], but for an error of `close` [s].
 
     Raises:
         ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.
     """
     if not 0.0 < limit < math.inf:
-        raise ValueError(f"limit_s: expected a finite number above 0, found {limit:g}")
-    if not 0.0 <= time <= limit:
-        raise ValueError(f"time_s: expected a number of 0 to limit_s, {limit:g}, found {time:g}")
+        raise ValueError(f"limit_s: expected a finite number above 0, found {limit}")
+    if not 0.0 <= time <= limit + close:
+        raise ValueError(
+            f"time_s: expected a finite number of 0 to limit_s, {limit:g}, found {time}"
+        )
 
 
 def has_fallen(links: Floats, ground: float) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import fields
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,14 @@ from pydantic import TypeAdapter, ValidationError
 from antennate.control.registry import CONTROLLERS
 from antennate.csv_files import MISSING, csv_rows, wrong_count
 from antennate.errors import ConfigError
-from antennate.experiments.compete.config import LARGEST_TABLE, require_free
+from antennate.experiments.compete.config import LARGEST_TABLE, require_unreserved
 from antennate.experiments.compete.episodes import Episode, restricted
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.files import read_limited
 from antennate.messages import nearest, shown
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
+from antennate.sim.trial import require_times
 from antennate.studies.statistics import sign_flips, signed_rank
 from antennate.types import Floats
 
@@ -100,7 +101,7 @@ def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Epi
     none = {name: "" for name in _WORDS if line.get(name, "").lower() in MISSING}
     try:
         row = _ROW.validate_python(line | none)
-        require_free(row.seed)
+        require_unreserved(row.seed)
         _require_sound(row, limited="limit_s" in line)
         if row.scene not in scenes:
             tunnel_config(row.scene, row.controller, row.seed)
@@ -124,12 +125,11 @@ def _require_sound(row: Episode, limited: bool) -> None:
         ValueError: A value is none that an episode can end with.
     """
     CONTROLLERS.check(row.controller)
+    require_times(row.time_s, row.limit_s, CLOSE)
     limit, free = row.limit_s, row.outcome == "success" or not limited
     rules = (
         ("seed", 0 <= row.seed <= LARGEST_SEED, f"0 to {LARGEST_SEED}"),
         ("trial", 0 <= row.trial <= LARGEST_SEED, f"0 to {LARGEST_SEED}"),
-        ("limit_s", 0 < limit < inf, "a finite number above 0"),
-        ("time_s", 0 <= row.time_s <= limit + CLOSE, f"a finite number of 0 to limit_s, {limit:g}"),
         ("time_s", free or row.time_s >= limit - CLOSE, f"limit_s, {limit:g}, as it is no success"),
         ("progress_m", isfinite(row.progress_m), "a finite number"),
         ("overturned", row.overturned or row.outcome != "overturned", "True, as it ended so"),

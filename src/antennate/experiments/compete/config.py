@@ -105,7 +105,7 @@ class CompeteConfig(Params):
     @field_validator("seed")
     @classmethod
     def _free_seed(cls, seed: int) -> int:
-        return require_free(seed)
+        return require_unreserved(seed)
 
     @field_validator("controllers")
     @classmethod
@@ -126,7 +126,7 @@ class CompeteConfig(Params):
         return self
 
 
-def require_free(seed: int) -> int:
+def require_unreserved(seed: int) -> int:
     """A seed that is not reserved.
 
     Raises:

@@ -4,65 +4,64 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Finding, Grade, Row, ids_text
 from antennate.hardware.joints import unmeasured
 from antennate.messages import typed
-from antennate.params.base import changes
 from antennate.params.control import CurveParams
-
-_SUPPLY = ("limits.supply_warn", "limits.supply_hold", "limits.supply_off")
 
 
 def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
     """A row for each number that would be assumed, of the ports that are looked at."""
-    robot = config.robot
+    robot, control = config.robot, config.control
+    ids = [i for n, group, _ in robot.groups if not group.ids for i in robot.ids[robot.places(n)]]
+    limits = (
+        f"{name} {math.degrees(robot.limits[robot.places(name).start]):.0f} deg"
+        for name, group, count in robot.groups
+        if count and math.isfinite(group.largest) and _unstated(group, "limit")
+    )
+    supply = _unstated(config.limits, "supply_warn", "supply_hold", "supply_off")
+    left, right = _curve(control.conditioning), control.conditioning_right
+    other = _curve(right) if right else left or "that of the left one"
+    axes = ", ".join(["x", "y", *_unstated(robot.imu, "gyro_step", "accel_step")])
+    curve = f"`{typed('record')}`, `{typed('calibrate')}`, then calibration"
+    sided = esp32 and robot.antenna_count
+    table: tuple[tuple[Any, str, Any, Grade, str], ...] = (
+        (bus, "ids", ids and f"{ids_text(ids)} in the order of the joints", "warn",
+         f"`{typed('setup')}` and `{typed('zero')}` write them"),
+        (bus, "joint limits", ", ".join(limits), "note", "set robot.*.limit to where they stop"),
+        (bus, "supply limits", supply and f"{', '.join(supply)} V, of three lithium cells", "note",
+         "set limits.supply_warn, supply_hold and supply_off to what your supply needs"),
+        (sided, "left calibration", left, "warn", f"{curve} = FILE"),
+        (sided, "right calibration", other, "warn" if right or left else "note",
+         f"{curve}_right = FILE"),
+        (esp32 and robot.has_imu, "inertial axes", f"{axes}; at rest only z is seen", "note",
+         "see IMU_AXES in firmware/config.py, robot.imu.gyro_step and accel_step"),
+    )  # fmt: skip
     if bus:
         yield _zeros(config)
-        ids = f"{ids_text(robot.ids)} in the order of the joints" if robot.unstated("ids") else ""
-        yield _row("ids", ids, f"`{typed('setup')}` and `{typed('zero')}` write them", "warn")
-        cure = "set robot.*.limit to where these joints meet their stops"
-        yield _row("joint limits", _limits(config), cure)
-        levels = ", ".join(f"{getattr(config.limits, name.split('.')[1]):g}" for name in _SUPPLY)
-        cells = "" if any(changes(config, _SUPPLY)) else f"three lithium cells, {levels} V"
-        yield _row("supply limits", cells, f"set {', '.join(_SUPPLY)} to what your supply needs")
-    if esp32 and robot.antenna_count:
-        yield from _curves(config)
-    if esp32 and robot.has_imu:
-        cure = "see IMU_AXES in firmware/config.py, robot.imu.gyro_step and accel_step"
-        yield _row("inertial axes", "x, y and steps; at rest only z is seen", cure)
-
-
-def _row(check: str, assumed: str, cure: str, grade: Grade = "note") -> Row:
-    """What is assumed of a number, nothing if its file has it."""
-    finding = Finding(f"assumed: {assumed}", grade, cure) if assumed else Finding("in its file")
-    return finding.row("robot", check, "in its file")
+    for check, lack, grade, cure in (row[1:] for row in table if row[0]):
+        finding = Finding(f"assumed: {lack}", grade, cure) if lack else Finding("in its file")
+        yield finding.row("robot", check, "in its file")
 
 
 def _zeros(config: DoctorConfig) -> Row:
     names, date = unmeasured(config.robot, config.zeros), config.zeros.measured
-    finding = Finding(f"measured on {date}" if date else "in its file, without a date")
-    if names:
-        some = f": {', '.join(names)}" if len(names) < len(config.robot.ids) else ""
-        finding = Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`")
-    return finding.row("robot", "zeros and directions", "measured")
+    some = f": {', '.join(names)}" if len(names) < len(config.robot.ids) else ""
+    known = Finding(f"measured on {date}" if date else "in its file, without a date")
+    lack = Finding(f"not measured{some}", "bad", f"run `{typed('zero')}`")
+    return (lack if names else known).row("robot", "zeros and directions", "measured")
 
 
-def _limits(config: DoctorConfig) -> str:
-    """Limits that no file has, in words."""
-    robot = config.robot
-    return ", ".join(
-        f"{name} {math.degrees(robot.limits[robot.places(name).start]):.0f} deg"
-        for name, group, count in robot.groups
-        if count and math.isfinite(group.largest) and not any(changes(group, ["limit"]))
-    )
+def _unstated(group: Any, *names: str) -> list[str]:
+    """Which of these parameters no file states, with the values that they have then."""
+    return [f"{n} {getattr(group, n)}" for n in names if n not in group.model_fields_set]
 
 
-def _curves(config: DoctorConfig) -> Iterator[Row]:
-    control, cure = config.control, f"`{typed('record')}`, `{typed('calibrate')}`, then calibration"
-    own = any(changes(control.conditioning, CurveParams.model_fields))
-    left = "" if own else "that of a simulated antenna"
-    yield _row("left calibration", left, f"{cure} = FILE", "warn")
-    right = "" if control.conditioning_right else left or "that of the left one"
-    yield _row("right calibration", right, f"{cure}_right = FILE", "warn" if left else "note")
+def _curve(curve: CurveParams) -> str:
+    """Numbers of a curve that no file states, in words."""
+    read = ("polarity", "counts_low", "counts_high", "midpoint", "slope")[: 3 if curve.knots else 5]
+    lack = _unstated(curve, *read)
+    return f"{'that' if len(lack) == 5 else ', '.join(lack)} of a simulated antenna" if lack else ""

@@ -88,8 +88,6 @@ def connect(
 ) -> Iterator[Session]:
     """Open both ports, identify board and servos, and close the ports afterwards.
 
-    Without measured zeros and directions the session has no torque.
-
     Args:
         config: The robot.
         esp32: Address of the antenna board, as `finder` takes it.
@@ -112,9 +110,7 @@ def connect(
             )
             for flag, address, baud in ports
         )
-        session = prepare(config, board, servos, HostClock(), bus, controller)
-        session.unfit = zeros_lack(config.robot, config.zeros)
-        yield session
+        yield prepare(config, board, servos, HostClock(), bus, controller)
 
 
 def prepare(
@@ -127,7 +123,7 @@ def prepare(
 ) -> Session:
     """A session on two open ports, once board and servos are identified.
 
-    `path` is the name of the bus for error messages.
+    Without measured zeros and directions it gets no torque. `path` names the bus in error messages.
     """
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
@@ -137,7 +133,7 @@ def prepare(
     master = Bus(bus, Timing(config.robot.baud, latest=ANSWER), clock=clock.now)
     require_servos(master, config.robot)
     board.count_anew(clock.now())
-    return Session(
+    session = Session(
         board=board,
         actuators=DynamixelActuators(
             master, Joints(config.robot), clock.now, config.limits.following
@@ -155,6 +151,8 @@ def prepare(
         ),
         limits=config.limits,
     )
+    session.unfit = zeros_lack(config.robot, config.zeros)
+    return session
 
 
 def await_board(

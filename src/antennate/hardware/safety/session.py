@@ -75,7 +75,7 @@ class Session:
         approaching: Whether the joints are on their way to the first command since torque came on.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
         unfit: What of the robot's own description speaks against torque, in words; set by
-            `connect`, empty if nothing does.
+            `prepare`, empty if nothing does.
     """
 
     def __init__(
