@@ -1,11 +1,11 @@
 """Weighs settings by what the paper says: `python docs/science/published.py PART FOLDER...`.
 
-Parts, over folders of `antennate study studies/published_tunnel.toml` or of later stages:
-`weigh` fits the outcome over the unknowns, and writes what is left of their ranges to
-docs/science/published_tunnel.json and its figure. `hidden` prints a study of three hidden settings;
+Parts, over folders of `antennate study studies/published_GROUP.toml` or of later stages: `weigh`
+fits the outcome over the unknowns, and writes what is left of their ranges to
+docs/science/published_GROUP.json and a figure. `hidden` prints a study of three hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
-prints a study of settings drawn from what is left. Needs `uv run --with scikit-learn`.
-The likelihoods are those of docs/science/published.md.
+prints a study of settings drawn from what is left. `rows` keeps the rows of folders as one table.
+Needs `uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import argparse
 import csv
 import json
 import math
+import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,15 +26,10 @@ from numpy.typing import NDArray
 from scipy.stats import binom, norm
 
 Floats = NDArray[np.float64]
-ROOT = Path(__file__).parents[2]
-STUDY = ROOT / "studies" / "published_tunnel.toml"
-RESULT = Path(__file__).with_name("published_tunnel.json")
-CROSSED = {"open": (6, 10), "paper": (10, 10)}
-"""Robots that crossed, of how many."""
-SPEED = {"open": 0.04, "paper": 0.12}
-"""Mean speed of those that crossed [m/s]."""
+Row = Mapping[str, str]
+HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 SPREAD = 0.15
-"""Standard deviation of the logarithm of such a mean beside that of chance."""
+"""Standard deviation of the logarithm of a mean speed beside that of chance."""
 DRAWS = 100_000
 """Settings that are weighed."""
 FITS = 12
@@ -43,6 +39,142 @@ NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
 HIDDEN = 20261129
 """Seed of hidden settings."""
+
+
+@dataclass(frozen=True)
+class Count:
+    """So many of so many did."""
+
+    did: int
+    of: int
+
+    def likelihood(self, chance: Floats, spread: float) -> Floats:
+        """Of chances."""
+        return binom.pmf(self.did, self.of, chance)
+
+    def again(self, values: Floats) -> Count:
+        """The same kind of statement on other trials."""
+        return Count(int(values.sum()), len(values))
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """That many of so many did, or, not `held`, fewer did."""
+
+    did: int
+    of: int
+    held: bool = True
+
+    def likelihood(self, chance: Floats, spread: float) -> Floats:
+        """Of chances."""
+        p = binom.sf(self.did - 1, self.of, chance)
+        return p if self.held else 1.0 - p
+
+    def again(self, values: Floats) -> AtLeast:
+        """The same kind of statement on other trials."""
+        return AtLeast(self.did, self.of, bool(values.mean() >= self.did / self.of))
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean over so many, whose logarithm the model tells."""
+
+    value: float
+    of: int
+
+    def likelihood(self, logarithm: Floats, spread: float) -> Floats:
+        """Of logarithms of means, trials about which have a standard deviation."""
+        sd = math.hypot(spread / math.sqrt(self.of), SPREAD)
+        return norm.pdf(math.log(self.value) - logarithm, scale=sd)
+
+    def again(self, values: Floats) -> Mean:
+        """The same kind of statement on other trials."""
+        return Mean(math.exp(float(values.mean())), len(values))
+
+
+Statement = Count | AtLeast | Mean
+
+
+@dataclass(frozen=True)
+class Group:
+    """Claims that are weighed together.
+
+    Attributes:
+        who: Column of who a row is of; rows of one point and trial belong together.
+        all: Who has to be there.
+        outcomes: What the paper speaks of, from the rows of all; NaN where a trial does not tell.
+        paper: What it says of each.
+    """
+
+    who: str
+    all: tuple[str, ...]
+    outcomes: Mapping[str, Callable[[Mapping[str, Row]], float]]
+    paper: Mapping[str, Statement]
+
+
+def _crossed(name: str) -> Callable[[Mapping[str, Row]], float]:
+    return lambda rows: float(rows[name]["outcome"] == "success")
+
+
+def _speed(name: str) -> Callable[[Mapping[str, Row]], float]:
+    def logarithm(rows: Mapping[str, Row]) -> float:
+        row = rows[name]
+        speed = float(row["progress_m"]) / float(row["time_s"])
+        return math.log(speed) if row["outcome"] == "success" else math.nan
+
+    return logarithm
+
+
+def _nearer(rows: Mapping[str, Row]) -> float:
+    both = all(row["outcome"] == "success" for row in rows.values())
+    off = [float(rows[name]["offset_m"]) if both else math.nan for name in ("paper", "open")]
+    return float(off[0] < off[1]) if both else math.nan
+
+
+def _ended(name: str, outcome: str) -> Callable[[Mapping[str, Row]], float]:
+    return lambda rows: float(rows[name]["outcome"] == outcome)
+
+
+def _below(name: str, degrees: float) -> Callable[[Mapping[str, Row]], float]:
+    return lambda rows: float(float(rows[name]["hinge_max_deg"]) < degrees)
+
+
+GROUPS = {
+    "tunnel": Group(
+        "controller",
+        ("open", "paper"),
+        {
+            "open crosses": _crossed("open"),
+            "paper crosses": _crossed("paper"),
+            "speed of open": _speed("open"),
+            "speed of paper": _speed("paper"),
+            "centred": _nearer,
+        },
+        {
+            "open crosses": Count(6, 10),
+            "paper crosses": Count(10, 10),
+            "speed of open": Mean(0.04, 6),
+            "speed of paper": Mean(0.12, 10),
+            "centred": AtLeast(1, 1),
+        },
+    ),
+    "wall": Group(
+        "profile",
+        ("stiff", "compliant", "descending"),
+        {
+            "stiff jams": _ended("stiff", "jam"),
+            "soft slips": _ended("compliant", "slip"),
+            "descending passes": _ended("descending", "success"),
+            "springs below 30 deg": _below("descending", 30.0),
+        },
+        {
+            "stiff jams": AtLeast(11, 20),
+            "soft slips": AtLeast(11, 20),
+            "descending passes": AtLeast(17, 20),
+            "springs below 30 deg": AtLeast(20, 20),
+        },
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -67,7 +199,9 @@ class Unknowns:
         return [
             f"{name}[{k}]" if count > 1 else name
             for name, axis in self.axes.items()
-            for count in [len(_entries(_choices(axis)[0])) if isinstance(axis, list) else 1]
+            for count in [
+                len(axis[0]) if isinstance(axis, list) and isinstance(axis[0], list) else 1
+            ]
             for k in range(count)
         ]
 
@@ -75,8 +209,10 @@ class Unknowns:
         """A setting as numbers from 0 to 1, one a name."""
         found: list[float] = []
         for name, axis in self.axes.items():
-            if isinstance(axis, list):
-                columns = np.array([_entries(choice) for choice in _choices(axis)], float)
+            if isinstance(axis, list) and isinstance(axis[0], str):
+                found.append(axis.index(values[name]) / (len(axis) - 1))
+            elif isinstance(axis, list):
+                columns = np.array([_entries(choice) for choice in axis], float)
                 low, high = columns.min(axis=0), columns.max(axis=0)
                 found += [*((np.array(_entries(values[name])) - low) / (high - low))]
             elif axis.get("log"):
@@ -104,68 +240,60 @@ def _share(value: float, low: float, high: float) -> float:
     return (value - low) / (high - low)
 
 
-def _choices(axis: Any) -> list[Any]:
-    return list(axis)
-
-
 def _entries(value: Any) -> list[float]:
     return [float(v) for v in value] if isinstance(value, list) else [float(value)]
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Trials of both robots.
+    """Trials of all of a group in one setting and one scene.
 
     Attributes:
-        x: The setting of each pair of trials as numbers from 0 to 1, shape (n, unknowns).
-        crossed: By robot whether it crossed, shape (n,).
-        speed: By robot the logarithm of its mean speed where it crossed, else NaN.
-        nearer: 1 where the one with feedback was nearer to the middle, 0 where not; NaN where not
-            both crossed.
-        groups: Which point of a study each is of, shape (n,).
+        x: The setting of each as numbers from 0 to 1, shape (n, unknowns).
+        outcomes: By name what came out, shape (n,); NaN where a trial does not tell.
+        points: Which point of a study each is of, shape (n,).
     """
 
     x: Floats
-    crossed: dict[str, Floats]
-    speed: dict[str, Floats]
-    nearer: Floats
-    groups: NDArray[np.int64]
+    outcomes: dict[str, Floats]
+    points: NDArray[np.int64]
 
 
-def read(folders: Sequence[Path], unknowns: Unknowns) -> Rows:
-    """Pairs of trials of one setting and one tunnel.
+def lines(files: Iterable[Path]) -> Iterable[dict[str, str]]:
+    """Rows of tables of studies; points are numbered on from one file to the next."""
+    number = 0
+    for file in files:
+        points: dict[str, int] = {}
+        path = file / "trials.csv" if file.is_dir() else file
+        with path.open(encoding="utf-8", newline="") as table:
+            for row in csv.DictReader(table):
+                place = points.setdefault(row["point"], number + len(points))
+                yield row | {"point": str(place)}
+        number += len(points)
+
+
+def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
+    """Trials that ended, of all of a group.
 
     Raises:
         SystemExit: There are none.
     """
-    pairs: dict[tuple[int, str, str], dict[str, dict[str, str]]] = {}
-    for number, folder in enumerate(folders):
-        with (folder / "trials.csv").open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                if row["status"] == "ok":
-                    key = (number, row["point"], row["trial"])
-                    pairs.setdefault(key, {})[row["controller"]] = row
-    whole = {key: pair for key, pair in pairs.items() if set(SPEED) <= set(pair)}
+    found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
+    for row in lines(files):
+        if row["status"] == "ok":
+            found.setdefault((row["point"], row["trial"]), {})[row[group.who]] = row
+    whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
-        raise SystemExit(f"{folders[0]}: expected trials of {' and '.join(SPEED)}, found none")
-    x, crossed, speed, nearer = [], {n: [] for n in SPEED}, {n: [] for n in SPEED}, []
-    for pair in whole.values():
-        x.append(unknowns.shares(_values(unknowns, pair["open"])))
-        for name in SPEED:
-            row, success = pair[name], pair[name]["outcome"] == "success"
-            crossed[name].append(float(success))
-            way = float(row["progress_m"]) / float(row["time_s"])
-            speed[name].append(math.log(way) if success else math.nan)
-        both = all(pair[name]["outcome"] == "success" for name in SPEED)
-        off = [float(pair[name]["offset_m"] or "nan") for name in ("paper", "open")]
-        nearer.append(float(off[0] < off[1]) if both else math.nan)
-    places = {key[:2]: place for place, key in enumerate(dict.fromkeys(k[:2] for k in whole))}
+        raise SystemExit(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
     return Rows(
-        np.array(x),
-        {name: np.array(v) for name, v in crossed.items()},
-        {name: np.array(v) for name, v in speed.items()},
-        np.array(nearer),
-        np.array([places[key[:2]] for key in whole]),
+        np.array(
+            [unknowns.shares(_values(unknowns, rows[group.all[0]])) for rows in whole.values()]
+        ),
+        {
+            name: np.array([of(rows) for rows in whole.values()])
+            for name, of in group.outcomes.items()
+        },
+        np.array([int(point) for point, _ in whole]),
     )
 
 
@@ -178,6 +306,8 @@ def _values(unknowns: Unknowns, row: Mapping[str, str]) -> dict[str, Any]:
             found[name] = [float(word) for word in text.split()]
         elif text in ("True", "False"):
             found[name] = text == "True"
+        elif isinstance(axis, list) and isinstance(axis[0], str):
+            found[name] = text
         else:
             found[name] = float(text)
     return found
@@ -249,17 +379,17 @@ class Fitted:
         return np.array([fit.predict_proba(x)[:, 1] for fit in self.fits])
 
 
-def choose(x: Floats, y: Floats, groups: NDArray[np.int64], chance: bool) -> Fitted:
+def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fitted:
     """The model of the least loss on points that were left out, fitted to all that are known."""
     from sklearn.model_selection import GroupKFold
 
     known = np.isfinite(y)
-    x, y, groups = x[known], y[known], groups[known]
+    x, y, points = x[known], y[known], points[known]
     losses: dict[str, float] = {}
     kinds = models() if chance else regressions()
     for name, make in kinds.items():
         loss = np.zeros(len(y))
-        for train, test in GroupKFold(FOLDS).split(x, y, groups):
+        for train, test in GroupKFold(FOLDS).split(x, y, points):
             model = make().fit(x[train], y[train].astype(int) if chance else y[train])
             if chance:
                 p = np.clip(model.predict_proba(x[test])[:, -1], 1e-6, 1 - 1e-6)
@@ -280,49 +410,27 @@ def choose(x: Floats, y: Floats, groups: NDArray[np.int64], chance: bool) -> Fit
 
 @dataclass(frozen=True)
 class Outcome:
-    """Models of all that the data speak of."""
+    """Models of all that the paper speaks of in a group."""
 
-    crossed: dict[str, Fitted]
-    speed: dict[str, Fitted]
-    nearer: Fitted
+    models: dict[str, Fitted]
 
     @classmethod
-    def of(cls, rows: Rows) -> Outcome:
+    def of(cls, rows: Rows, group: Group) -> Outcome:
         """Fitted to trials."""
-        x, groups = rows.x, rows.groups
         return cls(
-            {n: choose(x, y, groups, chance=True) for n, y in rows.crossed.items()},
-            {n: choose(x, y, groups, chance=False) for n, y in rows.speed.items()},
-            choose(x, rows.nearer, groups, chance=True),
+            {
+                name: choose(rows.x, y, rows.points, not isinstance(group.paper[name], Mean))
+                for name, y in rows.outcomes.items()
+            }
         )
 
-    def likelihoods(self, x: Floats, data: Data) -> dict[str, Floats]:
+    def likelihoods(self, x: Floats, said: Mapping[str, Statement]) -> dict[str, Floats]:
         """Likelihood of each statement in settings, mean over the fits, shape (n,)."""
-        found = {}
-        for name, model in self.crossed.items():
-            found[f"{name} crosses"] = binom.pmf(*data.crossed[name], model.at(x)).mean(axis=0)
-        for name, model in self.speed.items():
-            count = data.crossed[name][0]
-            if count:
-                sd = math.hypot(model.spread / math.sqrt(count), SPREAD)
-                off = math.log(data.speed[name]) - model.at(x)
-                found[f"speed of {name}"] = norm.pdf(off, scale=sd).mean(axis=0)
-        if data.nearer is not None:
-            p = self.nearer.at(x).mean(axis=0)
-            found["centred"] = p if data.nearer else 1 - p
-        return found
-
-
-@dataclass(frozen=True)
-class Data:
-    """What is known of some robots: how many crossed, how fast, whether nearer to the middle."""
-
-    crossed: Mapping[str, tuple[int, int]]
-    speed: Mapping[str, float]
-    nearer: bool | None
-
-
-PAPER = Data(CROSSED, SPEED, nearer=True)
+        return {
+            name: statement.likelihood(model.at(x), model.spread).mean(axis=0)
+            for name, statement in said.items()
+            for model in [self.models[name]]
+        }
 
 
 def weights_of(likelihoods: Mapping[str, Floats]) -> Floats:
@@ -368,122 +476,133 @@ def prior(unknowns: Unknowns, count: int, seed: int = 1) -> tuple[list[dict[str,
     return settings, np.array([unknowns.shares(setting) for setting in settings])
 
 
-def weigh(folders: Sequence[Path]) -> None:
+def weigh(name: str, files: Sequence[Path]) -> None:
     """Write what the paper's data leave of the ranges."""
-    unknowns = Unknowns.of(STUDY)
-    rows = read(folders, unknowns)
-    outcome = Outcome.of(rows)
+    group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
+    rows = read(files, group, unknowns)
+    outcome = Outcome.of(rows, group)
     _, x = prior(unknowns, DRAWS)
-    likelihoods = outcome.likelihoods(x, PAPER)
+    likelihoods = outcome.likelihoods(x, group.paper)
     weights = weights_of(likelihoods)
-    fitted = {
-        **{f"{name} crosses": model for name, model in outcome.crossed.items()},
-        **{f"speed of {name}": model for name, model in outcome.speed.items()},
-        "centred": outcome.nearer,
-    }
-    best = {name: float(v.max()) for name, v in likelihoods.items()}
     result = {
-        "pairs": len(rows.x),
-        "settings": len(set(rows.groups.tolist())),
-        "crossed": {name: round(float(v.mean()), 3) for name, v in rows.crossed.items()},
-        "speed": {n: round(math.exp(float(np.nanmean(v))), 4) for n, v in rows.speed.items()},
+        "trials": len(rows.x),
+        "settings": len(set(rows.points.tolist())),
+        "mean": {n: round(float(np.nanmean(y)), 3) for n, y in rows.outcomes.items()},
         "models": {
-            name: {"chosen": m.name, "loss": round(m.loss[0], 4), "constant": round(m.loss[1], 4)}
-            for name, m in fitted.items()
+            n: {"chosen": m.name, "loss": round(m.loss[0], 4), "constant": round(m.loss[1], 4)}
+            for n, m in outcome.models.items()
         },
         "effective_draws": round(1.0 / float((weights**2).sum()), 1),
-        "evidence": {name: round(float(v.mean()), 5) for name, v in likelihoods.items()},
+        "evidence": {n: round(float(v.mean()), 5) for n, v in likelihoods.items()},
+        "largest": {n: round(float(v.max()), 4) for n, v in likelihoods.items()},
         "together": float(np.prod(list(likelihoods.values()), axis=0).mean()),
-        "largest": {name: round(v, 4) for name, v in best.items()},
         "there": {
-            name: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
-            for name, m in fitted.items()
+            n: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
+            for n, m in outcome.models.items()
         },
         "left": left_of(unknowns.names, x, weights),
     }
-    RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    for name, found in result["models"].items():
-        print(f"{name}: {found}, likelihood {result['evidence'][name]}, at most {best[name]:.4f}")
+    text = json.dumps(result, indent=1)
+    (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
+    for n, found in result["models"].items():
+        print(f"{n}: {found}, likelihood {result['evidence'][n]}, at most {result['largest'][n]}")
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
     print("in what is left:", result["there"])
-    narrowed = sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])
-    for name, found in narrowed[:12]:
-        print(f"{name:45} {found['narrowed']:6.3f} nats, quantiles {found['quantiles']}")
+    for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
+        print(f"{n:45} {found['narrowed']:6.3f} nats, quantiles {found['quantiles']}")
 
 
-def study_of(settings: Sequence[Mapping[str, Any]], trials: int, seed: int) -> str:
-    """A study file of these settings, each with the same tunnels."""
-    lines = [
-        'experiment = "tunnel"',
+def study_file(name: str) -> Path:
+    """The first stage of a group."""
+    return ROOT / "studies" / f"published_{name}.toml"
+
+
+def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed: int) -> str:
+    """A study file of these settings, each with the same scenes."""
+    first = tomllib.loads(study_file(name).read_text(encoding="utf-8"))
+    text = [
+        f'experiment = "{first["experiment"]}"',
         'plan = "list"',
         f"trials = {trials}",
         "",
         "[settings]",
-        f"controllers = {json.dumps(list(SPEED))}",
+        *(f"{key} = {json.dumps(value)}" for key, value in first["settings"].items()),
         f"seed = {seed}",
         "",
         "[vary]",
-        *(f'"{name}" = {json.dumps([s[name] for s in settings])}' for name in settings[0]),
+        *(f'"{key}" = {json.dumps([s[key] for s in settings])}' for key in settings[0]),
     ]
-    return "\n".join(lines)
+    return "\n".join(text)
 
 
-def following(folders: Sequence[Path], count: int, trials: int, seed: int) -> str:
+def following(name: str, files: Sequence[Path], count: int, trials: int, seed: int) -> str:
     """A study of settings drawn from what is left."""
-    unknowns = Unknowns.of(STUDY)
+    group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     settings, x = prior(unknowns, DRAWS, seed)
-    weights = weights_of(Outcome.of(read(folders, unknowns)).likelihoods(x, PAPER))
-    rng = np.random.default_rng(seed)
-    chosen = rng.choice(DRAWS, size=count, replace=False, p=weights)
-    return study_of([settings[k] for k in chosen], trials, 561000 + seed)
+    outcome = Outcome.of(read(files, group, unknowns), group)
+    weights = weights_of(outcome.likelihoods(x, group.paper))
+    chosen = np.random.default_rng(seed).choice(DRAWS, size=count, replace=False, p=weights)
+    return study_of(name, [settings[k] for k in chosen], trials, 561000 + seed)
 
 
-def recover(folders: Sequence[Path]) -> None:
+def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
-    unknowns = Unknowns.of(STUDY)
-    hidden = read(folders[:1], unknowns)
-    outcome = Outcome.of(read(folders[1:], unknowns))
+    group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
+    hidden = read(files[:1], group, unknowns)
+    outcome = Outcome.of(read(files[1:], group, unknowns), group)
     _, x = prior(unknowns, DRAWS)
     told = inside = 0
-    for place in range(int(hidden.groups.max()) + 1):
-        here = hidden.groups == place
-        truth = hidden.x[here][0]
-        crossed, speed = {}, {}
-        for name in SPEED:
-            won = hidden.crossed[name][here] > 0
-            crossed[name] = int(won.sum()), len(won)
-            if won.any():
-                speed[name] = math.exp(float(hidden.speed[name][here][won].mean()))
-        closer = hidden.nearer[here]
-        known = np.isfinite(closer)
-        nearer = bool(closer[known].mean() > 0.5) if known.any() else None
-        data = Data(crossed, speed, nearer)
-        weights = weights_of(outcome.likelihoods(x, data))
-        print(f"hidden setting {place}: {data}, {1 / float((weights**2).sum()):.0f} draws")
-        for k, (name, found) in enumerate(left_of(unknowns.names, x, weights).items()):
+    for place in sorted(set(hidden.points.tolist())):
+        here = hidden.points == place
+        said = {}
+        for n, y in hidden.outcomes.items():
+            known = y[here][np.isfinite(y[here])]
+            if len(known):
+                said[n] = group.paper[n].again(known)
+        weights = weights_of(outcome.likelihoods(x, said))
+        print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
+        for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
             low, _, high = found["quantiles"]
             if found["narrowed"] > NARROWED:
+                truth = hidden.x[here][0, k]
                 told += 1
-                inside += low <= truth[k] <= high
-                print(f"  {name}: {low} to {high}, hidden {truth[k]:.3f}")
+                inside += low <= truth <= high
+                print(f"  {n}: {low} to {high}, hidden {truth:.3f}")
     print(f"{inside} of {told} unknowns that the data narrow lie within their 90 % interval")
+
+
+def keep(name: str, files: Sequence[Path]) -> None:
+    """Keep the rows of studies as one table, only what is read here."""
+    unknowns, group = Unknowns.of(study_file(name)), GROUPS[name]
+    read_here = ("outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg")
+    columns = ["point", "seed", *unknowns.axes, "trial", group.who, *read_here, "status"]
+    rows = [*lines(files)]
+    columns = [column for column in columns if column in rows[0]]
+    with (HERE / f"published_{name}.csv").open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 def main() -> None:
     """Run one part."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next"))
-    parser.add_argument("folders", nargs="*", type=Path)
+    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next", "rows"))
+    parser.add_argument("group", choices=GROUPS)
+    parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1)
     told = parser.parse_args()
+    name = told.group
+    files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
-        print(study_of(prior(Unknowns.of(STUDY), 3, HIDDEN)[0], 10, HIDDEN % 9000 + 560000))
+        settings = prior(Unknowns.of(study_file(name)), 3, HIDDEN)[0]
+        sys.stdout.write(study_of(name, settings, told.trials, 562129))
     elif told.part == "next":
-        print(following(told.folders, told.count, told.trials, told.seed))
+        sys.stdout.write(following(name, files, told.count, told.trials, told.seed))
     else:
-        {"weigh": weigh, "recover": recover}[told.part](told.folders)
+        {"weigh": weigh, "recover": recover, "rows": keep}[told.part](name, files)
 
 
 if __name__ == "__main__":
