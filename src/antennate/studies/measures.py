@@ -186,11 +186,14 @@ class Interim:
         ]
         ended = sum(counts.total() for counts in self._counts.values())
         tells = len(outcomes) > 1 or any(name != _ANY for name in self._counts)
-        return Table(f"So far, {ended} trials", outcomes, rows) if tells else None
+        words = [_WORDS.get(outcome, outcome) for outcome in outcomes]
+        return Table(f"So far, {ended} trials", words, rows) if tells else None
 
 
 _CONDITIONS = ("controller", "profile")
 """Columns that tell a condition."""
+_WORDS = {"success": "successes", "timeout": "out of time", "left": "left the scene"}
+"""Outcomes as tables of results name them."""
 _ANY = "trials"
 """Stands for all of them where there are no conditions."""
 
