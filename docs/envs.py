@@ -53,6 +53,8 @@ such as PyTorch; `uv sync --inexact` does not. `apprentice` on the [board](leade
 
 ## Use one
 
+`uv sync --extra gym` installs Gymnasium.
+
 ```python
 import gymnasium as gym
 

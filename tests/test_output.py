@@ -208,7 +208,7 @@ def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
         text = file.read_text()
         assert not re.search(r"pip install '?antennate\[", text), file
         named |= set(re.findall(r"\{extra\([\"'](\w+)[\"']\)\}", text))
-    assert {"view", "video", "fast", "hardware"} <= named <= set(known)
+    assert {"view", "video", "hardware"} <= named <= set(known)
     uv, pip = re.findall(r"`([^`]*)`", extra("video"))
     assert uv.removesuffix(" ...") in pages
     assert pip in pages

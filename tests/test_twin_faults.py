@@ -185,6 +185,20 @@ def test_a_fault_of_the_answers_is_taken_back() -> None:
     assert heard == [False, True]
 
 
+def test_a_board_that_fell_silent_speaks_again() -> None:
+    """100 samples a second."""
+    robot = watched(TwinConfig())[0]
+    robot.advance(1.0)
+    robot.take()
+    heard: list[int] = []
+    for what in ("silent", "none"):
+        broken(robot, f"esp32={what}")
+        robot.advance(robot.t + 0.5)
+        heard.append(len(robot.take()))
+    assert heard[0] == 0
+    assert heard[1] > 500
+
+
 @pytest.mark.parametrize("counts", [0.0, 4095.0, 60000.0, 1250.0])
 @pytest.mark.parametrize("others", [(), ("hum:900",), ("plateau:1250",), ("plateau:0", "sticky")])
 def test_every_code_is_one_of_the_converter(counts: float, others: tuple[str, ...]) -> None:

@@ -46,7 +46,7 @@ PRIVILEGED: dict[str, ControllerFactory] = {
 
 ABOUT = {
     "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
-    "timed": "backs off and turns by the clock, whatever it feels: the control of closed",
+    "timed": "backs off and turns by the clock, whatever it feels: what closed has to beat",
     "paper": "turns away from the side that touches, backs off where both do: the published table",
     "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
     "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",

@@ -207,6 +207,10 @@ _TERMS = {
     "time of each trial that succeeded.",
     "stuck": "Stuck episodes: how often the robot, for 5 s, did not gain 0.02 m on its best "
     "progress; it has recovered if it then did.",
+    "jams": "Jam: the base moves wall.jam_travel, three spheres, while the tip stays; it may come "
+    "free later. Slip: the tip is off the wall for longer than wall.slip_time.",
+    "after_start": "After: the same without the first wall.start of the way, over which the "
+    "antenna bows.",
     "hold": "Hold: the maneuver in which the robot stands still.",
     "mcnemar_p": "McNemar: two conditions meet the same trials, and only those trials count that "
     "one of them passes and the other does not. p is how often chance alone would split these so "

@@ -34,7 +34,7 @@ _FROZEN, _JUMP = "frozen", "jump"
 """Present Position keeps its value, or is wrong by some ticks; the servo moves as before."""
 _MOST_COUNTS = 65535
 """Largest reading that a frame can hold; those above 4095 are none of its converter."""
-_BOARD = ("silent", "reset")
+_BOARD = ("silent", "reset", NONE)
 _IMU = ("silent", "stuck", "railed", NONE)
 """What can be wrong with the inertial sensor of the board."""
 _READINGS = (

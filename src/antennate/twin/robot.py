@@ -245,9 +245,9 @@ class TwinRobot:
         self._off |= dtr != rts
 
     def break_board(self, what: str) -> None:
-        """Let the board fall silent, or start anew after BOOT_TICKS."""
-        if what == "silent":
-            self.board_silent = True
+        """Let the board fall silent or speak again, or start anew after BOOT_TICKS."""
+        if what != "reset":
+            self.board_silent = what == "silent"
         else:
             self._boot_id = (self._boot_id * 1_103_515_245 + 12_345) & 0xFFFFFFFF
             self._encoder = frame.SampleEncoder(self._boot_id, self.imu is not None)

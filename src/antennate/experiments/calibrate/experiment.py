@@ -35,8 +35,8 @@ SIGMOID = (
 )
 CURVE = (
     Measure("polarity", "polarity", form="+d"),
-    Measure("counts_low", "0 at", "counts", form=".0f"),
-    Measure("counts_high", "1 at", "counts", form=".0f"),
+    Measure("counts_low", "reading at x = 0", "counts", form=".0f"),
+    Measure("counts_high", "reading at x = 1", "counts", form=".0f"),
     Measure("threshold", "theta"),
     Measure("r2", "R²", form=".3f"),
     Measure("rmse", "RMSE of b", form=".4f"),

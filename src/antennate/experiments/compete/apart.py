@@ -129,10 +129,10 @@ class Apart:
             self._pipe.sendall(pickle.dumps(call, pickle.HIGHEST_PROTOCOL))
             wrong, answer, told = _Plain(io.BytesIO(self._answer(end))).load()
         except TimeoutError:
-            self._give_up()
+            self._give_up(call[0], f"{WAITING * self._limit:g} s on the clock")
         except (EOFError, OSError):
             raise ControllerError(f"its process ended in {call[0]}") from None
-        except ControllerError:  # it was given up
+        except ControllerError:
             raise
         except Exception as error:  # noqa: BLE001  (it may send anything)
             raise ControllerError(f"expected plain arrays, found {error}") from None
@@ -140,8 +140,8 @@ class Apart:
         self._answered = self._used
         if wrong:
             raise (ConfigError if wrong == "ConfigError" else ControllerError)(answer)
-        if self._used - before > limit or time.monotonic() > end:
-            self._give_up()
+        if self._used - before > limit:
+            self._give_up(call[0], f"{1e3 * limit:g} ms of the processor")
         if programs:
             raise ControllerError("a program that it began runs on after a decision")
         return answer
@@ -162,7 +162,7 @@ class Apart:
             if size > _LARGEST:
                 raise ControllerError(f"expected an answer of at most {_LARGEST} bytes")
             if time.monotonic() > end:
-                self._give_up()
+                raise TimeoutError
         return bytes(data[_HEAD.size :])
 
     def _look(self, told: float = 0.0) -> bool:
@@ -178,10 +178,11 @@ class Apart:
         self._used = max(told, sum(clocks.values()) + ended, sum(self._seen.values()))
         return len(below) > 1 and sum(map(_runs, below)) > 1
 
-    def _give_up(self) -> NoReturn:
+    def _give_up(self, call: str, limit: str) -> NoReturn:
         with contextlib.suppress(ProcessLookupError):
             os.kill(self._warden, signal.SIGCONT)  # where the controller stopped it
-        raise ControllerError(f"a decision took longer than {1e3 * self._limit:g} ms")
+        what = {"step": "a decision", "reset": "a reset"}.get(call, call)
+        raise ControllerError(f"{what} took longer than {limit}")
 
 
 class _Plain(pickle.Unpickler):
@@ -247,6 +248,7 @@ def _guard(pipe: socket.socket, make: Callable[[], Controller]) -> NoReturn:
                 os.kill(pid, signal.SIGKILL)
 
     with contextlib.suppress(BaseException):
+        os.setsid()  # a signal to its group stays there
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         _stay()
         signal.signal(_END, end)

@@ -244,10 +244,10 @@ def _border(result: Mapping[str, Any]) -> str:
 
 
 OUTCOME_COLOURS = {
-    "successes": "#009E73",
-    "jams": "#D55E00",
-    "slips": "#56B4E9",
-    "invalid": "#000000",
+    "successes": "#56B4E9",
+    "jams": "#9A9A9A",
+    "slips": "#F0E442",
+    "invalid": "#EBEBEB",
 }
 
 
