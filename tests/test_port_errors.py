@@ -79,7 +79,12 @@ def test_L15_a_second_program_is_told_the_pid_of_the_first() -> None:
 @pytest.mark.parametrize("command", ["doctor", "drive", "setup", "jog", "zero"])
 @pytest.mark.parametrize(
     ("path", "said"),
-    [("/dev/nowhere", "no such file"), ("/dev/null", "not a serial port"), ("/", "not a serial")],
+    [
+        ("/dev/nowhere", "no such file"),
+        ("/dev/pts/99999", "start `antennate twin` again"),
+        ("/dev/null", "not a serial port"),
+        ("/", "not a serial"),
+    ],
 )
 def test_every_command_says_it_and_ends_with_2(
     command: str,

@@ -79,6 +79,8 @@ def explain(flag: str, path: str, baud: int, error: Exception) -> OpenError:
 def _why(path: str, baud: int, error: Exception) -> tuple[str, str]:
     number = getattr(error, "errno", None)
     if not Path(path).exists():
+        if path.startswith("/dev/pts/"):
+            return "no such file", "a port of a twin ends with it: start `antennate twin` again"
         return "no such file", f"plug it in and give one of: {known_ports()}"
     if number in _DENIED:
         return "no permission", permission_cure(path)
