@@ -22,8 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binom, norm
+
+from antennate.figures import FAINT, SERIES, WIDTH, canvas, render, styled
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, str]
@@ -35,6 +38,8 @@ DRAWS = 100_000
 FITS = 12
 """Fits to rows drawn anew with replacement: what the rows leave open of the outcome."""
 FOLDS = 5
+BINS = 10
+"""Most parts of the range of an unknown that are told apart."""
 NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
 HIDDEN = 20261129
@@ -204,6 +209,19 @@ class Unknowns:
             ]
             for k in range(count)
         ]
+
+    @property
+    def ends(self) -> list[tuple[str, str]]:
+        """Its lowest and highest value in words, one a name."""
+        found: list[tuple[str, str]] = []
+        for axis in self.axes.values():
+            if isinstance(axis, dict):
+                found.append((f"{axis['low']:g}", f"{axis['high']:g}"))
+            elif isinstance(axis[0], list):
+                found += [(f"{min(v):g}", f"{max(v):g}") for v in zip(*axis, strict=True)]
+            else:
+                found.append((str(axis[0]).lower(), str(axis[-1]).lower()))
+        return found
 
     def shares(self, values: Mapping[str, Any]) -> list[float]:
         """A setting as numbers from 0 to 1, one a name."""
@@ -450,14 +468,17 @@ def quantiles(values: Floats, weights: Floats, at: Sequence[float]) -> list[floa
 def left_of(names: Sequence[str], x: Floats, weights: Floats) -> dict[str, Any]:
     """Of each unknown what is left: quantiles as shares of its range, and by how much it narrowed.
 
-    `narrowed` is the information in nats, from counts in ten bins, less what chance alone gives.
+    `narrowed` is the information in nats, from counts in bins, less what chance alone gives.
     """
     effective = 1.0 / float((weights**2).sum())
     found = {}
     for k, name in enumerate(names):
-        edges = np.unique(np.quantile(x[:, k], np.linspace(0, 1, 11)))
-        share, _ = np.histogram(x[:, k], edges, weights=weights)
-        prior = np.histogram(x[:, k], edges)[0] / len(x)
+        values = np.unique(x[:, k])
+        if len(values) > BINS:
+            values = np.linspace(0.0, 1.0, BINS, endpoint=False)
+        place = np.searchsorted(values, x[:, k], side="right") - 1
+        share = np.bincount(place, weights, len(values))
+        prior = np.bincount(place, minlength=len(values)) / len(x)
         there = share > 0
         nats = float((share[there] * np.log(share[there] / prior[there])).sum())
         low, middle, high = quantiles(x[:, k], weights, (0.05, 0.5, 0.95))
@@ -502,6 +523,9 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         },
         "left": left_of(unknowns.names, x, weights),
     }
+    (ROOT / "docs" / "images" / f"published-{name}.png").write_bytes(
+        render(figure(result["left"], dict(zip(unknowns.names, unknowns.ends, strict=True))))["png"]
+    )
     text = json.dumps(result, indent=1)
     (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
     for n, found in result["models"].items():
@@ -510,6 +534,34 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     print("in what is left:", result["there"])
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
         print(f"{n:45} {found['narrowed']:6.3f} nats, quantiles {found['quantiles']}")
+
+
+COLUMNS = 4
+"""Panels beside one another."""
+
+
+@styled
+def figure(left: Mapping[str, Any], ends: Mapping[str, tuple[str, str]]) -> Figure:
+    """How much likelier than in its range each value of an unknown is, of those that narrowed."""
+    shown = {n: f for n, f in left.items() if f["narrowed"] > NARROWED}
+    names = sorted(shown, key=lambda n: -shown[n]["narrowed"])
+    rows = max(1, math.ceil(len(names) / COLUMNS))
+    drawn = canvas(WIDTH, 0.5 + 1.25 * rows)
+    panels = drawn.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    for panel, n in zip(panels, names, strict=False):
+        share = shown[n]["share"]
+        panel.bar(
+            np.arange(len(share)) / len(share), share, 1 / len(share), align="edge", color=SERIES[0]
+        )
+        panel.axhline(1.0, color=FAINT)
+        panel.set_title(n.rpartition(".")[2].split("_n_mm")[0].replace("_", "\n", 1), fontsize=7)
+        panel.set_xticks([0, 1], ends[n], fontsize=6)
+        panel.tick_params(axis="y", labelsize=6)
+        for label, side in zip(panel.get_xticklabels(), ("left", "right"), strict=True):
+            label.set_horizontalalignment(side)
+    return drawn
 
 
 def study_file(name: str) -> Path:
