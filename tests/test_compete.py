@@ -256,12 +256,18 @@ class Ignored(Entry):
     def escape(self):
         signal.signal(signal.SIGCHLD, signal.SIG_IGN)
         if not os.fork():
-            work(0.2)
+            work(0.4)
             end()
         try:
             os.wait()
         except ChildProcessError:
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+class Hidden(Entry):  # behind more children than one read of /proc tells
+    def escape(self):
+        for number in range(900):
+            if not os.fork():
+                end()
+        work(0.2)
 class Between(Entry):
     def escape(self):
         threading.Thread(target=work, args=(30.0,), daemon=True).start()
@@ -308,6 +314,7 @@ class Picks(Entry):
                 return os.system, ("touch picked",)
         return Answer() if self.ticks else Entry.step(self, frame)
 """
+TOO_LONG = "controller: a decision took longer than "
 SLOW_SCENE = """
 import time
 import numpy as np
@@ -331,6 +338,7 @@ class Slow:
         ("Orphan", "controller: a program that it began runs on after a decision"),
         ("OrphanInside", "controller: a decision took longer than 50 ms of the processor"),
         ("Ignored", "controller: a decision took longer than 50 ms of the processor"),
+        ("Hidden", "controller: it began more than 64 programs that it did not wait for"),
         ("Between", "controller: a decision took longer than 50 ms of the processor"),
         ("Clocks", "controller: a decision took longer than 50 ms of the processor"),
         ("Stops", "controller: a decision took longer than 1 s on the clock"),
@@ -352,7 +360,8 @@ def test_processor_time_does_not_escape(
     words += ["--trials", "1", "--workers", "1", "--no-figures", "--out", "run"]
     assert main(["compete", *words]) == (2 if why else 0)
     (row,) = read_rows(tmp_path / "run" / "trials.csv")
-    assert (row.outcome, row.reason) == ("invalid" if why else "timeout", why)
+    assert row.outcome == ("invalid" if why else "timeout")
+    assert row.reason == why or (TOO_LONG in why and TOO_LONG in row.reason)  # or on the clock
     assert not (tmp_path / "picked").exists()
     if name == "Orphan":
         left = Path("/proc", (tmp_path / "pid").read_text())
@@ -360,6 +369,15 @@ def test_processor_time_does_not_escape(
         while left.exists() and time.monotonic() < end:
             time.sleep(0.01)
         assert not left.exists()
+
+
+def test_a_judge_that_was_stopped_blames_no_controller(entries: Callable[[str], str]) -> None:
+    """As by Ctrl-Z and fg: 1.5 s, where a decision may last one second on the clock."""
+    words = "sleep 0.3; kill -STOP $0; sleep 1.5; kill -CONT $0"
+    with subprocess.Popen(["sh", "-c", words, str(os.getpid())]) as stop:
+        rows = episodes(entries("Entry"), scene="flat+time_limit=15")
+        stop.wait(30)
+    assert [row.reason for row in rows] == [""]
 
 
 @pytest.mark.parametrize("name", ["Busy", "Begins", "Entry"])

@@ -23,6 +23,7 @@ from antennate.hardware.safety import channel as diagnosis
 from antennate.hardware.safety.causes import Cause, State
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding, Reading
 from antennate.params.control import CurveParams
+from antennate.params.safety import SupervisorParams
 from antennate.robots.antenna import SensorParams
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
@@ -375,19 +376,21 @@ def test_S11_beyond_the_calibrated_range_is_flagged_and_kept_as_in_simulation(
     assert {r.counts for r in found[-10:]} == {round(beyond), round(beyond) + 1}
 
 
-def test_S11_the_antennae_of_a_good_twin_stay_within_their_default_curve() -> None:
-    """As the tunnel bends them; a recording up to a right angle covers less than that."""
+def test_S11_the_antennae_of_a_good_twin_stay_within_what_its_curve_covers() -> None:
+    """As the tunnel bends them; `twin --robot-toml` writes that. On a robot nothing is assumed."""
+    assert SupervisorParams().covered == 0.0
     counts = antennate.simulate(time_limit=20.0, seed=1).counts
-    model, recorded = CurveParams(), CurveParams(counts_low=1400.0)
     flagged = []
-    for curve in (model, recorded):
-        films = [channel(Band.of(curve)) for _ in range(2)]
+    for covered in (0.8, 0.0):
+        films = [channel(Band.of(CurveParams(), covered=covered)) for _ in range(2)]
         for film, readings in zip(films, counts.T, strict=True):
             feed(film, readings.tolist())
         flagged.append(sum(film.counted[Finding.OUT_OF_CAL] for film in films))
     assert flagged[0] == 0
     assert flagged[1] > 100
-    straight = after_rest([BAND.high + 30.0 + n % 2 for n in range(20)], Band.of(model))
+    straight = after_rest(
+        [BAND.high + 30.0 + n % 2 for n in range(20)], Band.of(CurveParams(), covered=0.8)
+    )
     assert straight[-1].finding is Finding.OUT_OF_CAL
 
 

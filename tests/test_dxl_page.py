@@ -11,6 +11,8 @@ import pytest
 from pages import Block, blocks
 from test_servo_clients import served
 
+from antennate.dxl.answers import SILENT, Span, Value
+from antennate.dxl.inquiry import read_some
 from antennate.dxl.models import XL330_M288, XL430_W250, servo_model
 from antennate.twin.servos import read_list
 
@@ -26,6 +28,24 @@ def run(word: str, path: str = "") -> str:
     with contextlib.redirect_stdout(said):
         exec(block.replace("/dev/ttyUSB0", path).replace("t < 10.0", "t < 0.2"), {})
     return said.getvalue()
+
+
+def test_values_come_in_the_order_of_their_servos_whoever_answers_late() -> None:
+    class Late:
+        """Servo 1 answers the second question alone."""
+
+        times = 0
+
+        def read_all(self, ids: list[int], span: Span, budget: float) -> dict[int, object]:
+            self.times += 1
+            value = Value(b"\x05\x00\x00\x00", alert=False)
+            return {i: value if i != 1 or self.times > 1 else SILENT for i in ids}
+
+        def settle(self) -> None:
+            pass
+
+    found = read_some(Late(), [1, 2], XL430_W250["present_position"])  # type: ignore[arg-type]
+    assert [*found.items()] == [(1, 5), (2, 5)]
 
 
 def test_servos_are_read_and_written() -> None:

@@ -36,12 +36,14 @@ SPREAD = 0.15
 DRAWS = 100_000
 """Settings that are weighed."""
 FITS = 12
-"""Fits to rows drawn anew with replacement: what the rows leave open of the outcome."""
+"""Fits to points drawn anew with replacement: what they leave open of the outcome."""
 FOLDS = 5
 BINS = 10
 """Most parts of the range of an unknown that are told apart."""
 NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
+LATER = 571000
+"""Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
 HIDDEN = 20261129
 """Seed of hidden settings."""
 
@@ -64,20 +66,18 @@ class Count:
 
 @dataclass(frozen=True)
 class AtLeast:
-    """That many of so many did, or, not `held`, fewer did."""
+    """That many of so many did, or more."""
 
     did: int
     of: int
-    held: bool = True
 
     def likelihood(self, chance: Floats, spread: float) -> Floats:
         """Of chances."""
-        p = binom.sf(self.did - 1, self.of, chance)
-        return p if self.held else 1.0 - p
+        return binom.sf(self.did - 1, self.of, chance)
 
-    def again(self, values: Floats) -> AtLeast:
+    def again(self, values: Floats) -> Count:
         """The same kind of statement on other trials."""
-        return AtLeast(self.did, self.of, bool(values.mean() >= self.did / self.of))
+        return Count(int(values.sum()), len(values))
 
 
 @dataclass(frozen=True)
@@ -381,7 +381,7 @@ class Fitted:
         name: Which.
         loss: Its mean loss on settings left out, and that of the constant: logarithmic of a
             chance, squared of a number.
-        fits: It, fitted to rows that were drawn anew.
+        fits: It, fitted to points that were drawn anew.
         spread: Standard deviation about it on settings left out; 0 of a chance.
     """
 
@@ -417,9 +417,12 @@ def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fit
         losses[name] = float(loss.mean())
     best = min(losses, key=losses.__getitem__)
     rng = np.random.default_rng(0)
-    fits = []
+    fits, settings = [], np.unique(points)
     while len(fits) < FITS:
-        rows = rng.integers(len(y), size=len(y))
+        times = np.bincount(
+            rng.integers(len(settings), size=len(settings)), minlength=len(settings)
+        )
+        rows = np.repeat(np.arange(len(y)), times[np.searchsorted(settings, points)])
         if not chance or len(set(y[rows])) == 2:
             fits.append(kinds[best]().fit(x[rows], y[rows].astype(int) if chance else y[rows]))
     spread = 0.0 if chance else math.sqrt(losses[best])
@@ -594,7 +597,7 @@ def following(name: str, files: Sequence[Path], count: int, trials: int, seed: i
     outcome = Outcome.of(read(files, group, unknowns), group)
     weights = weights_of(outcome.likelihoods(x, group.paper))
     chosen = np.random.default_rng(seed).choice(DRAWS, size=count, replace=False, p=weights)
-    return study_of(name, [settings[k] for k in chosen], trials, 561000 + seed)
+    return study_of(name, [settings[k] for k in chosen], trials, LATER + seed)
 
 
 def recover(name: str, files: Sequence[Path]) -> None:
@@ -644,13 +647,13 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
     told = parser.parse_args()
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
         settings = prior(Unknowns.of(study_file(name)), 3, HIDDEN)[0]
-        sys.stdout.write(study_of(name, settings, told.trials, 562129))
+        sys.stdout.write(study_of(name, settings, told.trials, LATER))
     elif told.part == "next":
         sys.stdout.write(following(name, files, told.count, told.trials, told.seed))
     else:

@@ -17,6 +17,7 @@ import numpy as np
 import tomlkit
 from pydantic.dataclasses import dataclass
 
+from antennate.antenna.calibration import REACH
 from antennate.cli.arguments import as_typed
 from antennate.cli.exit_codes import OK
 from antennate.cli.options import fields_of, flag_of, option
@@ -32,6 +33,7 @@ from antennate.hardware.ports.finder import read_key
 from antennate.hardware.setup.robot_toml import edited
 from antennate.hardware.setup.zeros import measured
 from antennate.params.base import changes, paths_of
+from antennate.robots.antenna import SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
 from antennate.telemetry import FilmView
@@ -197,6 +199,8 @@ def _write_robot(path: Path, robot: RobotSpec, paths: dict[str, str]) -> None:
     own = robot.model_dump(mode="json", exclude_defaults=True)
     known = {("ports", name): port for name, port in paths.items()}
     known |= measured(robot, robot.zeros, robot.directions, (), today())
+    if robot.antenna.sensor == SensorParams():
+        known[("limits", "covered")] = REACH
     text = edited(_HEAD + tomlkit.dumps({"robot": own}), known)
     write_whole(path, text.encode(), overwrite=True)
 

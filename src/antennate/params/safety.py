@@ -76,6 +76,11 @@ class SupervisorParams(Params):
     """Age of a sample from which on it is not acted upon."""
     recovery: int = number(10, "1", "assumed: 100 ms, as the running mean", ge=1, le=1000)
     """Fresh valid samples in a row that end a loss of data."""
+    covered: float = number(
+        0.0, "1", "assumed: a curve holds as far as it was recorded", ge=0, le=200
+    )
+    """How far beyond the bent end of its range a curve holds, in calibrated spans; beyond that a
+    reading is OUT_OF_CAL."""
     hum_time: float = number(
         30.0,
         "s",

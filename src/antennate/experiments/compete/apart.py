@@ -23,7 +23,7 @@ import struct
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from antennate.control.knowledge import Kind, Knowing, Knowledge
@@ -41,8 +41,13 @@ _HEAD = struct.Struct("!I")
 """What an answer begins with: how many bytes follow."""
 _SUBREAPER, _DIES_WITH_PARENT = 36, 1
 """Numbers of prctl(2)."""
-_END = getattr(signal, "SIGRTMIN", signal.SIGUSR1) + 7
+_END = signal.SIGRTMIN + 7 if hasattr(signal, "SIGRTMIN") else signal.SIGXCPU
 """Signal by which the judge ends the warden; a cluster sends others to all processes of a job."""
+_MOST = 64
+"""Most processes of a controller, ended ones too: they are looked at in every decision."""
+_STOPPED = 0.5
+"""Time between two looks from which on the judge itself was stopped, as by Ctrl-Z [s]: it does not
+count on the clock."""
 _PATIENCE = 2.0
 """Time in which the warden ends all [s]."""
 _PLAIN = {("numpy", name) for name in ("ndarray", "dtype", "_reconstruct", "_frombuffer", "scalar")}
@@ -52,6 +57,8 @@ _PLAIN |= {("antennate", "JointCommand")}
 
 class Apart:
     """A controller whose decisions must not take longer than a limit, in a process of its own.
+
+    It ends with the thread that made it, too.
 
     Args:
         make: Makes the controller there.
@@ -111,23 +118,24 @@ class Apart:
     def close(self) -> None:
         """End it, and all that it began: that does the warden, also when the judge is killed."""
         self._pipe.close()
-        with contextlib.suppress(ProcessLookupError, ChildProcessError):
+        with contextlib.suppress(OSError):
             os.kill(self._warden, _END)
             os.kill(self._warden, signal.SIGCONT)
             end = time.monotonic() + _PATIENCE
             while not os.waitpid(self._warden, os.WNOHANG)[0]:
                 if time.monotonic() > end:
+                    _kill_below(self._warden)
                     os.kill(self._warden, signal.SIGKILL)
                 time.sleep(1e-3)
 
     def _ask(self, limit: float, *call: Any) -> Any:
         """What it answers; refused if it took longer on the processor [s], or waits for long."""
-        end = time.monotonic() + WAITING * (self._limit if limit < float("inf") else limit)
+        longest = WAITING * (self._limit if limit < float("inf") else limit)
         before = self._answered
         try:
             self._pipe.settimeout(WAITING * self._limit)
             self._pipe.sendall(pickle.dumps(call, pickle.HIGHEST_PROTOCOL))
-            wrong, answer, told = _Plain(io.BytesIO(self._answer(end))).load()
+            wrong, answer, told = _Plain(io.BytesIO(self._answer(longest))).load()
         except TimeoutError:
             self._give_up(call[0], f"{WAITING * self._limit:g} s on the clock")
         except (EOFError, OSError):
@@ -146,11 +154,18 @@ class Apart:
             raise ControllerError("a program that it began runs on after a decision")
         return answer
 
-    def _answer(self, end: float) -> bytes:
-        """The bytes of an answer, looked for until a time [s]."""
+    def _answer(self, longest: float) -> bytes:
+        """The bytes of an answer, looked for so long [s]."""
         self._pipe.settimeout(_LOOK)
-        data, size = bytearray(), _HEAD.size
+        data, size, last = bytearray(), _HEAD.size, time.monotonic()
+        end = last + longest
         while len(data) < size:
+            now = time.monotonic()
+            if now - last > _STOPPED:
+                end += now - last
+            if now > end:
+                raise TimeoutError
+            last = now
             try:
                 if not (piece := self._pipe.recv(2**16)):
                     raise EOFError
@@ -161,8 +176,6 @@ class Apart:
                 size += _HEAD.unpack_from(data)[0]
             if size > _LARGEST:
                 raise ControllerError(f"expected an answer of at most {_LARGEST} bytes")
-            if time.monotonic() > end:
-                raise TimeoutError
         return bytes(data[_HEAD.size :])
 
     def _look(self, told: float = 0.0) -> bool:
@@ -172,6 +185,8 @@ class Apart:
         nothing can be seen counts what its process says of itself [s].
         """
         below = [*descendants(self._warden)]
+        if len(below) > _MOST:
+            raise ControllerError(f"it began more than {_MOST} programs that it did not wait for")
         clocks = {pid: _clock(pid) for pid in below}
         self._seen |= clocks
         ended = sum(map(_ended, [self._warden, *below]))
@@ -232,7 +247,10 @@ def _text(path: str) -> bytes:
     """What a file of /proc says; `open` takes three times as long."""
     file = os.open(path, os.O_RDONLY)
     try:
-        return os.read(file, 2**16)
+        text = os.read(file, 2**16)
+        while more := os.read(file, 2**16):  # a page at a time, where there are many children
+            text += more
+        return text
     finally:
         os.close(file)
 
@@ -243,9 +261,7 @@ def _guard(pipe: socket.socket, make: Callable[[], Controller]) -> NoReturn:
 
     def end(number: int, *_: object) -> None:
         ending.append(number)
-        for pid in [*descendants(os.getpid())] or begun:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        _kill_below(os.getpid(), begun)
 
     with contextlib.suppress(BaseException):
         os.setsid()  # a signal to its group stays there
@@ -290,6 +306,17 @@ def _close_others(pipe: int) -> None:
             data = way == os.O_RDONLY and (stat.S_ISREG(kind) or stat.S_ISCHR(kind))
             if file > 2 and file != pipe and not data:
                 os.close(file)
+
+
+def _kill_below(pid: int, known: Iterable[int] = ()) -> None:
+    """Kill all that a process began, or those that are known where the system does not tell.
+
+    They are stopped first, so that none of them begins another one meanwhile.
+    """
+    for number in (signal.SIGSTOP, signal.SIGSTOP, signal.SIGKILL):
+        for each in [*descendants(pid)] or known:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(each, number)
 
 
 def _prctl(what: int, value: int = 1) -> None:

@@ -240,7 +240,8 @@ def _antenna(
     """Findings on an antenna by its readings [counts]."""
     yield _noise(board, config, name, counts)
     try:
-        band = Band.of(_curve(config, name), config.reaches[name == "right"])
+        reach, covered = config.reaches[name == "right"], config.limits.covered
+        band = Band.of(_curve(config, name), reach, covered)
         channel = ChannelDiagnosis(band, config.limits.hum_time)
     except CalibrationError as error:
         wrong = Finding(str(error), "bad", "calibrate again, with another divider resistor")

@@ -165,7 +165,6 @@ class Finding(Enum):
         return self in _BROKEN
 
 
-_MODEL = CurveParams()
 _BROKEN = {Finding.STUCK, Finding.NOISE, Finding.OPEN, Finding.SHORT_LO, Finding.SHORT_HI}
 _USABLE = {Finding.OK, Finding.OUT_OF_CAL, Finding.SPIKY, Finding.SATURATED}
 
@@ -185,11 +184,12 @@ class Band:
     covered: float = 0.0
 
     @classmethod
-    def of(cls, conditioning: CurveParams, reach: float | None = None) -> Band:
-        """The range of a calibration; the default curve is of a model, which bends to REACH."""
+    def of(
+        cls, conditioning: CurveParams, reach: float | None = None, covered: float = 0.0
+    ) -> Band:
+        """The range of a calibration."""
         low, high = conditioning.counts_low, conditioning.counts_high
-        model = (low, high) == (_MODEL.counts_low, _MODEL.counts_high)
-        return cls(low, high, conditioning.polarity, reach, REACH if model else 0.0)
+        return cls(low, high, conditioning.polarity, reach, covered)
 
     def covers(self, counts: float) -> bool:
         """Whether a reading [counts] is within the range, but for noise."""

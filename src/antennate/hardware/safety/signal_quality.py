@@ -189,8 +189,10 @@ class SignalQuality:
         right: CurveParams | None = None,
         limits: SupervisorParams | None = None,
     ) -> None:
-        bands = Band.of(conditioning, reaches[0]), Band.of(right or conditioning, reaches[1])
-        hum_time = (limits or SupervisorParams()).hum_time
+        limits = limits or SupervisorParams()
+        covered, hum_time = limits.covered, limits.hum_time
+        left = Band.of(conditioning, reaches[0], covered)
+        bands = left, Band.of(right or conditioning, reaches[1], covered)
         self.channels = [ChannelDiagnosis(band, hum_time) for band in bands]
         self.check = None if touch is None else TouchCheck(touch, bands)
         self._together = (drift or DriftParams()).together
