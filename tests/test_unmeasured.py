@@ -442,6 +442,7 @@ def test_the_twin_writes_the_file_of_its_robot(
     assert (found.robot.ids, found.robot.zeros) == (tuple(range(1, 27)), (2048,) * 26)
     assert found.robot.model_dump(exclude={*KNOWN}) == robot.model_dump(exclude={*KNOWN})
     assert found.robot.unstated("ids", "zeros", "directions") == ()
+    assert found.limits.covered == 0.8  # how far the simulated sensor goes on bending
     mine = (tmp_path / "mine.toml").read_text()
     assert main([*words, "mine.toml"]) == 2
     assert "--robot-toml: expected no file yet, or one of a twin" in capfd.readouterr().err

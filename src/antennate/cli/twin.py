@@ -199,7 +199,8 @@ def _write_robot(path: Path, robot: RobotSpec, paths: dict[str, str]) -> None:
     own = robot.model_dump(mode="json", exclude_defaults=True)
     known = {("ports", name): port for name, port in paths.items()}
     known |= measured(robot, robot.zeros, robot.directions, (), today())
-    if robot.antenna.sensor == SensorParams():
+    sensor = robot.antenna.sensor
+    if sensor == SensorParams(directions=sensor.directions):
         known[("limits", "covered")] = REACH
     text = edited(_HEAD + tomlkit.dumps({"robot": own}), known)
     write_whole(path, text.encode(), overwrite=True)
