@@ -4,7 +4,8 @@ Parts, over folders of `antennate study studies/published_GROUP.toml` or of late
 fits the outcome over the unknowns, and writes what is left of their ranges to
 docs/science/published_GROUP.json and a figure. `hidden` prints a study of three hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
-prints a study of settings drawn from what is left. `rows` keeps the rows of folders as one table.
+prints a study of settings drawn from what is left, `best` names the likeliest settings by
+their own trials; `rows` keeps the rows of folders as one table.
 Needs `uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
 """
 
@@ -600,6 +601,35 @@ def following(name: str, files: Sequence[Path], count: int, trials: int, seed: i
     return study_of(name, [settings[k] for k in chosen], trials, LATER + seed)
 
 
+def best(name: str, files: Sequence[Path], count: int) -> None:
+    """Print the settings that are likeliest by their own trials, and write the first one.
+
+    A chance is (did + 1) / (trials + 2), a mean that of the trials; where none tells, 0.
+    """
+    group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
+    rows = read(files, group, unknowns)
+    values = {row["point"]: _values(unknowns, row) for row in lines(files)}
+    found = []
+    for point in np.unique(rows.points):
+        here, logarithm, told = rows.points == point, 0.0, {}
+        for n, said in group.paper.items():
+            y = rows.outcomes[n][here]
+            y = y[np.isfinite(y)]
+            told[n] = f"{y.mean():.2f} of {len(y)}" if len(y) else "-"
+            if isinstance(said, Mean):
+                spread = float(y.std(ddof=1)) if len(y) > 1 else 1.0
+                likely = said.likelihood(y.mean(keepdims=True), spread) if len(y) else np.zeros(1)
+            else:
+                likely = said.likelihood(np.array([(y.sum() + 1) / (len(y) + 2)]), 0.0)
+            logarithm += float(np.log(np.maximum(likely, 1e-12))[0])
+        found.append((logarithm, str(point), told))
+    found.sort(key=lambda item: -item[0])
+    for logarithm, point, told in found[:count]:
+        print(f"{logarithm:8.2f}  point {point}: {told}")
+    setting = values[found[0][1]]
+    (HERE / f"published_{name}_best.json").write_text(json.dumps(setting, indent=1) + "\n")
+
+
 def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
@@ -642,7 +672,7 @@ def keep(name: str, files: Sequence[Path]) -> None:
 def main() -> None:
     """Run one part."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next", "rows"))
+    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next", "best", "rows"))
     parser.add_argument("group", choices=GROUPS)
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--count", type=int, default=60)
@@ -654,6 +684,8 @@ def main() -> None:
     if told.part == "hidden":
         settings = prior(Unknowns.of(study_file(name)), 3, HIDDEN)[0]
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
+    elif told.part == "best":
+        best(name, files, told.count)
     elif told.part == "next":
         sys.stdout.write(following(name, files, told.count, told.trials, told.seed))
     else:
