@@ -561,8 +561,8 @@ def figure(left: Mapping[str, Any], ends: Mapping[str, tuple[str, str]]) -> Figu
         )
         panel.axhline(1.0, color=FAINT)
         panel.set_title(n.rpartition(".")[2].split("_n_mm")[0].replace("_", "\n", 1), fontsize=7)
-        panel.set_xticks([0, 1], ends[n], fontsize=6)
-        panel.tick_params(axis="y", labelsize=6)
+        panel.set_xticks([0, 1], ends[n], fontsize=7)
+        panel.tick_params(axis="y", labelsize=7)
         for label, side in zip(panel.get_xticklabels(), ("left", "right"), strict=True):
             label.set_horizontalalignment(side)
     return drawn

@@ -143,7 +143,15 @@ _EXAMINED = (
     "control.rule.threshold",
     *(
         f"limits.{name}"
-        for name in ("rate", "rate_error", "hum_time", "supply_warn", "supply_hold", "supply_off")
+        for name in (
+            "rate",
+            "rate_error",
+            "covered",
+            "hum_time",
+            "supply_warn",
+            "supply_hold",
+            "supply_off",
+        )
     ),
 )
 """What the doctor looks at of control and supervisor."""
