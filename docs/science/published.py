@@ -666,7 +666,15 @@ def keep(name: str, files: Sequence[Path]) -> None:
     with (HERE / f"published_{name}.csv").open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
         table.writeheader()
-        table.writerows(rows)
+        table.writerows({name: _short(text) for name, text in row.items()} for row in rows)
+
+
+def _short(text: str) -> str:
+    """A number with six digits, as that of no setting matters beyond; other words as they are."""
+    try:
+        return text if text.isdigit() else f"{float(text):.6g}"
+    except ValueError:
+        return text
 
 
 def main() -> None:
