@@ -45,6 +45,8 @@ NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
 LATER = 571000
 """Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
+FRESH = 572001
+"""Seed on which the likeliest setting is judged."""
 HIDDEN = 20261129
 """Seed of hidden settings."""
 
@@ -626,8 +628,12 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
     found.sort(key=lambda item: -item[0])
     for logarithm, point, told in found[:count]:
         print(f"{logarithm:8.2f}  point {point}: {told}")
-    setting = values[found[0][1]]
-    (HERE / f"published_{name}_best.json").write_text(json.dumps(setting, indent=1) + "\n")
+    tables: dict[str, list[str]] = {"": ["trials = 200", f"seed = {FRESH}"]}
+    for path, value in values[found[0][1]].items():
+        table, _, key = path.rpartition(".")
+        tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
+    text = "\n\n".join("\n".join([f"[{t}]"] * bool(t) + tables[t]) for t in sorted(tables))
+    (HERE / f"published_{name}_best.toml").write_text(text + "\n", encoding="utf-8")
 
 
 def recover(name: str, files: Sequence[Path]) -> None:
