@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import sys
@@ -23,19 +24,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from published_figures import marginals, pairs, screening
 from scipy.stats import binom, norm
 
-from antennate.figures import FAINT, SERIES, WIDTH, canvas, render, styled
+from antennate.figures import render
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, str]
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 SPREAD = 0.15
 """Standard deviation of the logarithm of a mean speed beside that of chance."""
-DRAWS = 100_000
+DRAWS = 300_000
 """Settings that are weighed."""
+CHUNK = 20_000
+"""Settings whose outcomes are told at a time: what fits into the memory of a laptop."""
 FITS = 12
 """Fits to points drawn anew with replacement: what they leave open of the outcome."""
 FOLDS = 5
@@ -43,11 +46,15 @@ BINS = 10
 """Most parts of the range of an unknown that are told apart."""
 NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
+PAIR_BINS, PAIRS = 5, 4
+"""Parts of a range in a pair, and pairs that are drawn."""
+SHUFFLES = 200
+"""Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
 """Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
 FRESH = 572001
 """Seed on which the likeliest setting is judged."""
-HIDDEN = 20261129
+HIDDEN = 20261130
 """Seed of hidden settings."""
 
 
@@ -230,39 +237,68 @@ class Unknowns:
         """A setting as numbers from 0 to 1, one a name."""
         found: list[float] = []
         for name, axis in self.axes.items():
-            if isinstance(axis, list) and isinstance(axis[0], str):
-                found.append(axis.index(values[name]) / (len(axis) - 1))
-            elif isinstance(axis, list):
-                columns = np.array([_entries(choice) for choice in axis], float)
-                low, high = columns.min(axis=0), columns.max(axis=0)
-                found += [*((np.array(_entries(values[name])) - low) / (high - low))]
+            value = values[name]
+            if isinstance(axis, list):
+                found += _choices(axis)[axis.index(value)].tolist()
             elif axis.get("log"):
-                found.append(_share(*map(math.log, (values[name], axis["low"], axis["high"]))))
+                found.append(math.log(value / axis["low"]) / math.log(axis["high"] / axis["low"]))
             else:
-                found.append(_share(values[name], axis["low"], axis["high"]))
+                found.append((value - axis["low"]) / (axis["high"] - axis["low"]))
         return found
 
-    def draw(self, rng: np.random.Generator) -> dict[str, Any]:
-        """A setting, drawn from the ranges."""
-        values: dict[str, Any] = {}
-        for name, axis in self.axes.items():
-            if isinstance(axis, list):
-                values[name] = axis[int(rng.integers(len(axis)))]
-            elif axis.get("whole"):
-                values[name] = int(rng.integers(axis["low"], axis["high"] + 1))
-            elif axis.get("log"):
-                values[name] = math.exp(rng.uniform(math.log(axis["low"]), math.log(axis["high"])))
-            else:
-                values[name] = float(rng.uniform(axis["low"], axis["high"]))
-        return values
+
+def _choices(axis: Sequence[Any]) -> Floats:
+    """The values of a list as numbers from 0 to 1, shape (values, entries of one)."""
+    if isinstance(axis[0], str):
+        return np.linspace(0.0, 1.0, len(axis))[:, None]
+    entries = np.array([v if isinstance(v, list) else [v] for v in axis], float)
+    low = entries.min(axis=0)
+    return (entries - low) / (entries.max(axis=0) - low)
 
 
-def _share(value: float, low: float, high: float) -> float:
-    return (value - low) / (high - low)
+@dataclass(frozen=True)
+class Draws:
+    """Settings drawn from the ranges.
+
+    Attributes:
+        columns: Of each unknown its values; of a list their places in it.
+        x: The settings as numbers from 0 to 1, shape (n, unknowns).
+    """
+
+    unknowns: Unknowns
+    columns: Mapping[str, NDArray[Any]]
+    x: Floats
+
+    def setting(self, k: int) -> dict[str, Any]:
+        """One of them as the values of a study."""
+        return {
+            name: axis[self.columns[name][k]]
+            if isinstance(axis, list)
+            else self.columns[name][k].item()
+            for name, axis in self.unknowns.axes.items()
+        }
 
 
-def _entries(value: Any) -> list[float]:
-    return [float(v) for v in value] if isinstance(value, list) else [float(value)]
+def prior(unknowns: Unknowns, count: int, seed: int = 1) -> Draws:
+    """Settings drawn from the ranges."""
+    rng = np.random.default_rng(seed)
+    columns: dict[str, NDArray[Any]] = {}
+    x: list[Floats] = []
+    for name, axis in unknowns.axes.items():
+        if isinstance(axis, list):
+            columns[name] = rng.integers(len(axis), size=count)
+            x.append(_choices(axis)[columns[name]])
+            continue
+        low, high = axis["low"], axis["high"]
+        if axis.get("whole"):
+            columns[name] = rng.integers(low, high + 1, size=count)
+            share = (columns[name] - low) / (high - low)
+        else:
+            share = rng.uniform(size=count)
+            far = low * (high / low) ** share if axis.get("log") else low + (high - low) * share
+            columns[name] = far
+        x.append(share[:, None])
+    return Draws(unknowns, columns, np.hstack(x))
 
 
 @dataclass(frozen=True)
@@ -395,9 +431,10 @@ class Fitted:
 
     def at(self, x: Floats) -> Floats:
         """Chance or number of each fit, shape (fits, n)."""
+        parts = np.array_split(x, max(1, len(x) // CHUNK))
         if self.spread:
-            return np.array([fit.predict(x) for fit in self.fits])
-        return np.array([fit.predict_proba(x)[:, 1] for fit in self.fits])
+            return np.hstack([[fit.predict(part) for fit in self.fits] for part in parts])
+        return np.hstack([[fit.predict_proba(p)[:, 1] for fit in self.fits] for p in parts])
 
 
 def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fitted:
@@ -471,36 +508,95 @@ def quantiles(values: Floats, weights: Floats, at: Sequence[float]) -> list[floa
     return np.interp(at, np.cumsum(weights[order]), values[order]).tolist()
 
 
+def region(values: Floats, weights: Floats) -> list[float]:
+    """What holds 90 % of the weight: of few values the likeliest, else the ends of the middle."""
+    few = np.unique(values)
+    if len(few) > BINS:
+        return [round(end, 3) for end in quantiles(values, weights, (0.05, 0.95))]
+    share = np.bincount(np.searchsorted(few, values), weights, len(few))
+    order = np.argsort(-share)
+    count = int(np.searchsorted(np.cumsum(share[order]), 0.9)) + 1
+    return sorted(round(float(value), 3) for value in few[order[:count]])
+
+
+def holds(kept: Sequence[float], value: float, few: bool) -> bool:
+    """Whether a region holds a value."""
+    if few:
+        return bool(np.isclose(kept, value, atol=1e-3).any())
+    return kept[0] <= value <= kept[1]
+
+
+def _places(values: Floats, most: int) -> tuple[NDArray[np.int64], int]:
+    """In which part of its range each value lies, and how many parts there are."""
+    parts = np.unique(values)
+    if len(parts) > BINS:
+        parts = np.linspace(0.0, 1.0, most, endpoint=False)
+    return np.searchsorted(parts, values + 1e-12, side="right") - 1, len(parts)
+
+
 def left_of(names: Sequence[str], x: Floats, weights: Floats) -> dict[str, Any]:
-    """Of each unknown what is left: quantiles as shares of its range, and by how much it narrowed.
+    """Of each unknown what is left: 90 % of it as shares of its range, and by how much it narrowed.
 
     `narrowed` is the information in nats, from counts in bins, less what chance alone gives.
     """
     effective = 1.0 / float((weights**2).sum())
     found = {}
     for k, name in enumerate(names):
-        values = np.unique(x[:, k])
-        if len(values) > BINS:
-            values = np.linspace(0.0, 1.0, BINS, endpoint=False)
-        place = np.searchsorted(values, x[:, k], side="right") - 1
-        share = np.bincount(place, weights, len(values))
-        prior = np.bincount(place, minlength=len(values)) / len(x)
+        place, count = _places(x[:, k], BINS)
+        share = np.bincount(place, weights, count)
+        prior = np.bincount(place, minlength=count) / len(x)
         there = share > 0
         nats = float((share[there] * np.log(share[there] / prior[there])).sum())
-        low, middle, high = quantiles(x[:, k], weights, (0.05, 0.5, 0.95))
         found[name] = {
-            "quantiles": [round(v, 3) for v in (low, middle, high)],
+            "region": region(x[:, k], weights),
+            "few": len(np.unique(x[:, k])) <= BINS,
             "narrowed": round(nats - (len(prior) - 1) / (2 * effective), 3),
             "share": [round(float(v), 4) for v in share / prior],
         }
     return found
 
 
-def prior(unknowns: Unknowns, count: int, seed: int = 1) -> tuple[list[dict[str, Any]], Floats]:
-    """Settings drawn from the ranges, and as numbers from 0 to 1."""
-    rng = np.random.default_rng(seed)
-    settings = [unknowns.draw(rng) for _ in range(count)]
-    return settings, np.array([unknowns.shares(setting) for setting in settings])
+def pairs_of(names: Sequence[str], x: Floats, weights: Floats, count: int) -> list[dict[str, Any]]:
+    """The pairs that the data tie together most: information beyond that of each alone [nats]."""
+    effective = 1.0 / float((weights**2).sum())
+    found = []
+    for (j, one), (k, other) in itertools.combinations(enumerate(names), 2):
+        (a, rows), (b, columns) = (_places(x[:, i], PAIR_BINS) for i in (j, k))
+        both = np.bincount(a * columns + b, weights, rows * columns).reshape(rows, columns)
+        prior = np.bincount(a * columns + b, minlength=rows * columns).reshape(rows, columns)
+        alone = both.sum(axis=1, keepdims=True) * both.sum(axis=0, keepdims=True)
+        there = both > 0
+        nats = float((both[there] * np.log(both[there] / alone[there])).sum())
+        nats -= (rows - 1) * (columns - 1) / (2 * effective)
+        share = both / np.maximum(prior / len(x), 1e-12)
+        found.append(
+            {"names": [one, other], "nats": round(nats, 3), "share": np.round(share, 3).tolist()}
+        )
+    return sorted(found, key=lambda pair: -pair["nats"])[:count]
+
+
+def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
+    """Of each outcome the change from one end of each unknown to the other, and its size as noise.
+
+    Least squares over all unknowns at once. The second number is the size as a share of the
+    largest that outcomes in random order reach in one study of twenty.
+    """
+    found = {}
+    rng = np.random.default_rng(0)
+    for name, outcome in rows.outcomes.items():
+        known = np.isfinite(outcome)
+        y, design = outcome[known], np.insert(rows.x[known], 0, 1.0, axis=1)
+        solve = np.linalg.pinv(design)
+        orders = np.column_stack([y, *(rng.permutation(y) for _ in range(SHUFFLES))])
+        slopes = solve @ orders
+        left = np.sqrt(((orders - design @ slopes) ** 2).mean(axis=0))
+        sizes = np.abs(slopes) / np.outer(np.sqrt((solve**2).sum(axis=1)), np.maximum(left, 1e-12))
+        limit = np.quantile(sizes[1:, 1:].max(axis=0), 0.95)
+        found[name] = {
+            n: [round(float(slopes[k, 0]), 3), round(float(sizes[k, 0] / limit), 2)]
+            for k, n in enumerate(names, 1)
+        }
+    return found
 
 
 def weigh(name: str, files: Sequence[Path]) -> None:
@@ -508,7 +604,7 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
     outcome = Outcome.of(rows, group)
-    _, x = prior(unknowns, DRAWS)
+    x = prior(unknowns, DRAWS).x
     likelihoods = outcome.likelihoods(x, group.paper)
     weights = weights_of(likelihoods)
     result = {
@@ -527,11 +623,20 @@ def weigh(name: str, files: Sequence[Path]) -> None:
             n: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
             for n, m in outcome.models.items()
         },
+        "effects": effects_of(rows, unknowns.names),
         "left": left_of(unknowns.names, x, weights),
     }
-    (ROOT / "docs" / "images" / f"published-{name}.png").write_bytes(
-        render(figure(result["left"], dict(zip(unknowns.names, unknowns.ends, strict=True))))["png"]
-    )
+    ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
+    narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
+    told = [k for k, n in enumerate(unknowns.names) if n in narrowed]
+    result["pairs"] = pairs_of([unknowns.names[k] for k in told], x[:, told], weights, PAIRS)
+    for kind, drawn in {
+        "": marginals(narrowed, ends),
+        "-pairs": pairs(result["pairs"], ends),
+        "-screening": screening(result["effects"]),
+    }.items():
+        image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
+        image.write_bytes(render(drawn)["png"])
     text = json.dumps(result, indent=1)
     (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
     for n, found in result["models"].items():
@@ -539,35 +644,7 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
     print("in what is left:", result["there"])
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
-        print(f"{n:45} {found['narrowed']:6.3f} nats, quantiles {found['quantiles']}")
-
-
-COLUMNS = 4
-"""Panels beside one another."""
-
-
-@styled
-def figure(left: Mapping[str, Any], ends: Mapping[str, tuple[str, str]]) -> Figure:
-    """How much likelier than in its range each value of an unknown is, of those that narrowed."""
-    shown = {n: f for n, f in left.items() if f["narrowed"] > NARROWED}
-    names = sorted(shown, key=lambda n: -shown[n]["narrowed"])
-    rows = max(1, math.ceil(len(names) / COLUMNS))
-    drawn = canvas(WIDTH, 0.5 + 1.25 * rows)
-    panels = drawn.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
-    for panel in panels[len(names) :]:
-        panel.set_visible(False)
-    for panel, n in zip(panels, names, strict=False):
-        share = shown[n]["share"]
-        panel.bar(
-            np.arange(len(share)) / len(share), share, 1 / len(share), align="edge", color=SERIES[0]
-        )
-        panel.axhline(1.0, color=FAINT)
-        panel.set_title(n.rpartition(".")[2].split("_n_mm")[0].replace("_", "\n", 1), fontsize=7)
-        panel.set_xticks([0, 1], ends[n], fontsize=7)
-        panel.tick_params(axis="y", labelsize=7)
-        for label, side in zip(panel.get_xticklabels(), ("left", "right"), strict=True):
-            label.set_horizontalalignment(side)
-    return drawn
+        print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
 
 
 def study_file(name: str) -> Path:
@@ -596,11 +673,11 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
 def following(name: str, files: Sequence[Path], count: int, trials: int, seed: int) -> str:
     """A study of settings drawn from what is left."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
-    settings, x = prior(unknowns, DRAWS, seed)
+    draws = prior(unknowns, DRAWS, seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
-    weights = weights_of(outcome.likelihoods(x, group.paper))
+    weights = weights_of(outcome.likelihoods(draws.x, group.paper))
     chosen = np.random.default_rng(seed).choice(DRAWS, size=count, replace=False, p=weights)
-    return study_of(name, [settings[k] for k in chosen], trials, LATER + seed)
+    return study_of(name, [draws.setting(k) for k in chosen], trials, LATER + seed)
 
 
 def best(name: str, files: Sequence[Path], count: int) -> None:
@@ -641,7 +718,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     hidden = read(files[:1], group, unknowns)
     outcome = Outcome.of(read(files[1:], group, unknowns), group)
-    _, x = prior(unknowns, DRAWS)
+    x = prior(unknowns, DRAWS).x
     told = inside = 0
     for place in sorted(set(hidden.points.tolist())):
         here = hidden.points == place
@@ -653,13 +730,12 @@ def recover(name: str, files: Sequence[Path]) -> None:
         weights = weights_of(outcome.likelihoods(x, said))
         print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
         for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
-            low, _, high = found["quantiles"]
             if found["narrowed"] > NARROWED:
                 truth = hidden.x[here][0, k]
                 told += 1
-                inside += low <= truth <= high
-                print(f"  {n}: {low} to {high}, hidden {truth:.3f}")
-    print(f"{inside} of {told} unknowns that the data narrow lie within their 90 % interval")
+                inside += holds(found["region"], truth, found["few"])
+                print(f"  {n}: {found['region']}, hidden {truth:.3f}")
+    print(f"{inside} of {told} unknowns that the data narrow lie within their 90 % region")
 
 
 def keep(name: str, files: Sequence[Path]) -> None:
@@ -696,7 +772,8 @@ def main() -> None:
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
-        settings = prior(Unknowns.of(study_file(name)), 3, HIDDEN)[0]
+        draws = prior(Unknowns.of(study_file(name)), told.count, HIDDEN)
+        settings = [draws.setting(k) for k in range(told.count)]
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
     elif told.part == "best":
         best(name, files, told.count)
