@@ -21,7 +21,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,12 @@ FRESH = 572001
 """Seed on which the likeliest setting is judged."""
 HIDDEN = 20261130
 """Seed of hidden settings."""
+
+
+def refuse(text: str) -> NoReturn:
+    """End with one line and exit code 2."""
+    sys.stderr.write(f"published.py: {text}\n")
+    raise SystemExit(2)
 
 
 @dataclass(frozen=True)
@@ -322,6 +328,8 @@ def lines(files: Iterable[Path]) -> Iterable[dict[str, str]]:
     for file in files:
         points: dict[str, int] = {}
         path = file / "trials.csv" if file.is_dir() else file
+        if not path.is_file():
+            refuse(f"{path}: expected the rows of a study, found no such file")
         with path.open(encoding="utf-8", newline="") as table:
             for row in csv.DictReader(table):
                 place = points.setdefault(row["point"], number + len(points))
@@ -333,15 +341,17 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     """Trials that ended, of all of a group.
 
     Raises:
-        SystemExit: There are none.
+        SystemExit: There are none, or an unknown has no column.
     """
     found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in lines(files):
+        if missing := [name for name in unknowns.axes if name not in row]:
+            refuse(f"{files[0]}: expected a column {missing[0]}, found none")
         if row["status"] == "ok":
             found.setdefault((row["point"], row["trial"]), {})[row[group.who]] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
-        raise SystemExit(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
+        refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
     return Rows(
         np.array(
             [unknowns.shares(_values(unknowns, rows[group.all[0]])) for rows in whole.values()]
@@ -434,7 +444,13 @@ class Fitted:
         parts = np.array_split(x, max(1, len(x) // CHUNK))
         if self.spread:
             return np.hstack([[fit.predict(part) for fit in self.fits] for part in parts])
-        return np.hstack([[fit.predict_proba(p)[:, 1] for fit in self.fits] for p in parts])
+        return np.hstack([[_chance(fit, part) for fit in self.fits] for part in parts])
+
+
+def _chance(model: Any, x: Floats) -> Floats:
+    """Of a model that may have seen but one outcome."""
+    found = model.predict_proba(x)
+    return found @ np.asarray(model.classes_, float)
 
 
 def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fitted:
@@ -443,27 +459,33 @@ def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fit
 
     known = np.isfinite(y)
     x, y, points = x[known], y[known], points[known]
+    settings = np.unique(points)
+    if len(settings) < FOLDS:
+        refuse(f"expected {FOLDS} settings or more in which all is told, found {len(settings)}")
+    folds = [*GroupKFold(FOLDS).split(x, y, points)]
     losses: dict[str, float] = {}
     kinds = models() if chance else regressions()
+    if chance and any(len(np.unique(y[train])) == 1 for train, _ in folds):
+        kinds = {"constant": kinds["constant"]}
     for name, make in kinds.items():
         loss = np.zeros(len(y))
-        for train, test in GroupKFold(FOLDS).split(x, y, points):
+        for train, test in folds:
             model = make().fit(x[train], y[train].astype(int) if chance else y[train])
             if chance:
-                p = np.clip(model.predict_proba(x[test])[:, -1], 1e-6, 1 - 1e-6)
+                p = np.clip(_chance(model, x[test]), 1e-6, 1 - 1e-6)
                 loss[test] = -np.where(y[test] > 0, np.log(p), np.log(1 - p))
             else:
                 loss[test] = (model.predict(x[test]) - y[test]) ** 2
         losses[name] = float(loss.mean())
     best = min(losses, key=losses.__getitem__)
     rng = np.random.default_rng(0)
-    fits, settings = [], np.unique(points)
+    fits: list[Any] = []
     while len(fits) < FITS:
         times = np.bincount(
             rng.integers(len(settings), size=len(settings)), minlength=len(settings)
         )
         rows = np.repeat(np.arange(len(y)), times[np.searchsorted(settings, points)])
-        if not chance or len(set(y[rows])) == 2:
+        if not chance or len(set(y[rows])) == len(set(y)):
             fits.append(kinds[best]().fit(x[rows], y[rows].astype(int) if chance else y[rows]))
     spread = 0.0 if chance else math.sqrt(losses[best])
     return Fitted(best, (losses[best], losses["constant"]), fits, spread)
@@ -498,7 +520,10 @@ def weights_of(likelihoods: Mapping[str, Floats]) -> Floats:
     """Weights of draws, their sum 1."""
     product = np.prod(list(likelihoods.values()), axis=0)
     if not product.sum() > 0:
-        raise SystemExit("no setting within the ranges has a likelihood above zero")
+        refuse(
+            "expected a setting within the ranges with a likelihood above zero, found none: widen "
+            "the ranges of the study"
+        )
     return product / product.sum()
 
 
@@ -670,14 +695,16 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
     return "\n".join(text)
 
 
-def following(name: str, files: Sequence[Path], count: int, trials: int, seed: int) -> str:
-    """A study of settings drawn from what is left."""
+def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
+    """A study of settings drawn from what is left; by a power of the likelihood it is a search."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
-    draws = prior(unknowns, DRAWS, seed)
+    draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
-    weights = weights_of(outcome.likelihoods(draws.x, group.paper))
-    chosen = np.random.default_rng(seed).choice(DRAWS, size=count, replace=False, p=weights)
-    return study_of(name, [draws.setting(k) for k in chosen], trials, LATER + seed)
+    likelihoods = outcome.likelihoods(draws.x, group.paper)
+    weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
+    rng = np.random.default_rng(told.seed)
+    chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
+    return study_of(name, [draws.setting(k) for k in chosen], told.trials, LATER + told.seed)
 
 
 def best(name: str, files: Sequence[Path], count: int) -> None:
@@ -768,6 +795,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
+    parser.add_argument("--power", type=float, default=1.0)
     told = parser.parse_args()
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
@@ -778,7 +806,7 @@ def main() -> None:
     elif told.part == "best":
         best(name, files, told.count)
     elif told.part == "next":
-        sys.stdout.write(following(name, files, told.count, told.trials, told.seed))
+        sys.stdout.write(following(name, files, told))
     else:
         {"weigh": weigh, "recover": recover, "rows": keep}[told.part](name, files)
 
