@@ -35,7 +35,7 @@ Row = Mapping[str, str]
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 SPREAD = 0.15
 """Standard deviation of the logarithm of a mean speed beside that of chance."""
-DRAWS = 300_000
+DRAWS = 100_000
 """Settings that are weighed."""
 CHUNK = 20_000
 """Settings whose outcomes are told at a time: what fits into the memory of a laptop."""
