@@ -25,7 +25,6 @@ from antennate.experiments.reproduce import experiment as reproduce
 from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig, draw
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
 from antennate.messages import command_words
-from antennate.params.base import put_over
 
 BY_NAME = {claim.name: claim for claim in CLAIMS}
 
@@ -303,13 +302,26 @@ def test_a_fitted_file_changes_its_own_experiment_by_what_it_states(name: str) -
     stated = tomllib.loads(fitted()[name].read_text())
     assert not {"trials", "seed"} & set(stated)
     usual, ours = ReproduceConfig(), ReproduceConfig(setting="fitted")
-    told = reproduce.configured(name, ours).model_dump(mode="json")
-    default = experiments.load(name).config.model_validate(reproduce.FULL[name] | {"seed": 7})
-    want = put_over(default.model_dump(mode="json"), stated)
-    want |= {"trials": 200} if "trials" in want and name in ("wall", "tunnel") else {}
-    assert told == want
+    beside = dict(reproduce.FULL[name]) | {"seed": 7}
+    beside |= {"trials": 200} if name in ("wall", "tunnel") else {}
+    words = ["--config", str(fitted()[name])]
+    for key in beside.keys() - stated:
+        words += [f"--{key.replace('_', '-')}", str(beside[key])]
+    assert reproduce.configured(name, ours) == parsed(experiments.load(name), words)[0]
     for other in set(reproduce.FULL) - set(fitted()):
         assert reproduce.configured(other, ours) == reproduce.configured(other, usual)
+
+
+def test_what_a_fitted_file_states_wins_over_what_is_usual(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "calibrate.toml"
+    file.write_text("averaging_time = 0.3\n")
+    monkeypatch.setattr(reproduce, "fitted", lambda: {"calibrate": file})
+    config = ReproduceConfig(setting="fitted")
+    assert reproduce.configured("calibrate", config).model_dump()["averaging_time"] == 0.3
+    told = "antennate calibrate --config fitted --seed 7"
+    assert reproduce.command("calibrate", config) == told
 
 
 def test_where_numbers_were_fitted_a_claim_is_fitted_at_best_and_says_so(
