@@ -167,10 +167,10 @@ def _file_of(experiment: Experiment[Any, Any], path: Path | None) -> Path | None
     """The file to read; the word `fitted` is that of this package, if there is one."""
     if path is None or path != Path(FITTED):
         return path
-    if (ours := fitted().get(experiment.name)) is None and not path.exists():
+    if (ours := fitted().get(experiment.name)) is None and not path.is_file():
         those = ", ".join(map(command_words, fitted()))
         raise ConfigError(f"expected a FILE, found {FITTED}, a word that only these take: {those}")
-    if ours and path.exists():
+    if ours and path.is_file():
         raise ConfigError(
             f"--config: expected {FITTED} to be numbers of ours, found a file of that name, too; "
             "rename it, or run elsewhere"

@@ -60,7 +60,7 @@ FULL: Mapping[str, Mapping[str, Any]] = {
 }
 """Its settings otherwise: its defaults, and more tunnels."""
 _FULL_FITTED: Mapping[str, Mapping[str, Any]] = {"wall": {"trials": 200}, "tunnel": {"trials": 200}}
-"""Its settings with fitted numbers."""
+"""Its settings beside numbers that were fitted; of others those above."""
 _WORK = {"calibrate": 2, "force": 1, "touch": 4, "sweep": 28, "gait": 3, "wall": 16, "tunnel": 86}
 """Processor time of each experiment with `quick` [s]: what a bar counts; of others at most 1."""
 _MORE = {"force": 8, "touch": 22, "sweep": 5, "gait": 3, "wall": 3, "tunnel": 10}
@@ -142,7 +142,7 @@ def configured(name: str, config: ReproduceConfig) -> Params:
 
 
 def _settings(name: str, config: ReproduceConfig) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What flags say of an experiment, and what its file of fitted numbers does: that is kept."""
+    """Flags of an experiment, and its fitted numbers, over which no flag stands."""
     model, base = experiments.load(name).config, dict[str, Any]()
     flags = dict((QUICK if config.quick else FULL)[name])
     if is_fitted(name, config):

@@ -132,8 +132,8 @@ class Finding:
         ours: Our numbers, in words.
         holds: Whether the criterion is met; None if the trials decide neither.
         reason: Why, and for `conditional` under which condition.
-        by_default: What is said besides with our default settings alone.
         bars: The paper's numbers and ours, in the claim's unit; the paper's first.
+        by_default: What is also said, but of our default settings alone.
     """
 
     ours: str
