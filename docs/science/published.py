@@ -700,7 +700,8 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
-    likelihoods = outcome.likelihoods(draws.x, group.paper)
+    said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
+    likelihoods = outcome.likelihoods(draws.x, said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
     rng = np.random.default_rng(told.seed)
     chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
@@ -795,7 +796,8 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
-    parser.add_argument("--power", type=float, default=1.0)
+    parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
+    parser.add_argument("--only", nargs="+", help="statements to search by")
     told = parser.parse_args()
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
