@@ -1,12 +1,13 @@
-"""Weighs settings by what the paper says: `python docs/science/published.py PART FOLDER...`.
+"""Weighs settings by what the paper says: `python docs/science/published.py PART GROUP FILE...`.
 
 Parts, over folders of `antennate study studies/published_GROUP.toml` or of later stages: `weigh`
 fits the outcome over the unknowns, and writes what is left of their ranges to
-docs/science/published_GROUP.json and a figure. `hidden` prints a study of three hidden settings;
+docs/science/published_GROUP.json and figures. `hidden` prints a study of hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
-prints a study of settings drawn from what is left, `best` names the likeliest settings by
-their own trials; `rows` keeps the rows of folders as one table.
-Needs `uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
+prints a study of settings drawn from what is left, or searched by some of the statements. `best`
+names the likeliest settings by their own trials. `tune` prints a search of the published rule or
+of a clock in the setting of a file. `rows` keeps the rows of folders as one table. Needs
+`uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import tuning
 from numpy.typing import NDArray
 from published_figures import marginals, pairs, screening
 from scipy.stats import binom, norm
@@ -54,6 +56,8 @@ LATER = 571000
 """Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
 FRESH = 572001
 """Seed on which the likeliest setting is judged."""
+TUNING = 571999
+"""Seed on which the rule and its rivals are tuned in a setting."""
 HIDDEN = 20261130
 """Seed of hidden settings."""
 
@@ -741,6 +745,49 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
     (HERE / f"published_{name}_best.toml").write_text(text + "\n", encoding="utf-8")
 
 
+SEARCHED = {
+    "paper": """
+"rule.threshold" = { low = 0.05, high = 0.9 }
+"rule.hysteresis" = { low = 0.0, high = 0.1 }
+"rule.strong" = { low = 0.3, high = 0.95 }
+"rule.similar" = { low = 0.05, high = 0.5 }
+"rule.hold_time" = { low = 0.3, high = 6.0, log = true }
+"conditioning.averaging_time" = { low = 0.02, high = 0.5, log = true }
+"gait.turn_offset" = { low = 0.1, high = 0.6 }
+""",
+    **{rival: tuning.SEARCHED[rival] for rival in ("timed", "schedule")},
+}
+"""What is searched of the rule and of the clocks, each with the same budget."""
+
+
+def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
+    """A search by `antennate study design` of one controller in a setting."""
+    searched = {"control." + name for name in tomllib.loads(SEARCHED[controller])}
+    fixed = [
+        f"{path} = {json.dumps(value)}"
+        for path, value in _paths(tomllib.loads(file.read_text(encoding="utf-8")))
+        if path not in searched | {"trials", "seed", "controllers"}
+    ]
+    return "\n".join(
+        [
+            f"proposals = {proposals}\nvalidated = 1\nvalidation_factor = 1\n",
+            f"[search]{SEARCHED[controller]}",
+            f'[evaluate.tunnel]\ntrials = {trials}\nminimize = ["time_s"]\n',
+            f'[evaluate.tunnel.settings]\ncontrollers = ["{controller}"]\nseed = {TUNING}',
+            *fixed,
+        ]
+    )
+
+
+def _paths(tables: Mapping[str, Any], before: str = "") -> Iterable[tuple[str, Any]]:
+    """Values of nested tables by their dotted paths."""
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            yield from _paths(value, f"{before}{key}.")
+        else:
+            yield before + key, value
+
+
 def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
@@ -787,15 +834,19 @@ def _short(text: str) -> str:
         return text
 
 
+PARTS = ("weigh", "hidden", "recover", "next", "best", "tune", "rows")
+
+
 def main() -> None:
     """Run one part."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next", "best", "rows"))
+    parser.add_argument("part", choices=PARTS)
     parser.add_argument("group", choices=GROUPS)
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
+    parser.add_argument("--controller", choices=SEARCHED, default="paper")
     parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
     parser.add_argument("--only", nargs="+", help="statements to search by")
     told = parser.parse_args()
@@ -807,6 +858,8 @@ def main() -> None:
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
     elif told.part == "best":
         best(name, files, told.count)
+    elif told.part == "tune":
+        sys.stdout.write(tuned(files[0], told.controller, told.count, told.trials))
     elif told.part == "next":
         sys.stdout.write(following(name, files, told))
     else:
