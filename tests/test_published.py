@@ -38,7 +38,9 @@ def test_likelihoods_of_statements(published):
     assert published.Count(10, 10).likelihood(chance, 0.0)[1] == pytest.approx(0.34868, 1e-4)
     # 20 of 20 at 0.9, and a coin that shows 11 or more heads of 20: 0.41190
     assert published.AtLeast(20, 20).likelihood(chance, 0.0)[1] == pytest.approx(0.12158, 1e-4)
-    assert published.AtLeast(11, 20).likelihood(np.array([0.5]), 0.0) == pytest.approx([0.4119], 1e-4)
+    assert published.AtLeast(11, 20).likelihood(np.array([0.5]), 0.0) == pytest.approx(
+        [0.4119], 1e-4
+    )
     # at the mean the normal density is 0.39894 over its standard deviation, here 0.25
     mean = published.Mean(0.12, 4)
     assert mean.likelihood(np.log([0.12]), 0.4) == pytest.approx([1.5958], 1e-4)
