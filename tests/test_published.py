@@ -96,6 +96,13 @@ def test_what_weights_tell(published):
     assert all(abs(other["nats"]) < 0.01 for other in others)
 
 
+def test_what_a_measurement_would_settle(published):
+    x = np.random.default_rng(7).uniform(size=(20_000, 3))
+    weights = np.full(20_000, 1 / 20_000)
+    shares = published.measured(["a", "b", "c"], x, weights, x[:, 0] + 2 * x[:, 1])
+    assert shares == pytest.approx({"a": 0.2, "b": 0.8, "c": 0.0}, abs=0.02)  # variances 1 to 4
+
+
 def test_effects_of_unknowns(published):
     rng = np.random.default_rng(6)
     x = rng.uniform(size=(400, 4))

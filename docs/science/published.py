@@ -511,12 +511,17 @@ class Outcome:
             }
         )
 
-    def likelihoods(self, x: Floats, said: Mapping[str, Statement]) -> dict[str, Floats]:
-        """Likelihood of each statement in settings, mean over the fits, shape (n,)."""
+    def at(self, x: Floats) -> dict[str, Floats]:
+        """What comes out in settings by each fit, shape (fits, n)."""
+        return {name: model.at(x) for name, model in self.models.items()}
+
+    def likelihoods(
+        self, told: Mapping[str, Floats], said: Mapping[str, Statement]
+    ) -> dict[str, Floats]:
+        """Likelihood of each statement where that comes out, mean over the fits, shape (n,)."""
         return {
-            name: statement.likelihood(model.at(x), model.spread).mean(axis=0)
+            name: statement.likelihood(told[name], self.models[name].spread).mean(axis=0)
             for name, statement in said.items()
-            for model in [self.models[name]]
         }
 
 
@@ -604,6 +609,25 @@ def pairs_of(names: Sequence[str], x: Floats, weights: Floats, count: int) -> li
     return sorted(found, key=lambda pair: -pair["nats"])[:count]
 
 
+def measured(names: Sequence[str], x: Floats, weights: Floats, chance: Floats) -> dict[str, float]:
+    """How much of what is left open of an outcome a measurement of each unknown would settle.
+
+    Share of the variance of the outcome over what is left that lies between values of the unknown,
+    less what chance alone gives.
+    """
+    effective = 1.0 / float((weights**2).sum())
+    middle = float(weights @ chance)
+    whole = max(float(weights @ (chance - middle) ** 2), 1e-12)
+    found = {}
+    for k, name in enumerate(names):
+        place, count = _places(x[:, k], BINS)
+        mass = np.bincount(place, weights, count)
+        means = np.bincount(place, weights * chance, count)[mass > 0] / mass[mass > 0]
+        between = float(mass[mass > 0] @ (means - middle) ** 2)
+        found[name] = round(between / whole - (count - 1) / effective, 3)
+    return found
+
+
 def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
     """Of each outcome the change from one end of each unknown to the other, and its size as noise.
 
@@ -634,7 +658,8 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     rows = read(files, group, unknowns)
     outcome = Outcome.of(rows, group)
     x = prior(unknowns, DRAWS).x
-    likelihoods = outcome.likelihoods(x, group.paper)
+    told = outcome.at(x)
+    likelihoods = outcome.likelihoods(told, group.paper)
     weights = weights_of(likelihoods)
     result = {
         "trials": len(rows.x),
@@ -649,16 +674,19 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         "largest": {n: round(float(v.max()), 4) for n, v in likelihoods.items()},
         "together": float(np.prod(list(likelihoods.values()), axis=0).mean()),
         "there": {
-            n: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
-            for n, m in outcome.models.items()
+            n: [round(v, 4) for v in quantiles(y.mean(axis=0), weights, (0.05, 0.5, 0.95))]
+            for n, y in told.items()
         },
         "effects": effects_of(rows, unknowns.names),
+        "measured": {
+            n: measured(unknowns.names, x, weights, y.mean(axis=0)) for n, y in told.items()
+        },
         "left": left_of(unknowns.names, x, weights),
     }
     ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
     narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
-    told = [k for k, n in enumerate(unknowns.names) if n in narrowed]
-    result["pairs"] = pairs_of([unknowns.names[k] for k in told], x[:, told], weights, PAIRS)
+    these = [k for k, n in enumerate(unknowns.names) if n in narrowed]
+    result["pairs"] = pairs_of([unknowns.names[k] for k in these], x[:, these], weights, PAIRS)
     for kind, drawn in {
         "": marginals(narrowed, ends),
         "-pairs": pairs(result["pairs"], ends),
@@ -672,6 +700,9 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         print(f"{n}: {found}, likelihood {result['evidence'][n]}, at most {result['largest'][n]}")
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
     print("in what is left:", result["there"])
+    for n, shares in result["measured"].items():
+        first = sorted(shares.items(), key=lambda item: -item[1])[:4]
+        print(f"{n}: settled most by {', '.join(f'{u} ({v:.0%})' for u, v in first)}")
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
         print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
 
@@ -705,7 +736,7 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
-    likelihoods = outcome.likelihoods(draws.x, said)
+    likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
     rng = np.random.default_rng(told.seed)
     chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
@@ -794,6 +825,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
     hidden = read(files[:1], group, unknowns)
     outcome = Outcome.of(read(files[1:], group, unknowns), group)
     x = prior(unknowns, DRAWS).x
+    chances = outcome.at(x)
     told = inside = 0
     for place in sorted(set(hidden.points.tolist())):
         here = hidden.points == place
@@ -802,7 +834,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
             known = y[here][np.isfinite(y[here])]
             if len(known):
                 said[n] = group.paper[n].again(known)
-        weights = weights_of(outcome.likelihoods(x, said))
+        weights = weights_of(outcome.likelihoods(chances, said))
         print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
         for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
             if found["narrowed"] > NARROWED:
