@@ -27,7 +27,7 @@ from typing import Any, NoReturn
 import numpy as np
 import tuning
 from numpy.typing import NDArray
-from published_figures import marginals, pairs, screening
+from published_figures import marginals, pairs, screening, trade
 from scipy.stats import binom, norm
 
 from antennate.figures import render
@@ -50,6 +50,10 @@ NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
 PAIR_BINS, PAIRS = 5, 4
 """Parts of a range in a pair, and pairs that are drawn."""
+ENOUGH = 4
+"""Trials from which on a setting is drawn alone."""
+JUDGED: Sequence[tuple[float, float]] = ()
+"""Shares on fresh trials of settings that were judged: without and with the rule."""
 SHUFFLES = 200
 """Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
@@ -687,11 +691,14 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
     these = [k for k, n in enumerate(unknowns.names) if n in narrowed]
     result["pairs"] = pairs_of([unknowns.names[k] for k in these], x[:, these], weights, PAIRS)
-    for kind, drawn in {
+    figures = {
         "": marginals(narrowed, ends),
         "-pairs": pairs(result["pairs"], ends),
         "-screening": screening(result["effects"]),
-    }.items():
+    }
+    if name == "tunnel":
+        figures["-trade"] = trade(traded(rows), JUDGED)
+    for kind, drawn in figures.items():
         image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
         image.write_bytes(render(drawn)["png"])
     text = json.dumps(result, indent=1)
@@ -705,6 +712,17 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         print(f"{n}: settled most by {', '.join(f'{u} ({v:.0%})' for u, v in first)}")
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
         print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
+
+
+def traded(rows: Rows) -> list[tuple[float, float, int]]:
+    """Of settings with enough trials the share that crosses without and with the rule."""
+    found = []
+    for point in np.unique(rows.points):
+        here = rows.points == point
+        if here.sum() >= ENOUGH:
+            shares = (float(rows.outcomes[f"{n} crosses"][here].mean()) for n in ("open", "paper"))
+            found.append((*shares, int(here.sum())))
+    return found
 
 
 def study_file(name: str) -> Path:
