@@ -100,7 +100,30 @@ class Mean:
         return Mean(math.exp(float(values.mean())), len(values))
 
 
-Statement = Count | AtLeast | Mean
+@dataclass(frozen=True)
+class Near:
+    """A number, so far from that of the setting at most, or one that is below it.
+
+    Attributes:
+        sd: Standard deviation of the distance.
+        below: Whether any number of the setting below it serves as well.
+    """
+
+    value: float
+    sd: float
+    below: bool = False
+
+    def likelihood(self, number: Floats, spread: float) -> Floats:
+        """Of numbers, about which the model errs with a standard deviation."""
+        law = norm.cdf if self.below else norm.pdf
+        return law(self.value - number, scale=math.hypot(spread, self.sd))
+
+    def again(self, values: Floats) -> Near:
+        """What another recording says: a number, as a bound is not seen."""
+        return Near(float(values.mean()), self.sd)
+
+
+Statement = Count | AtLeast | Mean | Near
 
 
 @dataclass(frozen=True)
@@ -112,12 +135,14 @@ class Group:
         all: Who has to be there.
         outcomes: What the paper speaks of, from the rows of all; NaN where a trial does not tell.
         paper: What it says of each.
+        told: Status of rows that are read.
     """
 
     who: str
     all: tuple[str, ...]
     outcomes: Mapping[str, Callable[[Mapping[str, Row]], float]]
     paper: Mapping[str, Statement]
+    told: tuple[str, ...] = ("ok",)
 
 
 def _crossed(name: str) -> Callable[[Mapping[str, Row]], float]:
@@ -145,6 +170,34 @@ def _ended(name: str, outcome: str) -> Callable[[Mapping[str, Row]], float]:
 
 def _below(name: str, degrees: float) -> Callable[[Mapping[str, Row]], float]:
     return lambda rows: float(float(rows[name]["hinge_max_deg"]) < degrees)
+
+
+def _calibrated(rows: Mapping[str, Row]) -> float:
+    return float(rows["calibrate"]["status"] == "ok")
+
+
+def _number(of: Callable[[Callable[[str], float]], float]) -> Callable[[Mapping[str, Row]], float]:
+    """Of a calibration, from its columns; NaN of a recording that was refused."""
+
+    def number(rows: Mapping[str, Row]) -> float:
+        row = rows["calibrate"]
+        return of(lambda name: float(row[f"calibration.{name}"])) if _calibrated(rows) else math.nan
+
+    return number
+
+
+def _apart(column: Callable[[str], float]) -> float:
+    """Logarithm of how much the speeds miss R² of 0.95 and 0.02 between them, the larger one."""
+    r2 = [column(f"speeds.{k}.r2") for k in range(3)]
+    return math.log(max((1 - min(r2)) / 0.05, (max(r2) - min(r2)) / 0.02, 1e-3))
+
+
+def _beaten(column: Callable[[str], float]) -> float:
+    """Logarithm of the sigmoid's error over that of its best rival, on pushes left out."""
+    sigmoid, *rivals = (
+        column(f"cross_validated_rmse.{name}") for name in ("sigmoid", "line", "isotonic")
+    )
+    return math.log(sigmoid / min(rivals))
 
 
 GROUPS = {
@@ -181,6 +234,25 @@ GROUPS = {
             "descending passes": AtLeast(17, 20),
             "springs below 30 deg": AtLeast(20, 20),
         },
+    ),
+    "calibration": Group(
+        "command",
+        ("calibrate",),
+        {
+            "calibrated": _calibrated,
+            "slope": _number(lambda column: math.log(column("slope"))),
+            "midpoint": _number(lambda column: column("midpoint")),
+            "one curve": _number(_apart),
+            "sigmoid": _number(_beaten),
+        },
+        {
+            "calibrated": Count(1, 1),
+            "slope": Near(math.log(18.3), 0.1),
+            "midpoint": Near(0.305, 0.025),
+            "one curve": Near(0.0, 0.2, below=True),
+            "sigmoid": Near(0.0, 0.05, below=True),
+        },
+        told=("ok", "failed"),
     ),
 }
 
@@ -301,8 +373,9 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     """
     found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in lines(files):
-        if row["status"] == "ok":
-            found.setdefault((row["point"], row["trial"]), {})[row[group.who]] = row
+        if row["status"] in group.told:
+            who = row[group.who] or group.all[0]  # a trial that failed has no columns
+            found.setdefault((row["point"], row["trial"]), {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
         raise SystemExit(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
@@ -330,7 +403,7 @@ def _values(unknowns: Unknowns, row: Mapping[str, str]) -> dict[str, Any]:
         elif isinstance(axis, list) and isinstance(axis[0], str):
             found[name] = text
         else:
-            found[name] = float(text)
+            found[name] = int(text) if text.isdigit() else float(text)
     return found
 
 
@@ -443,7 +516,7 @@ class Outcome:
         """Fitted to trials."""
         return cls(
             {
-                name: choose(rows.x, y, rows.points, not isinstance(group.paper[name], Mean))
+                name: choose(rows.x, y, rows.points, isinstance(group.paper[name], Count | AtLeast))
                 for name, y in rows.outcomes.items()
             }
         )
@@ -581,10 +654,10 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
     text = [
         f'experiment = "{first["experiment"]}"',
         'plan = "list"',
-        f"trials = {trials}",
+        *([f"trials = {trials}"] if "trials" in first else []),
         "",
         "[settings]",
-        *(f"{key} = {json.dumps(value)}" for key, value in first["settings"].items()),
+        *(f"{key} = {json.dumps(value)}" for key, value in first.get("settings", {}).items()),
         f"seed = {seed}",
         "",
         "[vary]",
@@ -618,8 +691,8 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
             y = rows.outcomes[n][here]
             y = y[np.isfinite(y)]
             told[n] = f"{y.mean():.2f} of {len(y)}" if len(y) else "-"
-            if isinstance(said, Mean):
-                spread = float(y.std(ddof=1)) if len(y) > 1 else 1.0
+            if isinstance(said, Mean | Near):
+                spread = float(y.std(ddof=1)) if len(y) > 1 else float(isinstance(said, Mean))
                 likely = said.likelihood(y.mean(keepdims=True), spread) if len(y) else np.zeros(1)
             else:
                 likely = said.likelihood(np.array([(y.sum() + 1) / (len(y) + 2)]), 0.0)
@@ -628,7 +701,8 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
     found.sort(key=lambda item: -item[0])
     for logarithm, point, told in found[:count]:
         print(f"{logarithm:8.2f}  point {point}: {told}")
-    tables: dict[str, list[str]] = {"": ["trials = 200", f"seed = {FRESH}"]}
+    trials = ["trials = 200"] if "trials" in tomllib.loads(study_file(name).read_text()) else []
+    tables: dict[str, list[str]] = {"": [*trials, f"seed = {FRESH}"]}
     for path, value in values[found[0][1]].items():
         table, _, key = path.rpartition(".")
         tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
@@ -665,7 +739,10 @@ def recover(name: str, files: Sequence[Path]) -> None:
 def keep(name: str, files: Sequence[Path]) -> None:
     """Keep the rows of studies as one table, only what is read here."""
     unknowns, group = Unknowns.of(study_file(name)), GROUPS[name]
-    read_here = ("outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg")
+    read_here = ["outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg"]
+    read_here += ["calibration.slope", "calibration.midpoint"]
+    read_here += [f"calibration.speeds.{k}.r2" for k in range(3)]
+    read_here += [f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")]
     columns = ["point", "seed", *unknowns.axes, "trial", group.who, *read_here, "status"]
     rows = [*lines(files)]
     columns = [column for column in columns if column in rows[0]]
