@@ -43,6 +43,7 @@ tunnel --json yes :: expected flags only, found 'yes'
 tunnel stray :: expected flags only :: 'stray'
 tunnel --out '' :: --out: expected a path, found nothing
 tunnel --tunnel.mirror often :: expected one of random, never or always
+gait --config fitted :: expected a FILE, found fitted, a word that only these take :: bench wall
 tunnel --trials many :: --trials: expected a whole number, found many
 tunnel --seed '' :: --seed: expected a whole number, found ''
 tunnel --robot '' :: --robot: expected  :: found nothing

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
 from antennate import experiments
-from antennate.cli.arguments import parse
-from antennate.cli.experiment import Options
+from antennate.cli import main
+from antennate.cli.experiment import parsed
 from antennate.control.registry import RIVAL
+from antennate.experiments import fitted
 from antennate.experiments.reproduce import experiment as reproduce
 from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig, draw
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
@@ -278,16 +282,131 @@ def test_there_are_as_many_claims_as_asked_for_and_each_is_run() -> None:
     assert {claim.experiment for claim in CLAIMS} == set(reproduce.QUICK) == set(reproduce.FULL)
 
 
+@pytest.mark.parametrize("setting", ["default", "fitted"])
 @pytest.mark.parametrize("quick", [True, False])
 @pytest.mark.parametrize("name", list(reproduce.QUICK))
-def test_the_command_beside_a_claim_runs_just_that(name: str, quick: bool) -> None:
-    config = ReproduceConfig(quick=quick)
+def test_the_command_beside_a_claim_runs_just_that(
+    name: str, quick: bool, setting: Literal["default", "fitted"]
+) -> None:
+    config = ReproduceConfig(quick=quick, setting=setting)
     words = shlex.split(reproduce.command(name, config))
     asked = ["antennate", *command_words(name).split()]
     assert words[: len(asked)] == asked
-    told = experiments.load(name).config
-    parsed, _ = parse(name, "", told, words[len(asked) :], Options)
-    assert parsed == told.model_validate(reproduce.settings(name, config))
+    told, _ = parsed(experiments.load(name), words[len(asked) :])
+    assert told == reproduce.configured(name, config)
+
+
+@pytest.mark.parametrize("name", list(fitted()))
+def test_a_fitted_file_changes_its_own_experiment_by_what_it_states(name: str) -> None:
+    """Trials and seed are told beside it; what it states holds, and nothing else does."""
+    stated = tomllib.loads(fitted()[name].read_text())
+    assert not {"trials", "seed"} & set(stated)
+    usual, ours = ReproduceConfig(), ReproduceConfig(setting="fitted")
+    beside = dict(reproduce.FULL[name]) | {"seed": 7}
+    beside |= {"trials": 200} if name in ("wall", "tunnel") else {}
+    words = ["--config", str(fitted()[name])]
+    for key in beside.keys() - stated:
+        words += [f"--{key.replace('_', '-')}", str(beside[key])]
+    assert reproduce.configured(name, ours) == parsed(experiments.load(name), words)[0]
+    for other in set(reproduce.FULL) - set(fitted()):
+        assert reproduce.configured(other, ours) == reproduce.configured(other, usual)
+
+
+def test_what_a_fitted_file_states_wins_over_what_is_usual(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "calibrate.toml"
+    file.write_text("averaging_time = 0.3\n")
+    monkeypatch.setattr(reproduce, "fitted", lambda: {"calibrate": file})
+    config = ReproduceConfig(setting="fitted")
+    assert reproduce.configured("calibrate", config).model_dump()["averaging_time"] == 0.3
+    told = "antennate calibrate --config fitted --seed 7"
+    assert reproduce.command("calibrate", config) == told
+
+
+def test_where_numbers_were_fitted_a_claim_is_fitted_at_best_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Here the soft one slips and all springs stay below 30°: conditional by default."""
+    found = passing(20, 3)
+    found["profiles"] |= {"stiff": profile(jams=19), "compliant": profile(slips=19)}
+    for row in found["profiles"].values():
+        row["hinge_max_deg"] = 20.0
+    load = experiments.load
+    stub = dataclasses.replace(load("wall"), run=lambda *_: SimpleNamespace(result=lambda: found))
+    monkeypatch.setattr(experiments, "load", lambda n: stub if n == "wall" else load(n))
+    monkeypatch.setattr(reproduce, "FULL", {"taper": {}, "wall": {}})
+    monkeypatch.setattr(reproduce, "QUICK", {"taper": {}, "wall": {}})
+
+    def rows(**told: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        outcome = EXPERIMENT.run(ReproduceConfig(**told), 1, lambda *_: None, lambda row: None)
+        return outcome.result(), outcome.result()["claims"]
+
+    _, usual = rows()
+    whole, ours = rows(setting="fitted")
+    assert [row["verdict"] for row in usual[1:]] == [
+        *["fitted", "conditional"],
+        *["fitted"] * 2,
+        "conditional",
+    ]
+    assert [row["verdict"] for row in ours[1:]] == ["fitted"] * 5
+    assert ours[0] == usual[0]  # has no fitted numbers
+    assert [row["criterion"] for row in ours] == [row["criterion"] for row in usual]
+    assert all("chosen" in row["reason"] for row in usual[1:5])
+    for row in ours[1:]:
+        assert not {"chosen", "assumed", "53°"} & set(re.findall(r"[\w°]+", row["reason"]))
+        assert row["command"] == "antennate bench wall --config fitted --trials 200 --seed 7"
+    assert whole["setting"] == "fitted"
+    assert "fitted to the paper" in EXPERIMENT.sentence(whole)
+    assert EXPERIMENT.body is not None
+    page = EXPERIMENT.body(whole, {})
+    assert page.count("At best fitted: numbers that the paper does not give were fitted") == 5
+    assert "53°" not in page
+
+
+@pytest.mark.parametrize(
+    ("name", "result"),
+    [
+        ("bend", bent(30.0, 60.0)),
+        ("blind", blind(6, 10)),
+        ("published_rule", tunnel("paper", 95, 50)),
+        ("speed", tunnel("closed", 95, 50)),
+        ("blind_speed", tunnel("closed", 95, 50)),
+        ("centred", tunnel("closed", 95, 50, apart=[0.01, 0.02])),
+    ],
+)
+def test_a_reason_of_our_defaults_is_not_told_where_numbers_were_fitted(
+    name: str, result: dict[str, Any]
+) -> None:
+    """A rule, a corner or a corridor of ours is none of another setting."""
+    claim = BY_NAME[name]
+    finding = claim.judge(result)
+    said, ours = claim.reason(finding), claim.when_fitted().reason(finding)
+    words = {"ours are assumed", "At 75°", "0.1 m to either side", "nearly free speed", "no mark"}
+    assert any(word in said for word in words)
+    assert not any(word in ours for word in words)
+
+
+def test_the_word_fitted_is_a_file_only_where_there_is_no_choice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    few = ["--trials", "1", "--profiles", "stiff", "--no-figures", "--workers", "1"]
+    wall = ["bench", "wall", "--config", "fitted", *few, "--wall.travel", "0.08"]
+    assert main([*wall, "--out", "fitted"]) == 0  # a folder may have the name
+    kept = tomllib.loads(Path("fitted/config.toml").read_text())
+    Path("fitted").rename("run")
+    assert kept["wall"]["base_angle"] == pytest.approx(math.radians(44.6), abs=1e-3)
+    Path("fitted").write_text("trials = 1\nunknown = 2\n")
+    capsys.readouterr()
+    assert main(wall) == 2
+    assert (
+        "--config: expected fitted to be numbers of ours, found a file" in capsys.readouterr().err
+    )
+    assert main(["antenna", "taper", "--config", "fitted"]) == 2  # has none, so it reads the file
+    assert "fitted: trials" in capsys.readouterr().err
+    assert main(["bench", "wall", "--help"]) == 0
+    assert "the word fitted" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("quick", [True, False])

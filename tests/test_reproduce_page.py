@@ -10,13 +10,31 @@ from pathlib import Path
 
 import pytest
 
-from antennate.experiments.reproduce.experiment import CLAIMS
+from antennate.experiments.reproduce.experiment import CLAIMS, ReproduceConfig, configured
+from antennate.studies.run_directory import RunDirectory
 
 DOCS = Path(__file__).parents[1] / "docs"
 
 
 def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-W", "error", str(folder / "reproduce.py"), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+WALL_ALONE = """\
+import runpy, sys
+from antennate.experiments.reproduce import experiment
+every = experiment.fitted()
+experiment.fitted = lambda: {"wall": every["wall"]}
+sys.path.insert(0, sys.argv[1].removesuffix("reproduce.py"))
+del sys.argv[0]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def run_with_the_wall_alone(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """As `run` where only the wall has numbers that were fitted."""
+    command = [sys.executable, "-c", WALL_ALONE, str(folder / "reproduce.py"), *options]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -37,7 +55,8 @@ def pages(tmp_path: Path) -> Path:
         }
         for i, claim in enumerate(CLAIMS)
     ]
-    result = {"quick": False, "interrupted": False, "seed": 7, "claims": rows}
+    told = {"quick": False, "setting": "default", "interrupted": False, "seed": 7}
+    result = told | {"claims": rows}
     (tmp_path / "science").mkdir()
     (tmp_path / "science" / "reproduce.json").write_text(json.dumps(result))
     return tmp_path
@@ -56,6 +75,45 @@ def test_both_pages_tell_what_the_run_found(pages: Path) -> None:
     assert {line.count(" | ") for line in table} == {4}  # a bar in a cell ends no cell
     assert all(claim.criterion in page for claim in CLAIMS)
     assert run(pages, "--check").returncode == 0
+
+
+def test_runs_with_fitted_numbers_stand_beside(pages: Path, tmp_path: Path) -> None:
+    """Of the wall soft slips, no spring reaches 30° and all else fails: 19 of 20 is over a half."""
+    row = {"trials": 20, "invalid": 0, "successes": 0, "jams": 0, "slips": 19, "hinge_max_deg": 9.0}
+    names = ("stiff", "compliant", "descending", "matched_uniform", "ascending")
+    pair = {"trials": 20, "only_first": 0, "only_second": 0}
+    found = {
+        "command": "wall",
+        "profiles": dict.fromkeys(names, row),
+        "paired": {f"descending-{name}": pair for name in names[3:]},
+    }
+    for setting in ("fitted", "default"):
+        config = configured("wall", ReproduceConfig(setting=setting))
+        with RunDirectory.create("wall", tmp_path / setting) as folder:
+            folder.describe(config)
+            folder.finish(found)
+    (tmp_path / "other").mkdir()
+    for name in ("config.toml", "result.json"):
+        text = (tmp_path / "fitted" / name).read_text().replace("trials = 200", "trials = 199")
+        (tmp_path / "other" / name).write_text(text)
+    done = run(pages, str(tmp_path / "other"))
+    assert "expected a run of `antennate bench wall --seed 7` or `antennate bench " in done.stderr
+    assert "missing: antennate antenna springs;" in run(pages, str(tmp_path / "default")).stderr
+    done = run_with_the_wall_alone(pages, str(tmp_path / "fitted"))
+    assert done.returncode == 0, done.stderr
+    page, index = ((pages / name).read_text() for name in ("reproduce.md", "index.md"))
+    counts = (f"1 conditional, {len(CLAIMS) - 1}", f"1 conditional, 2 fitted, {len(CLAIMS) - 3}")
+    mine, best = (f"{text} not reproduced" for text in counts)
+    assert f"{mine}. At the settings that fit best, so far of `bench wall`: {best}." in index
+    assert f"**{mine}**. At the settings that fit best, so far of `bench wall`: **{best}**" in page
+    cells = [line.rpartition(" | ")[2] for line in page.splitlines() if "1 &#124; 2" in line]
+    assert cells.count("- |") == len(CLAIMS) - 5
+    assert "**fitted**: 19 of 20 slip (76 to 99 %), 0 of 20 jam (0 to 16 %) |" in cells
+    assert "by `antennate bench wall --config fitted --trials 200 --seed 7`" in page
+    assert run(pages, "--check").returncode == 0
+    kept = pages / "science" / "reproduce_fitted.json"
+    kept.write_text(kept.read_text().replace('"quick": false', '"quick": true'))
+    assert "run `antennate reproduce --setting fitted` and" in run(pages, "--check").stderr
 
 
 @pytest.mark.parametrize("change", [{"quick": True}, {"interrupted": True}, {"claims": []}])

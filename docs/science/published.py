@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import sys
@@ -20,14 +21,14 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from published_figures import marginals, pairs, screening
 from scipy.stats import binom, norm
 
-from antennate.figures import FAINT, SERIES, WIDTH, canvas, render, styled
+from antennate.figures import render
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, str]
@@ -36,6 +37,8 @@ SPREAD = 0.15
 """Standard deviation of the logarithm of a mean speed beside that of chance."""
 DRAWS = 100_000
 """Settings that are weighed."""
+CHUNK = 20_000
+"""Settings whose outcomes are told at a time: what fits into the memory of a laptop."""
 FITS = 12
 """Fits to points drawn anew with replacement: what they leave open of the outcome."""
 FOLDS = 5
@@ -43,12 +46,22 @@ BINS = 10
 """Most parts of the range of an unknown that are told apart."""
 NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
+PAIR_BINS, PAIRS = 5, 4
+"""Parts of a range in a pair, and pairs that are drawn."""
+SHUFFLES = 200
+"""Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
 """Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
 FRESH = 572001
 """Seed on which the likeliest setting is judged."""
-HIDDEN = 20261129
+HIDDEN = 20261130
 """Seed of hidden settings."""
+
+
+def refuse(text: str) -> NoReturn:
+    """End with one line and exit code 2."""
+    sys.stderr.write(f"published.py: {text}\n")
+    raise SystemExit(2)
 
 
 @dataclass(frozen=True)
@@ -302,39 +315,68 @@ class Unknowns:
         """A setting as numbers from 0 to 1, one a name."""
         found: list[float] = []
         for name, axis in self.axes.items():
-            if isinstance(axis, list) and isinstance(axis[0], str):
-                found.append(axis.index(values[name]) / (len(axis) - 1))
-            elif isinstance(axis, list):
-                columns = np.array([_entries(choice) for choice in axis], float)
-                low, high = columns.min(axis=0), columns.max(axis=0)
-                found += [*((np.array(_entries(values[name])) - low) / (high - low))]
+            value = values[name]
+            if isinstance(axis, list):
+                found += _choices(axis)[axis.index(value)].tolist()
             elif axis.get("log"):
-                found.append(_share(*map(math.log, (values[name], axis["low"], axis["high"]))))
+                found.append(math.log(value / axis["low"]) / math.log(axis["high"] / axis["low"]))
             else:
-                found.append(_share(values[name], axis["low"], axis["high"]))
+                found.append((value - axis["low"]) / (axis["high"] - axis["low"]))
         return found
 
-    def draw(self, rng: np.random.Generator) -> dict[str, Any]:
-        """A setting, drawn from the ranges."""
-        values: dict[str, Any] = {}
-        for name, axis in self.axes.items():
-            if isinstance(axis, list):
-                values[name] = axis[int(rng.integers(len(axis)))]
-            elif axis.get("whole"):
-                values[name] = int(rng.integers(axis["low"], axis["high"] + 1))
-            elif axis.get("log"):
-                values[name] = math.exp(rng.uniform(math.log(axis["low"]), math.log(axis["high"])))
-            else:
-                values[name] = float(rng.uniform(axis["low"], axis["high"]))
-        return values
+
+def _choices(axis: Sequence[Any]) -> Floats:
+    """The values of a list as numbers from 0 to 1, shape (values, entries of one)."""
+    if isinstance(axis[0], str):
+        return np.linspace(0.0, 1.0, len(axis))[:, None]
+    entries = np.array([v if isinstance(v, list) else [v] for v in axis], float)
+    low = entries.min(axis=0)
+    return (entries - low) / (entries.max(axis=0) - low)
 
 
-def _share(value: float, low: float, high: float) -> float:
-    return (value - low) / (high - low)
+@dataclass(frozen=True)
+class Draws:
+    """Settings drawn from the ranges.
+
+    Attributes:
+        columns: Of each unknown its values; of a list their places in it.
+        x: The settings as numbers from 0 to 1, shape (n, unknowns).
+    """
+
+    unknowns: Unknowns
+    columns: Mapping[str, NDArray[Any]]
+    x: Floats
+
+    def setting(self, k: int) -> dict[str, Any]:
+        """One of them as the values of a study."""
+        return {
+            name: axis[self.columns[name][k]]
+            if isinstance(axis, list)
+            else self.columns[name][k].item()
+            for name, axis in self.unknowns.axes.items()
+        }
 
 
-def _entries(value: Any) -> list[float]:
-    return [float(v) for v in value] if isinstance(value, list) else [float(value)]
+def prior(unknowns: Unknowns, count: int, seed: int = 1) -> Draws:
+    """Settings drawn from the ranges."""
+    rng = np.random.default_rng(seed)
+    columns: dict[str, NDArray[Any]] = {}
+    x: list[Floats] = []
+    for name, axis in unknowns.axes.items():
+        if isinstance(axis, list):
+            columns[name] = rng.integers(len(axis), size=count)
+            x.append(_choices(axis)[columns[name]])
+            continue
+        low, high = axis["low"], axis["high"]
+        if axis.get("whole"):
+            columns[name] = rng.integers(low, high + 1, size=count)
+            share = (columns[name] - low) / (high - low)
+        else:
+            share = rng.uniform(size=count)
+            far = low * (high / low) ** share if axis.get("log") else low + (high - low) * share
+            columns[name] = far
+        x.append(share[:, None])
+    return Draws(unknowns, columns, np.hstack(x))
 
 
 @dataclass(frozen=True)
@@ -358,6 +400,8 @@ def lines(files: Iterable[Path]) -> Iterable[dict[str, str]]:
     for file in files:
         points: dict[str, int] = {}
         path = file / "trials.csv" if file.is_dir() else file
+        if not path.is_file():
+            refuse(f"{path}: expected the rows of a study, found no such file")
         with path.open(encoding="utf-8", newline="") as table:
             for row in csv.DictReader(table):
                 place = points.setdefault(row["point"], number + len(points))
@@ -369,16 +413,18 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     """Trials that ended, of all of a group.
 
     Raises:
-        SystemExit: There are none.
+        SystemExit: There are none, or an unknown has no column.
     """
     found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in lines(files):
+        if missing := [name for name in unknowns.axes if name not in row]:
+            refuse(f"{files[0]}: expected a column {missing[0]}, found none")
         if row["status"] in group.told:
             who = row[group.who] or group.all[0]  # a trial that failed has no columns
             found.setdefault((row["point"], row["trial"]), {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
-        raise SystemExit(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
+        refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
     return Rows(
         np.array(
             [unknowns.shares(_values(unknowns, rows[group.all[0]])) for rows in whole.values()]
@@ -468,9 +514,16 @@ class Fitted:
 
     def at(self, x: Floats) -> Floats:
         """Chance or number of each fit, shape (fits, n)."""
+        parts = np.array_split(x, max(1, len(x) // CHUNK))
         if self.spread:
-            return np.array([fit.predict(x) for fit in self.fits])
-        return np.array([fit.predict_proba(x)[:, 1] for fit in self.fits])
+            return np.hstack([[fit.predict(part) for fit in self.fits] for part in parts])
+        return np.hstack([[_chance(fit, part) for fit in self.fits] for part in parts])
+
+
+def _chance(model: Any, x: Floats) -> Floats:
+    """Of a model that may have seen but one outcome."""
+    found = model.predict_proba(x)
+    return found @ np.asarray(model.classes_, float)
 
 
 def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fitted:
@@ -479,27 +532,33 @@ def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fit
 
     known = np.isfinite(y)
     x, y, points = x[known], y[known], points[known]
+    settings = np.unique(points)
+    if len(settings) < FOLDS:
+        refuse(f"expected {FOLDS} settings or more in which all is told, found {len(settings)}")
+    folds = [*GroupKFold(FOLDS).split(x, y, points)]
     losses: dict[str, float] = {}
     kinds = models() if chance else regressions()
+    if chance and any(len(np.unique(y[train])) == 1 for train, _ in folds):
+        kinds = {"constant": kinds["constant"]}
     for name, make in kinds.items():
         loss = np.zeros(len(y))
-        for train, test in GroupKFold(FOLDS).split(x, y, points):
+        for train, test in folds:
             model = make().fit(x[train], y[train].astype(int) if chance else y[train])
             if chance:
-                p = np.clip(model.predict_proba(x[test])[:, -1], 1e-6, 1 - 1e-6)
+                p = np.clip(_chance(model, x[test]), 1e-6, 1 - 1e-6)
                 loss[test] = -np.where(y[test] > 0, np.log(p), np.log(1 - p))
             else:
                 loss[test] = (model.predict(x[test]) - y[test]) ** 2
         losses[name] = float(loss.mean())
     best = min(losses, key=losses.__getitem__)
     rng = np.random.default_rng(0)
-    fits, settings = [], np.unique(points)
+    fits: list[Any] = []
     while len(fits) < FITS:
         times = np.bincount(
             rng.integers(len(settings), size=len(settings)), minlength=len(settings)
         )
         rows = np.repeat(np.arange(len(y)), times[np.searchsorted(settings, points)])
-        if not chance or len(set(y[rows])) == 2:
+        if not chance or len(set(y[rows])) == len(set(y)):
             fits.append(kinds[best]().fit(x[rows], y[rows].astype(int) if chance else y[rows]))
     spread = 0.0 if chance else math.sqrt(losses[best])
     return Fitted(best, (losses[best], losses["constant"]), fits, spread)
@@ -534,7 +593,10 @@ def weights_of(likelihoods: Mapping[str, Floats]) -> Floats:
     """Weights of draws, their sum 1."""
     product = np.prod(list(likelihoods.values()), axis=0)
     if not product.sum() > 0:
-        raise SystemExit("no setting within the ranges has a likelihood above zero")
+        refuse(
+            "expected a setting within the ranges with a likelihood above zero, found none: widen "
+            "the ranges of the study"
+        )
     return product / product.sum()
 
 
@@ -544,36 +606,95 @@ def quantiles(values: Floats, weights: Floats, at: Sequence[float]) -> list[floa
     return np.interp(at, np.cumsum(weights[order]), values[order]).tolist()
 
 
+def region(values: Floats, weights: Floats) -> list[float]:
+    """What holds 90 % of the weight: of few values the likeliest, else the ends of the middle."""
+    few = np.unique(values)
+    if len(few) > BINS:
+        return [round(end, 3) for end in quantiles(values, weights, (0.05, 0.95))]
+    share = np.bincount(np.searchsorted(few, values), weights, len(few))
+    order = np.argsort(-share)
+    count = int(np.searchsorted(np.cumsum(share[order]), 0.9)) + 1
+    return sorted(round(float(value), 3) for value in few[order[:count]])
+
+
+def holds(kept: Sequence[float], value: float, few: bool) -> bool:
+    """Whether a region holds a value."""
+    if few:
+        return bool(np.isclose(kept, value, atol=1e-3).any())
+    return kept[0] <= value <= kept[1]
+
+
+def _places(values: Floats, most: int) -> tuple[NDArray[np.int64], int]:
+    """In which part of its range each value lies, and how many parts there are."""
+    parts = np.unique(values)
+    if len(parts) > BINS:
+        parts = np.linspace(0.0, 1.0, most, endpoint=False)
+    return np.searchsorted(parts, values + 1e-12, side="right") - 1, len(parts)
+
+
 def left_of(names: Sequence[str], x: Floats, weights: Floats) -> dict[str, Any]:
-    """Of each unknown what is left: quantiles as shares of its range, and by how much it narrowed.
+    """Of each unknown what is left: 90 % of it as shares of its range, and by how much it narrowed.
 
     `narrowed` is the information in nats, from counts in bins, less what chance alone gives.
     """
     effective = 1.0 / float((weights**2).sum())
     found = {}
     for k, name in enumerate(names):
-        values = np.unique(x[:, k])
-        if len(values) > BINS:
-            values = np.linspace(0.0, 1.0, BINS, endpoint=False)
-        place = np.searchsorted(values, x[:, k], side="right") - 1
-        share = np.bincount(place, weights, len(values))
-        prior = np.bincount(place, minlength=len(values)) / len(x)
+        place, count = _places(x[:, k], BINS)
+        share = np.bincount(place, weights, count)
+        prior = np.bincount(place, minlength=count) / len(x)
         there = share > 0
         nats = float((share[there] * np.log(share[there] / prior[there])).sum())
-        low, middle, high = quantiles(x[:, k], weights, (0.05, 0.5, 0.95))
         found[name] = {
-            "quantiles": [round(v, 3) for v in (low, middle, high)],
+            "region": region(x[:, k], weights),
+            "few": len(np.unique(x[:, k])) <= BINS,
             "narrowed": round(nats - (len(prior) - 1) / (2 * effective), 3),
             "share": [round(float(v), 4) for v in share / prior],
         }
     return found
 
 
-def prior(unknowns: Unknowns, count: int, seed: int = 1) -> tuple[list[dict[str, Any]], Floats]:
-    """Settings drawn from the ranges, and as numbers from 0 to 1."""
-    rng = np.random.default_rng(seed)
-    settings = [unknowns.draw(rng) for _ in range(count)]
-    return settings, np.array([unknowns.shares(setting) for setting in settings])
+def pairs_of(names: Sequence[str], x: Floats, weights: Floats, count: int) -> list[dict[str, Any]]:
+    """The pairs that the data tie together most: information beyond that of each alone [nats]."""
+    effective = 1.0 / float((weights**2).sum())
+    found = []
+    for (j, one), (k, other) in itertools.combinations(enumerate(names), 2):
+        (a, rows), (b, columns) = (_places(x[:, i], PAIR_BINS) for i in (j, k))
+        both = np.bincount(a * columns + b, weights, rows * columns).reshape(rows, columns)
+        prior = np.bincount(a * columns + b, minlength=rows * columns).reshape(rows, columns)
+        alone = both.sum(axis=1, keepdims=True) * both.sum(axis=0, keepdims=True)
+        there = both > 0
+        nats = float((both[there] * np.log(both[there] / alone[there])).sum())
+        nats -= (rows - 1) * (columns - 1) / (2 * effective)
+        share = both / np.maximum(prior / len(x), 1e-12)
+        found.append(
+            {"names": [one, other], "nats": round(nats, 3), "share": np.round(share, 3).tolist()}
+        )
+    return sorted(found, key=lambda pair: -pair["nats"])[:count]
+
+
+def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
+    """Of each outcome the change from one end of each unknown to the other, and its size as noise.
+
+    Least squares over all unknowns at once. The second number is the size as a share of the
+    largest that outcomes in random order reach in one study of twenty.
+    """
+    found = {}
+    rng = np.random.default_rng(0)
+    for name, outcome in rows.outcomes.items():
+        known = np.isfinite(outcome)
+        y, design = outcome[known], np.insert(rows.x[known], 0, 1.0, axis=1)
+        solve = np.linalg.pinv(design)
+        orders = np.column_stack([y, *(rng.permutation(y) for _ in range(SHUFFLES))])
+        slopes = solve @ orders
+        left = np.sqrt(((orders - design @ slopes) ** 2).mean(axis=0))
+        sizes = np.abs(slopes) / np.outer(np.sqrt((solve**2).sum(axis=1)), np.maximum(left, 1e-12))
+        limit = np.quantile(sizes[1:, 1:].max(axis=0), 0.95)
+        found[name] = {
+            n: [round(float(slopes[k, 0]), 3), round(float(sizes[k, 0] / limit), 2)]
+            for k, n in enumerate(names, 1)
+        }
+    return found
 
 
 def weigh(name: str, files: Sequence[Path]) -> None:
@@ -581,7 +702,7 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
     outcome = Outcome.of(rows, group)
-    _, x = prior(unknowns, DRAWS)
+    x = prior(unknowns, DRAWS).x
     likelihoods = outcome.likelihoods(x, group.paper)
     weights = weights_of(likelihoods)
     result = {
@@ -600,11 +721,20 @@ def weigh(name: str, files: Sequence[Path]) -> None:
             n: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
             for n, m in outcome.models.items()
         },
+        "effects": effects_of(rows, unknowns.names),
         "left": left_of(unknowns.names, x, weights),
     }
-    (ROOT / "docs" / "images" / f"published-{name}.png").write_bytes(
-        render(figure(result["left"], dict(zip(unknowns.names, unknowns.ends, strict=True))))["png"]
-    )
+    ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
+    narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
+    told = [k for k, n in enumerate(unknowns.names) if n in narrowed]
+    result["pairs"] = pairs_of([unknowns.names[k] for k in told], x[:, told], weights, PAIRS)
+    for kind, drawn in {
+        "": marginals(narrowed, ends),
+        "-pairs": pairs(result["pairs"], ends),
+        "-screening": screening(result["effects"]),
+    }.items():
+        image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
+        image.write_bytes(render(drawn)["png"])
     text = json.dumps(result, indent=1)
     (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
     for n, found in result["models"].items():
@@ -612,35 +742,7 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
     print("in what is left:", result["there"])
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
-        print(f"{n:45} {found['narrowed']:6.3f} nats, quantiles {found['quantiles']}")
-
-
-COLUMNS = 4
-"""Panels beside one another."""
-
-
-@styled
-def figure(left: Mapping[str, Any], ends: Mapping[str, tuple[str, str]]) -> Figure:
-    """How much likelier than in its range each value of an unknown is, of those that narrowed."""
-    shown = {n: f for n, f in left.items() if f["narrowed"] > NARROWED}
-    names = sorted(shown, key=lambda n: -shown[n]["narrowed"])
-    rows = max(1, math.ceil(len(names) / COLUMNS))
-    drawn = canvas(WIDTH, 0.5 + 1.25 * rows)
-    panels = drawn.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
-    for panel in panels[len(names) :]:
-        panel.set_visible(False)
-    for panel, n in zip(panels, names, strict=False):
-        share = shown[n]["share"]
-        panel.bar(
-            np.arange(len(share)) / len(share), share, 1 / len(share), align="edge", color=SERIES[0]
-        )
-        panel.axhline(1.0, color=FAINT)
-        panel.set_title(n.rpartition(".")[2].split("_n_mm")[0].replace("_", "\n", 1), fontsize=7)
-        panel.set_xticks([0, 1], ends[n], fontsize=7)
-        panel.tick_params(axis="y", labelsize=7)
-        for label, side in zip(panel.get_xticklabels(), ("left", "right"), strict=True):
-            label.set_horizontalalignment(side)
-    return drawn
+        print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
 
 
 def study_file(name: str) -> Path:
@@ -666,18 +768,45 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
     return "\n".join(text)
 
 
-def following(name: str, files: Sequence[Path], count: int, trials: int, seed: int) -> str:
-    """A study of settings drawn from what is left."""
+def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
+    """A study of settings drawn from what is left; by a power of the likelihood it is a search."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
-    settings, x = prior(unknowns, DRAWS, seed)
+    draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
-    weights = weights_of(outcome.likelihoods(x, group.paper))
-    chosen = np.random.default_rng(seed).choice(DRAWS, size=count, replace=False, p=weights)
-    return study_of(name, [settings[k] for k in chosen], trials, LATER + seed)
+    said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
+    likelihoods = outcome.likelihoods(draws.x, said)
+    weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
+    rng = np.random.default_rng(told.seed)
+    chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
+    return study_of(name, [draws.setting(k) for k in chosen], told.trials, LATER + told.seed)
 
 
-def best(name: str, files: Sequence[Path], count: int) -> None:
-    """Print the settings that are likeliest by their own trials, and write the first one.
+def near(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
+    """A study of settings near the likeliest ones: a search, not a draw from what is left.
+
+    An unknown of a range moves by a tenth of it or so, one of a list is drawn anew one time in ten.
+    """
+    unknowns, rng = Unknowns.of(study_file(name)), np.random.default_rng(told.seed)
+    parents = [values for _, _, _, values in likeliest(name, files)[: told.near]]
+    settings = []
+    for _ in range(told.count):
+        values = dict(parents[rng.integers(len(parents))])
+        for n, axis in unknowns.axes.items():
+            if isinstance(axis, list):
+                values[n] = axis[rng.integers(len(axis))] if rng.random() < 0.1 else values[n]
+                continue
+            law = (math.log, math.exp) if axis.get("log") else (float, float)
+            low, high, at = (law[0](v) for v in (axis["low"], axis["high"], values[n]))
+            moved = law[1](min(max(at + 0.1 * (high - low) * rng.normal(), low), high))
+            values[n] = round(moved) if axis.get("whole") else moved
+        settings.append(values)
+    return study_of(name, settings, told.trials, LATER + told.seed)
+
+
+def likeliest(
+    name: str, files: Sequence[Path]
+) -> list[tuple[float, str, dict[str, str], dict[str, Any]]]:
+    """Settings in the order of their likelihood by their own trials: its logarithm, point, outcome.
 
     A chance is (did + 1) / (trials + 2), a mean that of the trials; where none tells, 0.
     """
@@ -696,14 +825,19 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
                 likely = said.likelihood(y.mean(keepdims=True), spread) if len(y) else np.zeros(1)
             else:
                 likely = said.likelihood(np.array([(y.sum() + 1) / (len(y) + 2)]), 0.0)
-            logarithm += float(np.log(np.maximum(likely, 1e-12))[0])
-        found.append((logarithm, str(point), told))
-    found.sort(key=lambda item: -item[0])
-    for logarithm, point, told in found[:count]:
+            logarithm += float(np.log(np.maximum(likely, 1e-300))[0])
+        found.append((logarithm, str(point), told, values[str(point)]))
+    return sorted(found, key=lambda item: -item[0])
+
+
+def best(name: str, files: Sequence[Path], count: int) -> None:
+    """Print the settings that are likeliest by their own trials, and write the first one."""
+    found = likeliest(name, files)
+    for logarithm, point, told, _ in found[:count]:
         print(f"{logarithm:8.2f}  point {point}: {told}")
     trials = ["trials = 200"] if "trials" in tomllib.loads(study_file(name).read_text()) else []
     tables: dict[str, list[str]] = {"": [*trials, f"seed = {FRESH}"]}
-    for path, value in values[found[0][1]].items():
+    for path, value in found[0][3].items():
         table, _, key = path.rpartition(".")
         tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
     text = "\n\n".join("\n".join([f"[{t}]"] * bool(t) + tables[t]) for t in sorted(tables))
@@ -715,7 +849,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     hidden = read(files[:1], group, unknowns)
     outcome = Outcome.of(read(files[1:], group, unknowns), group)
-    _, x = prior(unknowns, DRAWS)
+    x = prior(unknowns, DRAWS).x
     told = inside = 0
     for place in sorted(set(hidden.points.tolist())):
         here = hidden.points == place
@@ -727,13 +861,12 @@ def recover(name: str, files: Sequence[Path]) -> None:
         weights = weights_of(outcome.likelihoods(x, said))
         print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
         for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
-            low, _, high = found["quantiles"]
             if found["narrowed"] > NARROWED:
                 truth = hidden.x[here][0, k]
                 told += 1
-                inside += low <= truth <= high
-                print(f"  {n}: {low} to {high}, hidden {truth:.3f}")
-    print(f"{inside} of {told} unknowns that the data narrow lie within their 90 % interval")
+                inside += holds(found["region"], truth, found["few"])
+                print(f"  {n}: {found['region']}, hidden {truth:.3f}")
+    print(f"{inside} of {told} unknowns that the data narrow lie within their 90 % region")
 
 
 def keep(name: str, files: Sequence[Path]) -> None:
@@ -769,16 +902,20 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
+    parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
+    parser.add_argument("--only", nargs="+", help="statements to search by")
+    parser.add_argument("--near", type=int, help="search near so many of the likeliest settings")
     told = parser.parse_args()
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
-        settings = prior(Unknowns.of(study_file(name)), 3, HIDDEN)[0]
+        draws = prior(Unknowns.of(study_file(name)), told.count, HIDDEN)
+        settings = [draws.setting(k) for k in range(told.count)]
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
     elif told.part == "best":
         best(name, files, told.count)
     elif told.part == "next":
-        sys.stdout.write(following(name, files, told.count, told.trials, told.seed))
+        sys.stdout.write((near if told.near else following)(name, files, told))
     else:
         {"weigh": weigh, "recover": recover, "rows": keep}[told.part](name, files)
 

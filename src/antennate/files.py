@@ -22,7 +22,9 @@ _RANDOM = 8
 _BLOCK = 1 << 20
 """Bytes that are read at a time."""
 _MOST_DOTS = 100
-"""Most dots on a line of TOML; keys of thousands of parts keep its reader busy for minutes."""
+"""Most dots in a key of TOML; keys of thousands of parts keep its reader busy for minutes."""
+_QUOTED, _BETWEEN = re.compile(r"\"[^\"]*\"|'[^']*'"), re.compile(r"[][,={}]")
+"""Text in quotes, and what stands between keys and values of a line of TOML."""
 TOO_LONG = "expected numbers of at most 4300 digits, found more"
 """Python's own limit for whole numbers."""
 _UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
@@ -114,9 +116,9 @@ def read_toml(path: Path, largest: int) -> dict[str, Any]:
     """
     text = decoded(path, read_limited(path, largest, ConfigError), ConfigError)
     for number, line in enumerate(text.splitlines(), 1):
-        if line.count(".") > _MOST_DOTS:
+        if max(part.count(".") for part in _BETWEEN.split(_QUOTED.sub("", line))) > _MOST_DOTS:
             raise ConfigError(
-                f"{path}: line {number}: expected at most {_MOST_DOTS} dots, found more"
+                f"{path}: line {number}: expected at most {_MOST_DOTS} dots in a key, found more"
             )
     try:
         return tomllib.loads(text)

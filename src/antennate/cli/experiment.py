@@ -27,8 +27,9 @@ from antennate.errors import (
     WorkerError,
     raised,
 )
+from antennate.experiments import FITTED, fitted
 from antennate.experiments.running import keep, names_of, require_films, write_films
-from antennate.messages import shortened, typed
+from antennate.messages import command_words, shortened, typed
 from antennate.params.base import Params
 from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
@@ -84,6 +85,19 @@ class Options(ViewOptions, RunOptions):
 
 
 @dataclass(frozen=True)
+class FittedOptions(Options):
+    """The same where numbers were fitted to the paper."""
+
+    config: Path | None = option(
+        None,
+        f"TOML file of parameters, or the word {FITTED}: numbers that the paper does not give, "
+        "fitted to it; flags override it",
+        "FILE",
+        examples=[FITTED],
+    )
+
+
+@dataclass(frozen=True)
 class StudyOptions(Options):
     """The same where a file says what is run."""
 
@@ -116,14 +130,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     Raises:
         AntennateError: As below, or something given cannot be used.
     """
-    config, options = parse(
-        experiment.name,
-        experiment.description,
-        experiment.config,
-        argv,
-        StudyOptions if experiment.continued else Options,
-        without=_without(experiment),
-    )
+    config, options = parsed(experiment, argv)
     if experiment.continued and options.config is None and "assumed" not in config.model_fields_set:
         raise ConfigError(
             f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
@@ -136,6 +143,39 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
     if options.video:
         require_films(experiment, config, options.video_trial)
     return carry_out(experiment, argv, config, options)
+
+
+def parsed(experiment: Experiment[Any, Any], argv: Sequence[str]) -> tuple[Params, Options]:
+    """Configuration and options of an experiment by the words of its command.
+
+    Raises:
+        ConfigError: As `parse`, or a file is named as if it were that of fitted numbers.
+    """
+    usual = FittedOptions if experiment.name in fitted() else Options
+    return parse(
+        experiment.name,
+        experiment.description,
+        experiment.config,
+        argv,
+        StudyOptions if experiment.continued else usual,
+        without=_without(experiment),
+        file_of=lambda options: _file_of(experiment, options.config),
+    )
+
+
+def _file_of(experiment: Experiment[Any, Any], path: Path | None) -> Path | None:
+    """The file to read; the word `fitted` is that of this package, if there is one."""
+    if path is None or path != Path(FITTED):
+        return path
+    if (ours := fitted().get(experiment.name)) is None and not path.is_file():
+        those = ", ".join(map(command_words, fitted()))
+        raise ConfigError(f"expected a FILE, found {FITTED}, a word that only these take: {those}")
+    if ours and path.is_file():
+        raise ConfigError(
+            f"--config: expected {FITTED} to be numbers of ours, found a file of that name, too; "
+            "rename it, or run elsewhere"
+        )
+    return ours or path
 
 
 @dataclass(frozen=True)

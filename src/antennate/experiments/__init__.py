@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError, in_one_line
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 GROUP = "antennate.experiments"
 """Group of the entry points."""
+FITTED = "fitted"
+"""What stands for a file of `fitted`, as in `--config fitted`."""
 
 
 def is_ours(name: str) -> bool:
@@ -31,6 +34,12 @@ def is_ours(name: str) -> bool:
 def names() -> list[str]:
     """Names of all experiments, ours first."""
     return list(dict.fromkeys([*_folders(), *_entries()]))
+
+
+def fitted() -> dict[str, Path]:
+    """Files of numbers that the paper does not give, fitted to it, by name of the experiment."""
+    files = Path(__file__).parent.glob(f"reproduce/{FITTED}/*.toml")
+    return {file.stem: file for file in sorted(files)}
 
 
 def summaries() -> dict[str, str]:

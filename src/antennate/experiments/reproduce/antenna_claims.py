@@ -116,8 +116,9 @@ def one_curve(result: Mapping[str, Any]) -> Finding:
         "R² " + ", ".join(f"{value:.3f}" for value in r2),
         min(r2) >= _FIT and max(r2) - min(r2) < _ALIKE,
         "A running mean lags by half of its length, so that the same reading means more bend the "
-        "faster the push. Without a mean (`--averaging-time 0`) one curve serves all three.",
+        "faster the push.",
         tuple(Bar(f"ours, {100 * s['speed_m_s']:g} cm/s", s["r2"]) for s in speeds),
+        "Without a mean (`--averaging-time 0`) one curve serves all three.",
     )
 
 
@@ -133,12 +134,13 @@ def sigmoid(result: Mapping[str, Any]) -> Finding:
     """The curve is a sigmoid."""
     errors = result["calibration"]["cross_validated_rmse"]
     best = min(errors, key=errors.__getitem__)
+    serves = ": a sigmoid is one curve that serves, not the one that the readings ask for"
+    serves = "" if best == "sigmoid" else serves
     return Finding(
         "error of the level on pushes left out (rms): "
         + ", ".join(f"{name} {value:.3f}" for name, value in errors.items()),
         best == "sigmoid",
-        f"Over pushes left out, the best of these curves is {best}: a sigmoid is one curve that "
-        "serves, not the one that the readings ask for.",
+        f"Over pushes left out, the best of these curves is {best}{serves}.",
         tuple(Bar(name, value) for name, value in errors.items()),
     )
 
@@ -267,8 +269,9 @@ def stiff_jams(result: Mapping[str, Any]) -> Finding:
     return Finding(
         counted(row, "jam", "jams"),
         above(interval, 50.0),
-        _WINDOW,
+        "",
         (Bar("paper", 100.0), Bar("ours", share, interval)),
+        _WINDOW,
     )
 
 
@@ -287,12 +290,13 @@ def soft_slips(result: Mapping[str, Any]) -> Finding:
     return Finding(
         f"{counted(row, 'slip', 'slips')}, {counted(row, 'jam', 'jams')}",
         above(interval, 50.0),
+        "",
+        (Bar("paper", 100.0), Bar("ours", share, interval)),
         _WINDOW
         if share > 50
         else "The soft antenna jams where the stiff one does. Moved, not pushed, a chain of equal "
         "springs takes the same shapes however stiff it is; the flex strip, which adds to five of "
         "the six, makes it a slight taper. To slip it needs weight and a tip that does not lead.",
-        (Bar("paper", 100.0), Bar("ours", share, interval)),
     )
 
 
@@ -312,8 +316,9 @@ def descending_passes(result: Mapping[str, Any]) -> Finding:
     return Finding(
         counted(row, "pass"),
         above(interval, 80.0),
-        _WINDOW,
+        "",
         (Bar("paper", 100.0), Bar("ours", share, interval)),
+        _WINDOW,
     )
 
 
@@ -335,8 +340,9 @@ def taper_decides(result: Mapping[str, Any]) -> Finding:
     return Finding(
         f"descending {counted(ours)}, uniform {counted(uniform)}, ascending {counted(ascending)}",
         above((min(low for low, _ in leads), min(high for _, high in leads)), 50.0),
-        f"Against two controls that the paper lacks. {_WINDOW}",
+        "Against two controls that the paper lacks.",
         tuple(Bar(label, *share_of(row)) for label, row in zip(labels, rows, strict=True)),
+        _WINDOW,
     )
 
 
@@ -363,9 +369,9 @@ def bend(result: Mapping[str, Any]) -> Finding:
         None if ours is None or (stays and few) else stays,
         "The limit is held against the antenna that passes; one that jams is bent further."
         if stays
-        else "The springs near the tip are the softest and bend furthest. Angle, overlap and "
-        "length are unpublished; ours are assumed.",
+        else "The springs near the tip are the softest and bend furthest.",
         (Bar("paper", _LIMIT_DEG), *(Bar(f"ours, {n}", angle) for n, angle in angles.items())),
+        "" if stays else "Angle, overlap and length are unpublished; ours are assumed.",
     )
 
 

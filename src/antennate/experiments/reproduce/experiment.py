@@ -10,11 +10,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from antennate import experiments
+from antennate.experiments import FITTED, fitted
 from antennate.experiments.reproduce.antenna_claims import ANTENNA
 from antennate.experiments.reproduce.robot_claims import ROBOT
 from antennate.experiments.reproduce.verdict import (
@@ -26,7 +27,7 @@ from antennate.experiments.reproduce.verdict import (
 )
 from antennate.figures import INK, SERIES, canvas, styled
 from antennate.messages import command_words
-from antennate.params.base import Params, number
+from antennate.params.base import Params, number, put_over, read_file
 from antennate.params.control import ConditioningParams
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.measures import Table
@@ -58,10 +59,14 @@ FULL: Mapping[str, Mapping[str, Any]] = {
     "tunnel": {"trials": 100},
 }
 """Its settings otherwise: its defaults, and more tunnels."""
+_FULL_FITTED: Mapping[str, Mapping[str, Any]] = {"wall": {"trials": 200}, "tunnel": {"trials": 200}}
+"""Its settings beside numbers that were fitted; of others those above."""
 _WORK = {"calibrate": 2, "force": 1, "touch": 4, "sweep": 28, "gait": 3, "wall": 16, "tunnel": 86}
 """Processor time of each experiment with `quick` [s]: what a bar counts; of others at most 1."""
 _MORE = {"force": 8, "touch": 22, "sweep": 5, "gait": 3, "wall": 3, "tunnel": 10}
 """How many times as long it takes without."""
+_MORE_FITTED = {"wall": 33, "tunnel": 20}
+"""How many times as long with fitted numbers."""
 _WITHOUT_CHANCE = {"gait"}
 """Takes a seed only for draws of what is not known, and draws nothing here."""
 _LOOK = {
@@ -80,6 +85,8 @@ class ReproduceConfig(Params):
 
     quick: bool = number(False, "1", "assumed: all trials")
     """Few trials: minutes in place of half an hour, and wider intervals."""
+    setting: Literal["default", "fitted"] = number("default", "1", "assumed: as anybody runs them")
+    """Numbers that the paper does not give: our defaults, or fitted to it where a part has some."""
     seed: int = number(7, "1", "assumed: any; nothing was chosen on it", ge=0)
     """Seed of all chance, in every experiment."""
 
@@ -98,7 +105,7 @@ class ReproduceOutcome:
         return [
             Row(
                 *(c.claim, c.criterion, c.rival, c.paper, f.ours, c.verdict(f)),
-                *(f.reason, command(c.experiment, self.config)),
+                *(c.reason(f), command(c.experiment, self.config)),
             )
             for c, f in self.judged
         ]
@@ -110,6 +117,7 @@ class ReproduceOutcome:
             "schema": 1,
             "command": "reproduce",
             "quick": self.config.quick,
+            "setting": self.config.setting,
             "seed": self.config.seed,
             "interrupted": self.interrupted,
             "verdicts": {name: counts[name] for name in VERDICTS},
@@ -117,17 +125,39 @@ class ReproduceOutcome:
         }
 
 
-def settings(name: str, config: ReproduceConfig) -> dict[str, Any]:
-    """Settings of an experiment."""
-    values = dict((QUICK if config.quick else FULL)[name])
-    fields = experiments.load(name).config.model_fields
-    chance = "seed" in fields and name not in _WITHOUT_CHANCE
-    return values | ({"seed": config.seed} if chance else {})
+def claims(config: ReproduceConfig) -> tuple[Claim, ...]:
+    """All claims, with what they can be at best at this setting."""
+    return tuple(c.when_fitted() if is_fitted(c.experiment, config) else c for c in CLAIMS)
+
+
+def is_fitted(name: str, config: ReproduceConfig) -> bool:
+    """Whether an experiment runs with numbers that were fitted to the paper."""
+    return config.setting == FITTED and name in fitted()
+
+
+def configured(name: str, config: ReproduceConfig) -> Params:
+    """The configuration of an experiment."""
+    flags, base = _settings(name, config)
+    return experiments.load(name).config.model_validate(put_over(base, flags))
+
+
+def _settings(name: str, config: ReproduceConfig) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Flags of an experiment, and its fitted numbers, over which no flag stands."""
+    model, base = experiments.load(name).config, dict[str, Any]()
+    flags = dict((QUICK if config.quick else FULL)[name])
+    if is_fitted(name, config):
+        base = read_file(fitted()[name], model).model_dump(exclude_unset=True)
+        flags |= {} if config.quick else _FULL_FITTED.get(name, {})
+        flags = {key: value for key, value in flags.items() if key not in base}
+    chance = "seed" in model.model_fields and name not in _WITHOUT_CHANCE
+    return flags | ({"seed": config.seed} if chance else {}), base
 
 
 def command(name: str, config: ReproduceConfig) -> str:
     """The command that runs this part alone."""
-    return shlex.join(["antennate", *command_words(name).split(), *_flags(settings(name, config))])
+    file = ["--config", FITTED] if is_fitted(name, config) else []
+    flags = _flags(_settings(name, config)[0])
+    return shlex.join(["antennate", *command_words(name).split(), *file, *flags])
 
 
 def _flags(values: Mapping[str, Any], prefix: str = "--") -> list[str]:
@@ -155,28 +185,29 @@ def run(
         AntennateError: An experiment failed.
     """
     judged: list[tuple[Claim, Finding]] = []
-    work = {n: _WORK.get(n, 1) * (1 if config.quick else _MORE.get(n, 1)) for n in QUICK}
-    before = 0
+    more = {n: (_MORE_FITTED if is_fitted(n, config) else _MORE).get(n, 1) for n in QUICK}
+    work = {n: _WORK.get(n, 1) * (1 if config.quick else more[n]) for n in QUICK}
+    before, every = 0, claims(config)
     for name, own in work.items():
         experiment = experiments.load(name)
 
         def step(done: int, total: int, before: int = before, own: int = own) -> None:
             on_step(100 * (before + own * done // total) // sum(work.values()), 100)
 
-        configured = experiment.config.model_validate(settings(name, config))
+        told = configured(name, config)
         try:
-            result = experiment.run(configured, workers_from(workers), step, no_row).result()
+            result = experiment.run(told, workers_from(workers), step, no_row).result()
         except KeyboardInterrupt:
             result = {"interrupted": True}
         if result.get("interrupted"):
             return ReproduceOutcome(config, tuple(judged), interrupted=True)
         step(1, 1)
         before += own
-        new = [(claim, claim.judge(result)) for claim in CLAIMS if claim.experiment == name]
+        new = [(claim, claim.judge(result)) for claim in every if claim.experiment == name]
         judged += new
         for row in ReproduceOutcome(config, tuple(new), interrupted=False).rows:
             on_row(row)
-    judged.sort(key=lambda pair: CLAIMS.index(pair[0]))
+    judged.sort(key=lambda pair: every.index(pair[0]))
     return ReproduceOutcome(config, tuple(judged), interrupted=False)
 
 
@@ -189,7 +220,7 @@ def tables(result: Mapping[str, Any]) -> Sequence[Table]:
         )
         for row in result["claims"]
     ]
-    note = f"Reasons and figures: {REPORT}. Seed {result['seed']}."
+    note = f"Reasons and figures: {REPORT}. Seed {result['seed']}{_with(result)}."
     return (Table("Claims", ["criterion", "paper", "ours", "verdict"], rows, note),)
 
 
@@ -198,7 +229,13 @@ def sentence(result: Mapping[str, Any]) -> str:
     few = " With --quick the intervals are wide." if result["quick"] else ""
     unjudged = len(CLAIMS) - len(result["claims"])
     left = f", {unjudged} not judged" if unjudged else ""
-    return f"Of {len(CLAIMS)} claims: {_counts(result)}{left}.{few}"
+    return f"Of {len(CLAIMS)} claims{_with(result)}: {_counts(result)}{left}.{few}"
+
+
+def _with(result: Mapping[str, Any]) -> str:
+    """With which numbers, if these are not our defaults."""
+    fits = result.get("setting") == FITTED
+    return ", with numbers fitted to the paper where a part has some" if fits else ""
 
 
 def _counts(result: Mapping[str, Any]) -> str:
@@ -215,7 +252,7 @@ def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
     rows = [(row, names.get(row["claim"])) for row in result["claims"]]
     index = "".join(_line(row, claim.name if claim else "") for row, claim in rows)
     sections = "".join(
-        _section(row, claim.name, claim.rule, figures.get(claim.name, ""))
+        _section(row, claim.name, _as_judged(claim, row).rule, figures.get(claim.name, ""))
         for row, claim in rows
         if claim is not None
     )
@@ -224,12 +261,17 @@ def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
         "<p>A Robust Antenna Provides Tactile Feedback in a Multi-legged Robot, "
         "arXiv:2603.07795, beside what antennate finds in simulation. Claims are in our words.</p>"
         f"<p><strong>{summary}.</strong></p>"
-        f'<p class="muted">{how}, seed {result["seed"]}. '
+        f'<p class="muted">{how}, seed {result["seed"]}{_with(result)}. '
         f"Intervals are 95 %.</p><dl>{words}</dl>"
         "<table><thead><tr><th>claim</th><th class=wide>criterion</th><th class=wide>paper</th>"
         "<th class=wide>ours</th>"
         f"<th>verdict</th></tr></thead><tbody>{index}</tbody></table>{sections}"
     )
+
+
+def _as_judged(claim: Claim, row: Mapping[str, Any]) -> Claim:
+    """The claim with what it could be at best in a row of a result."""
+    return claim.when_fitted() if f"--config {FITTED}" in row["command"] else claim
 
 
 def _verdict(row: Mapping[str, Any]) -> str:

@@ -156,12 +156,13 @@ def blind(result: Mapping[str, Any]) -> Finding:
     return Finding(
         f"{counted(row)}",
         agrees(share, interval, 60.0, _NEAR_POINTS),
-        "At 75° nearly all cross, at 90° as many as in the paper; all else was left as it was.",
+        "",
         (_of_ten(6), Bar("ours, open", share, interval)),
+        "At 75° nearly all cross, at 90° as many as in the paper; all else was left as it was.",
     )
 
 
-def _touch(name: str, text: str, reason: str) -> Claim:
+def _touch(name: str, text: str, reason: str = "", by_default: str = "") -> Claim:
     """The claim that all robots cross with the controller of this name."""
 
     def judge(result: Mapping[str, Any]) -> Finding:
@@ -183,6 +184,7 @@ def _touch(name: str, text: str, reason: str) -> Claim:
                 Bar(f"ours, {name}", share, interval),
                 *(Bar(f"ours, {n}", *share_of(result["controllers"][n])) for n in blinds),
             ),
+            by_default,
         )
 
     return Claim(
@@ -200,7 +202,7 @@ def _touch(name: str, text: str, reason: str) -> Claim:
     )
 
 
-def _speed(name: str, text: str, ceiling: str, reason: str) -> Claim:
+def _speed(name: str, text: str, ceiling: str, by_default: str) -> Claim:
     """The claim that robots that cross do so at a speed."""
     paper = _PAPER_SPEED[name]
 
@@ -216,11 +218,12 @@ def _speed(name: str, text: str, ceiling: str, reason: str) -> Claim:
             None
             if ours is None
             else agrees(ours, ends and tuple(ends), paper, _NEAR_SPEED * paper),
-            reason,
+            "",
             (
                 Bar("paper", paper),
                 *(Bar(f"ours, {n}", s, rows[n]["speed_95"]) for n, s in speeds.items()),
             ),
+            by_default,
         )
 
     return Claim(
@@ -296,9 +299,9 @@ def centred(result: Mapping[str, Any]) -> Finding:
     return Finding(
         ", ".join(f"{n} {shown(rows[n]['offset_m'], '.3f')} m" for n in names) + f"; {beside}",
         all_of(*(above(ends, 0.0) for ends in gains)),
-        "Distance of the head from the centre line, each stretch of 5 cm counts alike. The "
-        "corridor leaves a robot in its middle 0.1 m to either side.",
+        "Distance of the head from the centre line, each stretch of 5 cm counts alike.",
         tuple(Bar(f"ours, {n}", rows[n]["offset_m"], rows[n]["offset_95"]) for n in known),
+        "The corridor leaves a robot in its middle 0.1 m to either side.",
     )
 
 
@@ -347,8 +350,8 @@ ROBOT = (
     _touch(
         "paper",
         "With the published rule all robots cross",
-        "The plain rule alternates between REVERSE and FORWARD in the corner, or turns round and "
-        "leaves; its margins and times are unpublished, ours are assumed.",
+        by_default="The plain rule alternates between REVERSE and FORWARD in the corner, or turns "
+        "round and leaves; its margins and times are unpublished, ours are assumed.",
     ),
     _touch(
         "closed",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from antennate.studies.statistics import wilson95
@@ -133,12 +133,14 @@ class Finding:
         holds: Whether the criterion is met; None if the trials decide neither.
         reason: Why, and for `conditional` under which condition.
         bars: The paper's numbers and ours, in the claim's unit; the paper's first.
+        by_default: What is also said, but of our default settings alone.
     """
 
     ours: str
     holds: bool | None
     reason: str
     bars: tuple[Bar, ...]
+    by_default: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +158,7 @@ class Claim:
         experiment: Experiment that tests it.
         unit: Unit of the figure's numbers.
         judge: From the results to a finding.
+        fitted: Whether numbers that the paper does not give are those fitted to it.
     """
 
     name: str
@@ -168,6 +171,17 @@ class Claim:
     experiment: str
     unit: str
     judge: Callable[[Mapping[str, Any]], Finding]
+    fitted: bool = False
+
+    def when_fitted(self) -> Claim:
+        """The claim with numbers that were fitted to the paper; its criterion stays."""
+        why = "numbers that the paper does not give were fitted to it"
+        return replace(self, best="fitted", ceiling=why, fitted=True)
+
+    def reason(self, finding: Finding) -> str:
+        """Why the verdict is what it is."""
+        more = "The fit knew other trials than these." if self.fitted else finding.by_default
+        return f"{finding.reason} {more}".strip()
 
     def verdict(self, finding: Finding) -> Verdict:
         """The verdict by what was found: undecided if the trials decide neither."""

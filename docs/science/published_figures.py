@@ -1,0 +1,96 @@
+"""Figures of docs/science/published.md: what is left of the unknowns, and what depends on which."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from antennate.figures import FAINT, INK, SERIES, WIDTH, canvas, styled
+
+COLUMNS = 4
+"""Panels beside one another."""
+SMALL = 7
+"""Size of letters [points]."""
+Ends = Mapping[str, tuple[str, str]]
+"""Of each unknown its lowest and highest value in words."""
+
+
+def short(name: str) -> str:
+    """The last part of the name of an unknown, without its unit."""
+    return name.rpartition(".")[2].split("_n_mm")[0].replace("_", " ")
+
+
+def _ends(panel: Axes, ends: tuple[str, str]) -> None:
+    """Write the ends of a range below a panel."""
+    panel.set_xticks([0, 1], ends, fontsize=SMALL)
+    for label, side in zip(panel.get_xticklabels(), ("left", "right"), strict=True):
+        label.set_horizontalalignment(side)
+
+
+@styled
+def marginals(left: Mapping[str, Any], ends: Ends) -> Figure:
+    """How much likelier than in its range each value of an unknown is, most narrowed first."""
+    names = sorted(left, key=lambda n: -left[n]["narrowed"])
+    rows = max(1, math.ceil(len(names) / COLUMNS))
+    drawn = canvas(WIDTH, 0.5 + 1.25 * rows)
+    panels = drawn.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    for panel, n in zip(panels, names, strict=False):
+        share = left[n]["share"]
+        place, width = np.arange(len(share)) / len(share), 1 / len(share)
+        panel.bar(place, share, width, align="edge", color=SERIES[0])
+        panel.axhline(1.0, color=FAINT)
+        panel.set_title(short(n).replace(" ", "\n", 1), fontsize=SMALL)
+        panel.tick_params(axis="y", labelsize=SMALL)
+        _ends(panel, ends[n])
+    return drawn
+
+
+@styled
+def pairs(found: Sequence[Mapping[str, Any]], ends: Ends) -> Figure:
+    """How much likelier than in their ranges values of two unknowns are together."""
+    rows = max(1, math.ceil(len(found) / 2))
+    drawn = canvas(WIDTH, 2.2 * rows)
+    panels = drawn.subplots(rows, 2, squeeze=False).ravel()
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    for panel, pair in zip(panels, found, strict=False):
+        share = np.array(pair["share"])
+        at = [np.linspace(0.0, 1.0, count + 1) for count in share.shape]
+        image = panel.pcolormesh(at[0], at[1], share.T, cmap="Blues", vmin=0.0)
+        panel.set_xlabel(short(pair["names"][0]), fontsize=SMALL)
+        panel.set_ylabel(short(pair["names"][1]), fontsize=SMALL)
+        _ends(panel, ends[pair["names"][0]])
+        panel.set_yticks([0, 1], ends[pair["names"][1]], fontsize=SMALL)
+        drawn.colorbar(image, ax=panel).ax.tick_params(labelsize=SMALL)
+    return drawn
+
+
+@styled
+def screening(effects: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+    """Change of each outcome from one end of an unknown to the other, written where it is no noise.
+
+    Colours go to once the size that noise reaches in one study of twenty.
+    """
+    outcomes = list(effects)
+    names = list(effects[outcomes[0]])
+    value = np.array([[effects[o][n][0] for o in outcomes] for n in names])
+    size = np.array([[effects[o][n][1] for o in outcomes] for n in names])
+    drawn = canvas(WIDTH, 1.2 + 0.165 * len(names))
+    panel = drawn.subplots()
+    panel.imshow(np.sign(value) * size, cmap="RdBu", vmin=-1.5, vmax=1.5, aspect="auto")
+    for row, column in zip(*np.nonzero(size >= 1.0), strict=True):
+        ink = "white" if size[row, column] > 1.2 else INK
+        text = f"{value[row, column]:+.2f}"
+        panel.text(column, row, text, ha="center", va="center", fontsize=SMALL, color=ink)
+    panel.set_xticks(range(len(outcomes)), [o.replace(" ", "\n", 1) for o in outcomes])
+    panel.set_yticks(range(len(names)), [short(n) for n in names])
+    panel.tick_params(labelsize=SMALL, top=True, labeltop=True, bottom=False, labelbottom=False)
+    panel.grid(visible=False)
+    return drawn

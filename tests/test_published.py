@@ -1,0 +1,147 @@
+"""What the paper's statements leave of ranges: docs/science/published.py."""
+
+import importlib.util
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antennate.experiments.study.config import StudyConfig
+
+FOLDER = Path(__file__).parents[1] / "docs" / "science"
+
+
+@pytest.fixture(scope="module")
+def published():
+    sys.path.insert(0, str(FOLDER))
+    try:
+        spec = importlib.util.spec_from_file_location("published", FOLDER / "published.py")
+        module = sys.modules["published"] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(FOLDER))
+    return module
+
+
+def part(*words):
+    command = [sys.executable, str(FOLDER / "published.py"), *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_likelihoods_of_statements(published):
+    chance = np.array([0.6, 0.9])
+    # 210 p^6 (1 - p)^4, and p^10
+    assert published.Count(6, 10).likelihood(chance, 0.0) == pytest.approx([0.2508, 0.01116], 1e-3)
+    assert published.Count(10, 10).likelihood(chance, 0.0)[1] == pytest.approx(0.34868, 1e-4)
+    # 20 of 20 at 0.9, and a coin that shows 11 or more heads of 20: 0.41190
+    assert published.AtLeast(20, 20).likelihood(chance, 0.0)[1] == pytest.approx(0.12158, 1e-4)
+    assert published.AtLeast(11, 20).likelihood(np.array([0.5]), 0.0) == pytest.approx([0.4119], 1e-4)
+    # at the mean the normal density is 0.39894 over its standard deviation, here 0.25
+    mean = published.Mean(0.12, 4)
+    assert mean.likelihood(np.log([0.12]), 0.4) == pytest.approx([1.5958], 1e-4)
+
+
+def test_a_setting_and_its_shares(published):
+    unknowns = published.Unknowns(
+        {
+            "a.even": {"low": 2.0, "high": 4.0},
+            "a.log": {"low": 0.01, "high": 1.0, "log": True},
+            "a.whole": {"low": 0, "high": 3, "whole": True},
+            "a.choice": [False, True],
+            "a.word": ["down", "off", "up"],
+            "a.pair": [[0.8, 0.8], [1.4, 0.8], [0.8, 1.0]],
+        }
+    )
+    values = {"a.even": 3.0, "a.log": 0.1, "a.whole": 3, "a.choice": True, "a.word": "off"}
+    shares = unknowns.shares(values | {"a.pair": [1.4, 0.8]})
+    assert shares == pytest.approx([0.5, 0.5, 1.0, 1.0, 0.5, 1.0, 0.0])
+    draws = published.prior(unknowns, 4000, 3)
+    assert np.allclose(draws.x[7], unknowns.shares(draws.setting(7)))
+    assert np.allclose(draws.x.mean(axis=0)[:5], 0.5, atol=0.03)
+    assert set(map(str, (draws.setting(k)["a.pair"] for k in range(50)))) == {
+        "[0.8, 0.8]",
+        "[1.4, 0.8]",
+        "[0.8, 1.0]",
+    }
+
+
+def test_a_region_holds_nine_tenths(published):
+    values = np.linspace(0.0, 1.0, 1001)
+    assert published.region(values, np.full(1001, 1 / 1001)) == pytest.approx(
+        [0.05, 0.95], abs=0.01
+    )
+    few = np.repeat([0.0, 0.5, 1.0], [5, 45, 50])
+    kept = published.region(few, np.full(100, 0.01))
+    assert kept == [0.5, 1.0]
+    assert published.holds(kept, 0.5, few=True)
+    assert not published.holds(kept, 0.7, few=True)
+    assert published.holds([0.05, 0.95], 0.7, few=False)
+
+
+def test_what_weights_tell(published):
+    rng = np.random.default_rng(5)
+    x = rng.uniform(size=(20_000, 3))
+    weights = np.where((x[:, 0] < 0.5) == (x[:, 1] < 0.5), 1.0, 0.0)
+    weights /= weights.sum()
+    left = published.left_of(["a", "b", "c"], x, weights)
+    assert all(abs(found["narrowed"]) < 0.01 for found in left.values())  # none alone
+    pair, *others = published.pairs_of(["a", "b", "c"], x, weights, 3)
+    assert pair["names"] == ["a", "b"]
+    assert pair["nats"] > 0.4  # ln 2, less what coarse parts blur
+    assert all(abs(other["nats"]) < 0.01 for other in others)
+
+
+def test_effects_of_unknowns(published):
+    rng = np.random.default_rng(6)
+    x = rng.uniform(size=(400, 4))
+    y = (rng.uniform(size=400) < 0.2 + 0.6 * x[:, 2]).astype(float)
+    effects = published.effects_of(published.Rows(x, {"y": y}, np.arange(400)), list("abcd"))["y"]
+    assert effects["c"][0] == pytest.approx(0.6, abs=0.2)
+    assert effects["c"][1] > 1.0
+    assert max(effects[name][1] for name in "abd") < 1.0
+
+
+@pytest.mark.parametrize("group", ["tunnel", "wall"])
+def test_hidden_settings_are_a_study(tmp_path, group):
+    run = part("hidden", group, "--count", 3, "--trials", 4)
+    assert run.returncode == 0, run.stderr
+    study = tomllib.loads(run.stdout)
+    assert StudyConfig.model_validate(study).trials == 4
+    first = tomllib.loads((FOLDER.parents[1] / f"studies/published_{group}.toml").read_text())
+    assert set(study["vary"]) == set(first["vary"]) - {"seed"}
+    assert all(len(values) == 3 for values in study["vary"].values())
+
+
+def test_rows_are_read_as_they_were_kept(published):
+    unknowns = published.Unknowns.of(published.study_file("wall"))
+    rows = published.read([FOLDER / "published_wall.csv"], published.GROUPS["wall"], unknowns)
+    assert rows.x.shape == (len(rows.points), len(unknowns.names))
+    assert rows.x.min() > -1e-6
+    assert rows.x.max() < 1 + 1e-6
+    assert 0.2 < rows.outcomes["stiff jams"].mean() < 0.6
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["weigh", "wall", "none"], "none: expected the rows of a study, found no such file"),
+        (["best", "wall", FOLDER / "published_tunnel.csv"], "expected a column wall.base_angle"),
+    ],
+)
+def test_what_cannot_be_weighed_is_one_line(words, line):
+    run = part(*words)
+    assert run.returncode == 2
+    assert line in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+def test_ranges_that_leave_nothing_are_one_line(published, capsys):
+    with pytest.raises(SystemExit) as end:
+        published.weights_of({"a": np.array([0.0, 1.0]), "b": np.array([1.0, 0.0])})
+    assert end.value.code == 2
+    assert "expected a setting within the ranges with a likelihood above zero" in (
+        capsys.readouterr().err
+    )
