@@ -421,7 +421,7 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
             refuse(f"{files[0]}: expected a column {missing[0]}, found none")
         if row["status"] in group.told:
             who = row[group.who] or group.all[0]  # a trial that failed has no columns
-            found.setdefault((row["point"], row["trial"]), {})[who] = row
+            found.setdefault((row["point"], row.get("trial", "")), {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
         refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
@@ -787,7 +787,7 @@ def near(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
     An unknown of a range moves by a tenth of it or so, one of a list is drawn anew one time in ten.
     """
     unknowns, rng = Unknowns.of(study_file(name)), np.random.default_rng(told.seed)
-    parents = [values for _, _, _, values in likeliest(name, files)[: told.near]]
+    parents = [values for _, _, _, values in likeliest(name, files, told.only)[: told.near]]
     settings = []
     for _ in range(told.count):
         values = dict(parents[rng.integers(len(parents))])
@@ -804,7 +804,7 @@ def near(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
 
 
 def likeliest(
-    name: str, files: Sequence[Path]
+    name: str, files: Sequence[Path], only: Sequence[str] | None = None
 ) -> list[tuple[float, str, dict[str, str], dict[str, Any]]]:
     """Settings in the order of their likelihood by their own trials: its logarithm, point, outcome.
 
@@ -813,9 +813,12 @@ def likeliest(
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
     values = {row["point"]: _values(unknowns, row) for row in lines(files)}
+    same: dict[str, list[int]] = {}  # points of one setting, as of a study that varies the seed
+    for point in np.unique(rows.points).tolist():
+        same.setdefault(json.dumps(values[str(point)]), []).append(point)
     found = []
-    for point in np.unique(rows.points):
-        here, logarithm, told = rows.points == point, 0.0, {}
+    for point, *others in same.values():
+        here, logarithm, told = np.isin(rows.points, [point, *others]), 0.0, {}
         for n, said in group.paper.items():
             y = rows.outcomes[n][here]
             y = y[np.isfinite(y)]
@@ -825,7 +828,8 @@ def likeliest(
                 likely = said.likelihood(y.mean(keepdims=True), spread) if len(y) else np.zeros(1)
             else:
                 likely = said.likelihood(np.array([(y.sum() + 1) / (len(y) + 2)]), 0.0)
-            logarithm += float(np.log(np.maximum(likely, 1e-300))[0])
+            if n in (only or group.paper):
+                logarithm += float(np.log(np.maximum(likely, 1e-300))[0])
         found.append((logarithm, str(point), told, values[str(point)]))
     return sorted(found, key=lambda item: -item[0])
 
