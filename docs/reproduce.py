@@ -27,6 +27,7 @@ from antennate.experiments.reproduce.experiment import (
     configured,
     is_fitted,
 )
+from antennate.experiments.reproduce.experiment import judge as found_of
 from antennate.experiments.reproduce.verdict import MEANINGS, VERDICTS
 from antennate.messages import command_words
 from antennate.studies.formats import to_json
@@ -144,7 +145,8 @@ def judge(folders: Sequence[str]) -> None:
         of = runs[config.setting]
         if missing := [command(name, config) for name in parts(config) if of and name not in of]:
             sys.exit(f"expected runs of all parts, missing: {'; '.join(missing)}")
-        judged = tuple((c, c.judge(of[c.experiment])) for c in claims(config) if c.experiment in of)
+        found = {c: f for name in of for c, f in found_of(name, of[name], config)}
+        judged = tuple((c, found[c]) for c in claims(config) if c in found)
         outcome = ReproduceOutcome(config, judged, interrupted=False)
         if of:
             FILES[config.setting].write_text(to_json(outcome.result()), encoding="utf-8")

@@ -38,7 +38,9 @@ def test_likelihoods_of_statements(published):
     assert published.Count(10, 10).likelihood(chance, 0.0)[1] == pytest.approx(0.34868, 1e-4)
     # 20 of 20 at 0.9, and a coin that shows 11 or more heads of 20: 0.41190
     assert published.AtLeast(20, 20).likelihood(chance, 0.0)[1] == pytest.approx(0.12158, 1e-4)
-    assert published.AtLeast(11, 20).likelihood(np.array([0.5]), 0.0) == pytest.approx([0.4119], 1e-4)
+    assert published.AtLeast(11, 20).likelihood(np.array([0.5]), 0.0) == pytest.approx(
+        [0.4119], 1e-4
+    )
     # at the mean the normal density is 0.39894 over its standard deviation, here 0.25
     mean = published.Mean(0.12, 4)
     assert mean.likelihood(np.log([0.12]), 0.4) == pytest.approx([1.5958], 1e-4)
@@ -92,6 +94,13 @@ def test_what_weights_tell(published):
     assert pair["names"] == ["a", "b"]
     assert pair["nats"] > 0.4  # ln 2, less what coarse parts blur
     assert all(abs(other["nats"]) < 0.01 for other in others)
+
+
+def test_what_a_measurement_would_settle(published):
+    x = np.random.default_rng(7).uniform(size=(20_000, 3))
+    weights = np.full(20_000, 1 / 20_000)
+    shares = published.measured(["a", "b", "c"], x, weights, x[:, 0] + 2 * x[:, 1])
+    assert shares == pytest.approx({"a": 0.2, "b": 0.8, "c": 0.0}, abs=0.02)  # variances 1 to 4
 
 
 def test_effects_of_unknowns(published):

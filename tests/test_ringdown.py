@@ -139,3 +139,19 @@ def test_the_quick_antenna_stands_beside_the_default_one(
     drawn = (tmp_path / "out" / "figures" / "ringdown.svg").read_text()
     assert result["engine"]["natural_hz"] < 3.0
     assert all(name in drawn for name in ("this antenna", "quick antenna"))
+
+
+def test_a_stiff_stop_holds_a_hinge_that_a_soft_one_lets_go_on() -> None:
+    """What a stop yields goes with the square of its time: solref of the engine."""
+
+    def beyond(stop_time: float) -> float:
+        antenna = AntennaSpec(active_coils=(3.0,), range=0.5, stop_time=stop_time, **RIGID)
+        model = compile_bench(BenchPhysicsParams(), antenna)
+        data = mujoco.MjData(model)
+        hinge = model.joint("antenna/hinge0")
+        data.qfrc_applied[hinge.dofadr[0]] = 2 * antenna.hinge_stiffness()[0] * 0.5
+        mujoco.mj_step(model, data, 4000)
+        return float(data.qpos[hinge.qposadr[0]]) - 0.5
+
+    assert beyond(0.02) > math.radians(1.0)
+    assert 0 < beyond(0.002) < beyond(0.02) / 25

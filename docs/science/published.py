@@ -1,12 +1,13 @@
-"""Weighs settings by what the paper says: `python docs/science/published.py PART FOLDER...`.
+"""Weighs settings by what the paper says: `python docs/science/published.py PART GROUP FILE...`.
 
 Parts, over folders of `antennate study studies/published_GROUP.toml` or of later stages: `weigh`
 fits the outcome over the unknowns, and writes what is left of their ranges to
-docs/science/published_GROUP.json and a figure. `hidden` prints a study of three hidden settings;
+docs/science/published_GROUP.json and figures. `hidden` prints a study of hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
-prints a study of settings drawn from what is left, `best` names the likeliest settings by
-their own trials; `rows` keeps the rows of folders as one table.
-Needs `uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
+prints a study of settings drawn from what is left, or searched by some of the statements. `best`
+names the likeliest settings by their own trials. `tune` prints a search of the published rule or
+of a clock in the setting of a file. `rows` keeps the rows of folders as one table. Needs
+`uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import tuning
 from numpy.typing import NDArray
-from published_figures import marginals, pairs, screening
+from published_figures import marginals, pairs, screening, trade
 from scipy.stats import binom, norm
 
 from antennate.figures import render
@@ -48,12 +50,18 @@ NARROWED = 0.02
 """Information from which on an unknown is told by the data [nats]."""
 PAIR_BINS, PAIRS = 5, 4
 """Parts of a range in a pair, and pairs that are drawn."""
+ENOUGH = 4
+"""Trials from which on a setting is drawn alone."""
+JUDGED: Sequence[tuple[float, float]] = ()
+"""Shares on fresh trials of settings that were judged: without and with the rule."""
 SHUFFLES = 200
 """Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
 """Seeds of later stages are this and 1 to 999 more; none is reserved or of the first stage."""
 FRESH = 572001
 """Seed on which the likeliest setting is judged."""
+TUNING = 571999
+"""Seed on which the rule and its rivals are tuned in a setting."""
 HIDDEN = 20261130
 """Seed of hidden settings."""
 
@@ -580,12 +588,17 @@ class Outcome:
             }
         )
 
-    def likelihoods(self, x: Floats, said: Mapping[str, Statement]) -> dict[str, Floats]:
-        """Likelihood of each statement in settings, mean over the fits, shape (n,)."""
+    def at(self, x: Floats) -> dict[str, Floats]:
+        """What comes out in settings by each fit, shape (fits, n)."""
+        return {name: model.at(x) for name, model in self.models.items()}
+
+    def likelihoods(
+        self, told: Mapping[str, Floats], said: Mapping[str, Statement]
+    ) -> dict[str, Floats]:
+        """Likelihood of each statement where that comes out, mean over the fits, shape (n,)."""
         return {
-            name: statement.likelihood(model.at(x), model.spread).mean(axis=0)
+            name: statement.likelihood(told[name], self.models[name].spread).mean(axis=0)
             for name, statement in said.items()
-            for model in [self.models[name]]
         }
 
 
@@ -673,6 +686,25 @@ def pairs_of(names: Sequence[str], x: Floats, weights: Floats, count: int) -> li
     return sorted(found, key=lambda pair: -pair["nats"])[:count]
 
 
+def measured(names: Sequence[str], x: Floats, weights: Floats, chance: Floats) -> dict[str, float]:
+    """How much of what is left open of an outcome a measurement of each unknown would settle.
+
+    Share of the variance of the outcome over what is left that lies between values of the unknown,
+    less what chance alone gives.
+    """
+    effective = 1.0 / float((weights**2).sum())
+    middle = float(weights @ chance)
+    whole = max(float(weights @ (chance - middle) ** 2), 1e-12)
+    found = {}
+    for k, name in enumerate(names):
+        place, count = _places(x[:, k], BINS)
+        mass = np.bincount(place, weights, count)
+        means = np.bincount(place, weights * chance, count)[mass > 0] / mass[mass > 0]
+        between = float(mass[mass > 0] @ (means - middle) ** 2)
+        found[name] = round(between / whole - (count - 1) / effective, 3)
+    return found
+
+
 def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
     """Of each outcome the change from one end of each unknown to the other, and its size as noise.
 
@@ -703,7 +735,8 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     rows = read(files, group, unknowns)
     outcome = Outcome.of(rows, group)
     x = prior(unknowns, DRAWS).x
-    likelihoods = outcome.likelihoods(x, group.paper)
+    told = outcome.at(x)
+    likelihoods = outcome.likelihoods(told, group.paper)
     weights = weights_of(likelihoods)
     result = {
         "trials": len(rows.x),
@@ -718,21 +751,27 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         "largest": {n: round(float(v.max()), 4) for n, v in likelihoods.items()},
         "together": float(np.prod(list(likelihoods.values()), axis=0).mean()),
         "there": {
-            n: [round(v, 4) for v in quantiles(m.at(x).mean(axis=0), weights, (0.05, 0.5, 0.95))]
-            for n, m in outcome.models.items()
+            n: [round(v, 4) for v in quantiles(y.mean(axis=0), weights, (0.05, 0.5, 0.95))]
+            for n, y in told.items()
         },
         "effects": effects_of(rows, unknowns.names),
+        "measured": {
+            n: measured(unknowns.names, x, weights, y.mean(axis=0)) for n, y in told.items()
+        },
         "left": left_of(unknowns.names, x, weights),
     }
     ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
     narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
-    told = [k for k, n in enumerate(unknowns.names) if n in narrowed]
-    result["pairs"] = pairs_of([unknowns.names[k] for k in told], x[:, told], weights, PAIRS)
-    for kind, drawn in {
+    these = [k for k, n in enumerate(unknowns.names) if n in narrowed]
+    result["pairs"] = pairs_of([unknowns.names[k] for k in these], x[:, these], weights, PAIRS)
+    figures = {
         "": marginals(narrowed, ends),
         "-pairs": pairs(result["pairs"], ends),
         "-screening": screening(result["effects"]),
-    }.items():
+    }
+    if name == "tunnel":
+        figures["-trade"] = trade(traded(rows), JUDGED)
+    for kind, drawn in figures.items():
         image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
         image.write_bytes(render(drawn)["png"])
     text = json.dumps(result, indent=1)
@@ -741,8 +780,22 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         print(f"{n}: {found}, likelihood {result['evidence'][n]}, at most {result['largest'][n]}")
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
     print("in what is left:", result["there"])
+    for n, shares in result["measured"].items():
+        first = sorted(shares.items(), key=lambda item: -item[1])[:4]
+        print(f"{n}: settled most by {', '.join(f'{u} ({v:.0%})' for u, v in first)}")
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
         print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
+
+
+def traded(rows: Rows) -> list[tuple[float, float, int]]:
+    """Of settings with enough trials the share that crosses without and with the rule."""
+    found = []
+    for point in np.unique(rows.points):
+        here = rows.points == point
+        if here.sum() >= ENOUGH:
+            shares = (float(rows.outcomes[f"{n} crosses"][here].mean()) for n in ("open", "paper"))
+            found.append((*shares, int(here.sum())))
+    return found
 
 
 def study_file(name: str) -> Path:
@@ -774,7 +827,7 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
-    likelihoods = outcome.likelihoods(draws.x, said)
+    likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
     rng = np.random.default_rng(told.seed)
     chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
@@ -848,12 +901,56 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
     (HERE / f"published_{name}_best.toml").write_text(text + "\n", encoding="utf-8")
 
 
+SEARCHED = {
+    "paper": """
+"rule.threshold" = { low = 0.05, high = 0.9 }
+"rule.hysteresis" = { low = 0.0, high = 0.1 }
+"rule.strong" = { low = 0.3, high = 0.95 }
+"rule.similar" = { low = 0.05, high = 0.5 }
+"rule.hold_time" = { low = 0.3, high = 6.0, log = true }
+"conditioning.averaging_time" = { low = 0.02, high = 0.5, log = true }
+"gait.turn_offset" = { low = 0.1, high = 0.6 }
+""",
+    **{rival: tuning.SEARCHED[rival] for rival in ("timed", "schedule")},
+}
+"""What is searched of the rule and of the clocks, each with the same budget."""
+
+
+def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
+    """A search by `antennate study design` of one controller in a setting."""
+    searched = {"control." + name for name in tomllib.loads(SEARCHED[controller])}
+    fixed = [
+        f"{path} = {json.dumps(value)}"
+        for path, value in _paths(tomllib.loads(file.read_text(encoding="utf-8")))
+        if path not in searched | {"trials", "seed", "controllers"}
+    ]
+    return "\n".join(
+        [
+            f"proposals = {proposals}\nvalidated = 1\nvalidation_factor = 1\n",
+            f"[search]{SEARCHED[controller]}",
+            f'[evaluate.tunnel]\ntrials = {trials}\nminimize = ["time_s"]\n',
+            f'[evaluate.tunnel.settings]\ncontrollers = ["{controller}"]\nseed = {TUNING}',
+            *fixed,
+        ]
+    )
+
+
+def _paths(tables: Mapping[str, Any], before: str = "") -> Iterable[tuple[str, Any]]:
+    """Values of nested tables by their dotted paths."""
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            yield from _paths(value, f"{before}{key}.")
+        else:
+            yield before + key, value
+
+
 def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     hidden = read(files[:1], group, unknowns)
     outcome = Outcome.of(read(files[1:], group, unknowns), group)
     x = prior(unknowns, DRAWS).x
+    chances = outcome.at(x)
     told = inside = 0
     for place in sorted(set(hidden.points.tolist())):
         here = hidden.points == place
@@ -862,7 +959,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
             known = y[here][np.isfinite(y[here])]
             if len(known):
                 said[n] = group.paper[n].again(known)
-        weights = weights_of(outcome.likelihoods(x, said))
+        weights = weights_of(outcome.likelihoods(chances, said))
         print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
         for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
             if found["narrowed"] > NARROWED:
@@ -897,15 +994,19 @@ def _short(text: str) -> str:
         return text
 
 
+PARTS = ("weigh", "hidden", "recover", "next", "best", "tune", "rows")
+
+
 def main() -> None:
     """Run one part."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("weigh", "hidden", "recover", "next", "best", "rows"))
+    parser.add_argument("part", choices=PARTS)
     parser.add_argument("group", choices=GROUPS)
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
+    parser.add_argument("--controller", choices=SEARCHED, default="paper")
     parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
     parser.add_argument("--only", nargs="+", help="statements to search by")
     parser.add_argument("--near", type=int, help="search near so many of the likeliest settings")
@@ -918,6 +1019,8 @@ def main() -> None:
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
     elif told.part == "best":
         best(name, files, told.count)
+    elif told.part == "tune":
+        sys.stdout.write(tuned(files[0], told.controller, told.count, told.trials))
     elif told.part == "next":
         sys.stdout.write((near if told.near else following)(name, files, told))
     else:

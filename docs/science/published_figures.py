@@ -94,3 +94,29 @@ def screening(effects: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
     panel.tick_params(labelsize=SMALL, top=True, labeltop=True, bottom=False, labelbottom=False)
     panel.grid(visible=False)
     return drawn
+
+
+@styled
+def trade(
+    shares: Sequence[tuple[float, float, int]], judged: Sequence[tuple[float, float]]
+) -> Figure:
+    """What the rule makes of settings in which robots without feedback cross so often.
+
+    Args:
+        shares: Of each setting how many cross without and with the rule, of how many trials.
+        judged: Likewise of settings that were judged on fresh trials.
+    """
+    drawn = canvas(WIDTH, 3.4)
+    panel = drawn.subplots()
+    x, y, trials = np.array(shares, float).T
+    panel.axvspan(0.45, 0.75, color=FAINT, linewidth=0)
+    panel.plot([0, 1], [0, 1], color=INK, linewidth=0.8)
+    panel.axhline(0.95, color=INK, linewidth=0.8, linestyle="--")
+    panel.scatter(x, y, s=3 * trials, color=SERIES[0], alpha=0.35, linewidth=0)
+    if judged:
+        panel.scatter(*np.array(judged).T, marker="D", s=36, color=SERIES[1])
+    panel.set_xlabel("share that crosses without feedback")
+    panel.set_ylabel("share that crosses with the rule")
+    panel.set_xlim(-0.03, 1.03)
+    panel.set_ylim(-0.03, 1.03)
+    return drawn

@@ -214,6 +214,11 @@ class AntennaSpec(Params):
     """Inertia added per hinge."""
     range: float = number(1.4, "rad", "assumed: neighbouring holders meet", gt=0, lt=3.1)
     """Largest angle of one hinge."""
+    stop_time: float = number(
+        0.02, "s", "assumed: that of the engine; a soft stop", gt=1e-5, le=0.1
+    )
+    """Time in which the stop of a hinge pushes back: the shorter, the stiffer. The engine takes at
+    least two of its timesteps."""
     base_angle: float = number(
         math.radians(47.0), "rad", "assumed: tips lead and span the width", ge=0, lt=math.pi / 2
     )

@@ -102,6 +102,7 @@ def build_antenna(
             armature=params.armature,
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
             range=[-params.range, params.range],
+            solref_limit=[params.stop_time, 1.0],
         )
         parent.add_geom(
             name=name,

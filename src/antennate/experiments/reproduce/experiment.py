@@ -144,13 +144,22 @@ def configured(name: str, config: ReproduceConfig) -> Params:
 def _settings(name: str, config: ReproduceConfig) -> tuple[dict[str, Any], dict[str, Any]]:
     """Flags of an experiment, and its fitted numbers, over which no flag stands."""
     model, base = experiments.load(name).config, dict[str, Any]()
-    flags = dict((QUICK if config.quick else FULL)[name])
+    flags = dict((QUICK if config.quick else FULL).get(name, {}))
     if is_fitted(name, config):
         base = read_file(fitted()[name], model).model_dump(exclude_unset=True)
         flags |= {} if config.quick else _FULL_FITTED.get(name, {})
         flags = {key: value for key, value in flags.items() if key not in base}
     chance = "seed" in model.model_fields and name not in _WITHOUT_CHANCE
     return flags | ({"seed": config.seed} if chance else {}), base
+
+
+def judge(
+    name: str, result: Mapping[str, Any], config: ReproduceConfig
+) -> list[tuple[Claim, Finding]]:
+    """What the result of an experiment says of its claims; springs are wound as in `springs`."""
+    wound = configured("springs", config).model_dump(include={"wire_mm", "coil_mm"})
+    own = (claim for claim in claims(config) if claim.experiment == name)
+    return [(claim, claim.judge({**result, "wound": wound})) for claim in own]
 
 
 def command(name: str, config: ReproduceConfig) -> str:
@@ -203,7 +212,7 @@ def run(
             return ReproduceOutcome(config, tuple(judged), interrupted=True)
         step(1, 1)
         before += own
-        new = [(claim, claim.judge(result)) for claim in every if claim.experiment == name]
+        new = judge(name, result, config)
         judged += new
         for row in ReproduceOutcome(config, tuple(new), interrupted=False).rows:
             on_row(row)

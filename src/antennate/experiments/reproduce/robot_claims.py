@@ -320,9 +320,9 @@ def unbroken(result: Mapping[str, Any]) -> Finding:
     if row["spring_high_n_m"] is None:
         return Finding("no valid trial", None, "No trial of `closed` is valid.", ())
     low, high, cycles = (row[f"spring_{n}"] for n in ("low_n_m", "high_n_m", "cycles"))
-    wires = {kind: SpringParams(wire=kind) for kind in ("stainless_302", "music_wire")}
-    load = {kind: endurance(wire, max(low, -high), high) for kind, wire in wires.items()}
-    usual, music = load.values()
+    wire = SpringParams.model_validate(result.get("wound", {}))
+    usual = endurance(wire, max(low, -high), high)
+    music = endurance(wire.model_copy(update={"wire": "music_wire"}), max(low, -high), high)
     stays = min(usual.yield_factor, usual.fatigue_factor) > 1.0
     few = row["trials"] - row["invalid"] < ENOUGH_TO_STAY
     yields = usual.stress * usual.yield_factor
@@ -331,14 +331,14 @@ def unbroken(result: Mapping[str, Any]) -> Finding:
         f"{usual.yield_factor:.2f} of that is yield, {usual.fatigue_factor:.2f} the limit of a "
         f"million cycles; at most {cycles} cycles a trial",
         None if stays and few else stays,
-        "Stainless 302 of 0.5 mm on a coil of 3.77 mm; music wire yields at "
-        f"{music.yield_factor:.2f} of the load and bears {music.fatigue_factor:.2f} of it for a "
+        f"Stainless 302 of {wire.wire_mm:g} mm on a coil of {wire.coil_mm:g} mm; music wire yields "
+        f"at {music.yield_factor:.2f} of the load and bears {music.fatigue_factor:.2f} of it for a "
         f"million cycles. That many are {1e6 / max(cycles, 1):.0f} trials: "
         + (
             "wear is no matter of a few trials."
             if usual.yield_factor > 1
             else "not wear, but a single strong bend decides, where an antenna is caught between "
-            "robot and wall and a hinge goes to its stop (80°, assumed)."
+            "robot and wall and a hinge goes to its stop."
         ),
         (Bar("yield", yields / 1e6), Bar("ours, largest", usual.stress / 1e6)),
     )
