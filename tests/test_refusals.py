@@ -201,6 +201,7 @@ bench sweep --profiles stiff stiff :: profiles must differ
 bench sweep --antenna.sensor.rate 300 :: whole fraction of the physics rate 2000 Hz
 bench sweep --estimate.trials 3 :: estimate.trials: expected a number of at least 6
 tunnel --robot.antenna.sensor.kind fsr :: conditioning.polarity must be 1 for a fsr sensor :: found -1 :: antennate calibrate --antenna.sensor.kind fsr
+bench touch --antenna.sensor.fixed-resistor supply :: conditioning.polarity must be 1 for a flex sensor :: found -1 :: --antenna.sensor.kind flex --antenna.sensor.fixed-resistor supply
 bench touch --antenna.sensor.kind fsr :: conditioning.polarity must be 1 for a fsr sensor :: found -1 :: antennate calibrate --antenna.sensor.kind fsr
 bench force --antenna.sensor.kind fsr :: conditioning.polarity must be 1 for a fsr sensor :: found -1 :: antennate calibrate --antenna.sensor.kind fsr
 """

@@ -13,6 +13,7 @@ from antennate import simulate
 from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
+from antennate.experiments.bench import flex_of
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.params.base import read_file
@@ -28,6 +29,16 @@ FLAT, GAIN = 10e3, 1.2 / math.pi
 def test_film_resistances_give_the_counts_of_the_divider(resistance: float, expected: int) -> None:
     flex = (resistance / FLAT - 1) / GAIN
     assert sensor.counts(SensorParams(), np.array([flex])) == pytest.approx([expected], abs=1)
+
+
+@pytest.mark.parametrize(("resistance", "expected"), [(10e3, 1872), (15e3, 2281), (22e3, 2640)])
+def test_below_the_fixed_resistor_counts_rise(resistance: float, expected: int) -> None:
+    """By hand: 3.3 V R / (R + 10 kOhm), less 0.142 V, by 0.80566 mV a count."""
+    params = SensorParams(fixed_resistor="supply")
+    read = sensor.counts(params, np.array([(resistance / FLAT - 1) / GAIN]))
+    assert read == pytest.approx([expected], abs=1)
+    assert flex_of(params, read) == pytest.approx([(resistance / FLAT - 1) / GAIN], abs=0.01)
+    assert params.polarity == 1
 
 
 def test_counts_fall_strictly_over_bends_a_degree_apart() -> None:
@@ -95,18 +106,20 @@ def test_a_pressure_film_reads_more_when_bent() -> None:
 FSR = {"sensor": {"kind": "fsr"}}
 
 
+@pytest.mark.parametrize(("name", "value"), [("kind", "fsr"), ("fixed_resistor", "supply")])
 def test_the_curve_that_calibrate_finds_for_it_is_taken(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, value: str
 ) -> None:
     """As the refusal says; `drive` takes the same file for a real robot."""
+    other = [f"--antenna.sensor.{name.replace('_', '-')}", value]
     words = ["--rig.pushes", "2", "--rig.speeds", "0.3", "--no-figures"]
-    rig = ["calibrate", "--antenna.sensor.kind", "fsr", *words, "--out", str(tmp_path / "rig")]
+    rig = ["calibrate", *other, *words, "--out", str(tmp_path / "rig")]
     assert main(rig) == 0
     file = tmp_path / "rig" / "conditioning.toml"
     words = ["--trials", "1", "--time-limit", "0.1", "--no-figures", "--out", str(tmp_path / "run")]
     assert main(["tunnel", "--config", str(file), *words]) == 0, capsys.readouterr().err
     told = (tmp_path / "run" / "config.toml").read_text()
-    assert 'kind = "fsr"' in told
+    assert f'{name} = "{value}"' in told
     assert "polarity = 1  #" in told
     assert read_file(file, RobotFile).control.conditioning.polarity == 1
 

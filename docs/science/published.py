@@ -124,7 +124,30 @@ class Mean:
         return Mean(math.exp(float(values.mean())), len(values))
 
 
-Statement = Count | AtLeast | Mean
+@dataclass(frozen=True)
+class Near:
+    """A number, so far from that of the setting at most, or one that is below it.
+
+    Attributes:
+        sd: Standard deviation of the distance.
+        below: Whether any number of the setting below it serves as well.
+    """
+
+    value: float
+    sd: float
+    below: bool = False
+
+    def likelihood(self, number: Floats, spread: float) -> Floats:
+        """Of numbers, about which the model errs with a standard deviation."""
+        law = norm.cdf if self.below else norm.pdf
+        return law(self.value - number, scale=math.hypot(spread, self.sd))
+
+    def again(self, values: Floats) -> Near:
+        """What another recording says: a number, as a bound is not seen."""
+        return Near(float(values.mean()), self.sd)
+
+
+Statement = Count | AtLeast | Mean | Near
 
 
 @dataclass(frozen=True)
@@ -136,12 +159,14 @@ class Group:
         all: Who has to be there.
         outcomes: What the paper speaks of, from the rows of all; NaN where a trial does not tell.
         paper: What it says of each.
+        told: Status of rows that are read.
     """
 
     who: str
     all: tuple[str, ...]
     outcomes: Mapping[str, Callable[[Mapping[str, Row]], float]]
     paper: Mapping[str, Statement]
+    told: tuple[str, ...] = ("ok",)
 
 
 def _crossed(name: str) -> Callable[[Mapping[str, Row]], float]:
@@ -169,6 +194,34 @@ def _ended(name: str, outcome: str) -> Callable[[Mapping[str, Row]], float]:
 
 def _below(name: str, degrees: float) -> Callable[[Mapping[str, Row]], float]:
     return lambda rows: float(float(rows[name]["hinge_max_deg"]) < degrees)
+
+
+def _calibrated(rows: Mapping[str, Row]) -> float:
+    return float(rows["calibrate"]["status"] == "ok")
+
+
+def _number(of: Callable[[Callable[[str], float]], float]) -> Callable[[Mapping[str, Row]], float]:
+    """Of a calibration, from its columns; NaN of a recording that was refused."""
+
+    def number(rows: Mapping[str, Row]) -> float:
+        row = rows["calibrate"]
+        return of(lambda name: float(row[f"calibration.{name}"])) if _calibrated(rows) else math.nan
+
+    return number
+
+
+def _apart(column: Callable[[str], float]) -> float:
+    """Logarithm of how much the speeds miss R² of 0.95 and 0.02 between them, the larger one."""
+    r2 = [column(f"speeds.{k}.r2") for k in range(3)]
+    return math.log(max((1 - min(r2)) / 0.05, (max(r2) - min(r2)) / 0.02, 1e-3))
+
+
+def _beaten(column: Callable[[str], float]) -> float:
+    """Logarithm of the sigmoid's error over that of its best rival, on pushes left out."""
+    sigmoid, *rivals = (
+        column(f"cross_validated_rmse.{name}") for name in ("sigmoid", "line", "isotonic")
+    )
+    return math.log(sigmoid / min(rivals))
 
 
 GROUPS = {
@@ -205,6 +258,25 @@ GROUPS = {
             "descending passes": AtLeast(17, 20),
             "springs below 30 deg": AtLeast(20, 20),
         },
+    ),
+    "calibration": Group(
+        "command",
+        ("calibrate",),
+        {
+            "calibrated": _calibrated,
+            "slope": _number(lambda column: math.log(column("slope"))),
+            "midpoint": _number(lambda column: column("midpoint")),
+            "one curve": _number(_apart),
+            "sigmoid": _number(_beaten),
+        },
+        {
+            "calibrated": Count(1, 1),
+            "slope": Near(math.log(18.3), 0.1),
+            "midpoint": Near(0.305, 0.025),
+            "one curve": Near(0.0, 0.2, below=True),
+            "sigmoid": Near(0.0, 0.05, below=True),
+        },
+        told=("ok", "failed"),
     ),
 }
 
@@ -358,8 +430,9 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     for row in lines(files):
         if missing := [name for name in unknowns.axes if name not in row]:
             refuse(f"{files[0]}: expected a column {missing[0]}, found none")
-        if row["status"] == "ok":
-            found.setdefault((row["point"], row["trial"]), {})[row[group.who]] = row
+        if row["status"] in group.told:
+            who = row[group.who] or group.all[0]  # a trial that failed has no columns
+            found.setdefault((row["point"], row.get("trial", "")), {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
         refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
@@ -387,7 +460,7 @@ def _values(unknowns: Unknowns, row: Mapping[str, str]) -> dict[str, Any]:
         elif isinstance(axis, list) and isinstance(axis[0], str):
             found[name] = text
         else:
-            found[name] = float(text)
+            found[name] = int(text) if text.isdigit() else float(text)
     return found
 
 
@@ -513,7 +586,7 @@ class Outcome:
         """Fitted to trials."""
         return cls(
             {
-                name: choose(rows.x, y, rows.points, not isinstance(group.paper[name], Mean))
+                name: choose(rows.x, y, rows.points, isinstance(group.paper[name], Count | AtLeast))
                 for name, y in rows.outcomes.items()
             }
         )
@@ -739,10 +812,10 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
     text = [
         f'experiment = "{first["experiment"]}"',
         'plan = "list"',
-        f"trials = {trials}",
+        *([f"trials = {trials}"] if "trials" in first else []),
         "",
         "[settings]",
-        *(f"{key} = {json.dumps(value)}" for key, value in first["settings"].items()),
+        *(f"{key} = {json.dumps(value)}" for key, value in first.get("settings", {}).items()),
         f"seed = {seed}",
         "",
         "[vary]",
@@ -764,33 +837,67 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     return study_of(name, [draws.setting(k) for k in chosen], told.trials, LATER + told.seed)
 
 
-def best(name: str, files: Sequence[Path], count: int) -> None:
-    """Print the settings that are likeliest by their own trials, and write the first one.
+def near(name: str, files: Sequence[Path], told: argparse.Namespace) -> str:
+    """A study of settings near the likeliest ones: a search, not a draw from what is left.
+
+    An unknown of a range moves by a tenth of it or so, one of a list is drawn anew one time in ten.
+    """
+    unknowns, rng = Unknowns.of(study_file(name)), np.random.default_rng(told.seed)
+    parents = [values for _, _, _, values in likeliest(name, files, told.only)[: told.near]]
+    settings = []
+    for _ in range(told.count):
+        values = dict(parents[rng.integers(len(parents))])
+        for n, axis in unknowns.axes.items():
+            if isinstance(axis, list):
+                values[n] = axis[rng.integers(len(axis))] if rng.random() < 0.1 else values[n]
+                continue
+            law = (math.log, math.exp) if axis.get("log") else (float, float)
+            low, high, at = (law[0](v) for v in (axis["low"], axis["high"], values[n]))
+            moved = law[1](min(max(at + 0.1 * (high - low) * rng.normal(), low), high))
+            values[n] = round(moved) if axis.get("whole") else moved
+        settings.append(values)
+    return study_of(name, settings, told.trials, LATER + told.seed)
+
+
+def likeliest(
+    name: str, files: Sequence[Path], only: Sequence[str] | None = None
+) -> list[tuple[float, str, dict[str, str], dict[str, Any]]]:
+    """Settings in the order of their likelihood by their own trials: its logarithm, point, outcome.
 
     A chance is (did + 1) / (trials + 2), a mean that of the trials; where none tells, 0.
     """
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
     values = {row["point"]: _values(unknowns, row) for row in lines(files)}
+    same: dict[str, list[int]] = {}  # points of one setting, as of a study that varies the seed
+    for point in np.unique(rows.points).tolist():
+        same.setdefault(json.dumps(values[str(point)]), []).append(point)
     found = []
-    for point in np.unique(rows.points):
-        here, logarithm, told = rows.points == point, 0.0, {}
+    for point, *others in same.values():
+        here, logarithm, told = np.isin(rows.points, [point, *others]), 0.0, {}
         for n, said in group.paper.items():
             y = rows.outcomes[n][here]
             y = y[np.isfinite(y)]
             told[n] = f"{y.mean():.2f} of {len(y)}" if len(y) else "-"
-            if isinstance(said, Mean):
-                spread = float(y.std(ddof=1)) if len(y) > 1 else 1.0
+            if isinstance(said, Mean | Near):
+                spread = float(y.std(ddof=1)) if len(y) > 1 else float(isinstance(said, Mean))
                 likely = said.likelihood(y.mean(keepdims=True), spread) if len(y) else np.zeros(1)
             else:
                 likely = said.likelihood(np.array([(y.sum() + 1) / (len(y) + 2)]), 0.0)
-            logarithm += float(np.log(np.maximum(likely, 1e-12))[0])
-        found.append((logarithm, str(point), told))
-    found.sort(key=lambda item: -item[0])
-    for logarithm, point, told in found[:count]:
+            if n in (only or group.paper):
+                logarithm += float(np.log(np.maximum(likely, 1e-300))[0])
+        found.append((logarithm, str(point), told, values[str(point)]))
+    return sorted(found, key=lambda item: -item[0])
+
+
+def best(name: str, files: Sequence[Path], count: int) -> None:
+    """Print the settings that are likeliest by their own trials, and write the first one."""
+    found = likeliest(name, files)
+    for logarithm, point, told, _ in found[:count]:
         print(f"{logarithm:8.2f}  point {point}: {told}")
-    tables: dict[str, list[str]] = {"": ["trials = 200", f"seed = {FRESH}"]}
-    for path, value in values[found[0][1]].items():
+    trials = ["trials = 200"] if "trials" in tomllib.loads(study_file(name).read_text()) else []
+    tables: dict[str, list[str]] = {"": [*trials, f"seed = {FRESH}"]}
+    for path, value in found[0][3].items():
         table, _, key = path.rpartition(".")
         tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
     text = "\n\n".join("\n".join([f"[{t}]"] * bool(t) + tables[t]) for t in sorted(tables))
@@ -869,7 +976,10 @@ def recover(name: str, files: Sequence[Path]) -> None:
 def keep(name: str, files: Sequence[Path]) -> None:
     """Keep the rows of studies as one table, only what is read here."""
     unknowns, group = Unknowns.of(study_file(name)), GROUPS[name]
-    read_here = ("outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg")
+    read_here = ["outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg"]
+    read_here += ["calibration.slope", "calibration.midpoint"]
+    read_here += [f"calibration.speeds.{k}.r2" for k in range(3)]
+    read_here += [f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")]
     columns = ["point", "seed", *unknowns.axes, "trial", group.who, *read_here, "status"]
     rows = [*lines(files)]
     columns = [column for column in columns if column in rows[0]]
@@ -902,6 +1012,7 @@ def main() -> None:
     parser.add_argument("--controller", choices=SEARCHED, default="paper")
     parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
     parser.add_argument("--only", nargs="+", help="statements to search by")
+    parser.add_argument("--near", type=int, help="search near so many of the likeliest settings")
     told = parser.parse_args()
     name = told.group
     files = told.files or [HERE / f"published_{name}.csv"]
@@ -914,7 +1025,7 @@ def main() -> None:
     elif told.part == "tune":
         sys.stdout.write(tuned(files[0], told.controller, told.count, told.trials))
     elif told.part == "next":
-        sys.stdout.write(following(name, files, told))
+        sys.stdout.write((near if told.near else following)(name, files, told))
     else:
         {"weigh": weigh, "recover": recover, "rows": keep}[told.part](name, files)
 

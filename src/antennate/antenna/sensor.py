@@ -5,7 +5,7 @@ creep, both with the static curve as their mean.
 
 - Flex sensor: `flex`, resistance R0 (1 + a |flex|); or `fsr`, a pressure strip whose conductance
   rises in proportion to the flex. It is the upper half of a voltage divider, so counts fall with
-  the flex for `flex` and rise for `fsr`.
+  the flex for `flex` and rise for `fsr`; or the lower half, if `fixed_resistor` is `supply`.
 - Hysteresis: play operators (Prandtl-Ishlinskii). A play operator of half width r keeps its output
   until the input is more than r away, then follows at that distance. Operators of weights w and
   half widths r make a loop of the width 2 sum(w r).
@@ -54,9 +54,10 @@ def resistance(params: SensorParams, sensed: Floats) -> Floats:
     return 1.0 / (idle + (pressed - idle) * sensed / RIGHT_ANGLE)
 
 
-def divider(params: SensorParams, upper: Floats) -> Floats:
-    """Voltage [V] over the fixed resistor below a flex sensor of `upper` [Ohm], same shape."""
-    return params.supply * params.divider_resistance / (upper + params.divider_resistance)
+def divider(params: SensorParams, sensed: Floats) -> Floats:
+    """Voltage [V] over the lower half of a divider with a flex sensor of `sensed` [Ohm]."""
+    lower = params.divider_resistance if params.fixed_resistor == "ground" else sensed
+    return params.supply * lower / (sensed + params.divider_resistance)
 
 
 def transfer_curve(params: SensorParams) -> tuple[Floats, Floats]:

@@ -63,7 +63,10 @@ def flex_of(sensor: SensorParams, counts: Floats) -> Floats:
     """
     volts, readings = flex_sensor.transfer_curve(sensor)
     voltage = np.interp(counts, readings, volts)
-    resistance = sensor.divider_resistance * (sensor.supply / voltage - 1.0)
+    odds = sensor.supply / voltage - 1.0  # upper half of the divider over the lower one
+    resistance = sensor.divider_resistance * odds ** (
+        1 if sensor.fixed_resistor == "ground" else -1
+    )
     return np.maximum((resistance / sensor.flat_resistance - 1.0) / sensor.bend_gain, 0.0)
 
 

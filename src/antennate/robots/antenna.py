@@ -68,7 +68,11 @@ class SensorParams(Params):
     )
     """Whether the flex sensor sees bending towards the tail only (one) or either way."""
     divider_resistance: float = number(10e3, "Ohm", "assumed: what makers pair with it", gt=0)
-    """Fixed resistor to ground."""
+    """Fixed resistor of the divider."""
+    fixed_resistor: Literal["ground", "supply"] = number(
+        "ground", "1", "assumed: as makers wire it; the paper does not say"
+    )
+    """Where the fixed resistor leads to; the flex sensor leads to the other end of the divider."""
     supply: float = number(3.3, "V", "datasheet: ESP32 supply", gt=0)
     """Voltage over the divider."""
     reference: float = number(1.1, "V", "datasheet: ESP32, nominal; 1.0 to 1.2 V", ge=1.0, le=1.2)
@@ -115,7 +119,7 @@ class SensorParams(Params):
     @property
     def polarity(self) -> Literal[-1, 1]:
         """1 if readings rise with bending, -1 if they fall."""
-        return 1 if self.kind == "fsr" else -1
+        return 1 if (self.kind == "fsr") == (self.fixed_resistor == "ground") else -1
 
 
 def require_own_curve(sensor: SensorParams, name: str, curve: CurveParams | None) -> None:
@@ -134,7 +138,8 @@ def require_own_curve(sensor: SensorParams, name: str, curve: CurveParams | None
         raise ValueError(
             f"{name}.polarity must be {sensor.polarity} for a {sensor.kind} sensor, whose readings "
             f"{way} with bending, found {curve.polarity}, the curve of another one; give "
-            f"conditioning.toml of `antennate calibrate --antenna.sensor.kind {sensor.kind}`"
+            f"conditioning.toml of `antennate calibrate --antenna.sensor.kind {sensor.kind}"
+            f"{' --antenna.sensor.fixed-resistor supply' * (sensor.fixed_resistor == 'supply')}`"
         )
 
 

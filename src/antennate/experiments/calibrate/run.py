@@ -170,15 +170,17 @@ class CalibrateOutcome(Outcome):
         return bending_level(self.calibration.conditioning(), self.recording.samples.counts)
 
     def conditioning_toml(self) -> str:
-        """The curve as keys of a configuration file, with the kind of a simulated fsr sensor."""
+        """The curve as keys of a configuration file, with what turns a simulated sensor round."""
         curve = self.calibration.conditioning()
         of_curve = ("knots", "knot_levels") if curve.knots else ("midpoint", "slope")
         keys = (*of_curve, "polarity", "counts_low", "counts_high")
         values = {key: getattr(curve, key) for key in keys}
         lines = [f"{k} = {list(v) if isinstance(v, tuple) else v!r}" for k, v in values.items()]
-        kind = self.config.antenna.sensor.kind
-        if self.config.recording is None and kind != SensorParams().kind:
-            lines += ["", "[robot.antenna.sensor]", f'kind = "{kind}"']
+        here, usual = self.config.antenna.sensor, SensorParams()
+        other = [n for n in ("kind", "fixed_resistor") if getattr(here, n) != getattr(usual, n)]
+        if self.config.recording is None and other:
+            lines += ["", "[robot.antenna.sensor]"]
+            lines += [f'{name} = "{getattr(here, name)}"' for name in other]
         return "\n".join(["[control.conditioning]", *lines]) + "\n"
 
 
