@@ -69,7 +69,7 @@ points wide, though it may reach below: 10 of 10 are *undecided*, 97 of 100 are 
 Numbers that the paper does not give are also fitted to all that it says of a part at once
 ([What must be true](science/published.md)). At that setting a claim is *fitted* at best, and fewer
 may hold than with our defaults, some of which were chosen for one claim. A dash stands for a part
-that has no such numbers yet; the counts then take our defaults.
+that has none; the counts then take our defaults.
 
 """
 BEST = (
@@ -175,7 +175,7 @@ def counts(found: Mapping[str, Any], fitted: Rows, mark: str = "") -> str:
     if fitted:
         of = dict.fromkeys(command_words(c.experiment) for c in CLAIMS if c.claim in fitted)
         at_best = told(fitted.get(row["claim"], row) for row in found["claims"])
-        line += f" At the settings that fit best, so far of `{'`, `'.join(of)}`: {at_best}."
+        line += f" At the settings that fit best, of `{'`, `'.join(of)}`: {at_best}."
     return line
 
 

@@ -44,6 +44,12 @@ def test_likelihoods_of_statements(published):
     # at the mean the normal density is 0.39894 over its standard deviation, here 0.25
     mean = published.Mean(0.12, 4)
     assert mean.likelihood(np.log([0.12]), 0.4) == pytest.approx([1.5958], 1e-4)
+    # likewise with 0.5, and a normal is below its mean plus one standard deviation in 0.84134
+    assert published.Near(1.0, 0.3).likelihood(np.array([1.0]), 0.4) == pytest.approx(
+        [0.79788], 1e-4
+    )
+    below = published.Near(1.0, 0.3, below=True)
+    assert below.likelihood(np.array([0.5, -9.0]), 0.4) == pytest.approx([0.84134, 1.0], 1e-4)
 
 
 def test_a_setting_and_its_shares(published):
@@ -154,3 +160,103 @@ def test_ranges_that_leave_nothing_are_one_line(published, capsys):
     assert "expected a setting within the ranges with a likelihood above zero" in (
         capsys.readouterr().err
     )
+
+
+def test_a_recording_that_was_refused_tells_that_it_was(published, tmp_path):
+    """R² of 0.95 to 0.97 is just one curve; the sigmoid errs by e times its rival."""
+    group = published.GROUPS["calibration"]
+    columns = {f"calibration.speeds.{k}.r2": str(0.95 + 0.01 * k) for k in range(3)}
+    columns |= {"calibration.slope": "18.3", "calibration.midpoint": "0.3"}
+    errors = {"sigmoid": str(0.1 * np.e), "line": "0.2", "isotonic": "0.1"}
+    columns |= {f"calibration.cross_validated_rmse.{n}": e for n, e in errors.items()}
+    axes = {"averaging_time": {"low": 0.0, "high": 0.5}}
+    table = tmp_path / "trials.csv"
+    table.write_text(
+        f"point,command,status,averaging_time,{','.join(columns)}\n"
+        f"0,calibrate,ok,0.1,{','.join(columns.values())}\n"
+        f"1,,failed,0.2{',' * len(columns)}\n"
+    )
+    rows = published.read([table], group, published.Unknowns(axes))
+    found = {name: values.tolist() for name, values in rows.outcomes.items()}
+    assert found["calibrated"] == [1.0, 0.0]
+    assert found["slope"][0] == pytest.approx(np.log(18.3))
+    assert found["one curve"][0] == pytest.approx(0.0, abs=1e-9)
+    assert found["sigmoid"][0] == pytest.approx(1.0)
+    assert np.isnan(
+        [found[name][1] for name in ("slope", "midpoint", "one curve", "sigmoid")]
+    ).all()
+
+
+def test_a_search_stays_near_the_likeliest_and_within_the_ranges(tmp_path):
+    """One of 40 settings has the paper's numbers, at an end of a range."""
+    columns = tomllib.loads(
+        (FOLDER.parents[1] / "studies" / "published_calibration.toml").read_text()
+    )
+    axes = {name: axis for name, axis in columns["vary"].items() if name != "seed"}
+
+    def middle(axis):
+        if isinstance(axis, list):
+            return " ".join(map(str, axis[0])) if isinstance(axis[0], list) else str(axis[0])
+        return str((axis["low"] * axis["high"]) ** 0.5 if axis.get("log") else axis["high"])
+
+    told = [f"calibration.speeds.{k}.r2" for k in range(3)]
+    told += [f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")]
+    head = ["point", "command", "status", *axes, "calibration.slope", "calibration.midpoint", *told]
+    lines = [",".join(head)]
+    for k in range(40):
+        values = {name: middle(axis) for name, axis in axes.items()}
+        values["rig.place"] = "0.1" if k == 7 else "0.06"
+        fitted = ("18.3", "0.305") if k == 7 else ("4.5", "0.5")
+        row = [str(k), "calibrate", "ok", *values.values(), *fitted, *["0.97"] * 3, *["0.03"] * 3]
+        lines.append(",".join(row))
+    table = tmp_path / "trials.csv"
+    table.write_text("\n".join(lines) + "\n")
+    found = part("next", "calibration", table, "--near", 1, "--count", 30, "--trials", 1)
+    assert found.returncode == 0, found.stderr
+    vary = tomllib.loads(found.stdout)["vary"]
+    assert all(0.085 <= place <= 0.1 for place in vary["rig.place"])
+    assert len(set(vary["rig.place"])) > 5
+    assert all(
+        axes["rig.depth"]["low"] <= d <= axes["rig.depth"]["high"] for d in vary["rig.depth"]
+    )
+
+
+def test_the_page_tells_what_the_rows_of_the_tunnel_say(published):
+    page = (FOLDER / "published.md").read_text()
+    unknowns = published.Unknowns.of(published.study_file("tunnel"))
+    rows = published.read([FOLDER / "published_tunnel.csv"], published.GROUPS["tunnel"], unknowns)
+    assert f"{len(np.unique(rows.points))} settings were walked ({len(rows.x):,} pairs" in page
+    many = [(a * n, b * n, n) for a, b, n in published.traded(rows) if n >= 12]
+    without, with_rule, tunnels = (round(sum(column)) for column in zip(*many, strict=True))
+    assert len(many) == 9
+    assert tunnels == 36 + 108
+    assert with_rule == 36 + 86  # as the page says of the first and of the later tunnels
+    assert "crossed 36 of 36, and then crossed 86 of 108" in page
+    assert 75 <= without <= 75 + 36
+    for _, a, n, b, m in published.JUDGED:
+        assert f"{a} of {n} | {b} of {m} |" in page
+
+
+def test_a_clock_is_searched_in_the_setting_of_a_file(tmp_path):
+    run = part("tune", "tunnel", FOLDER / "published_tunnel_best.toml", "--controller", "timed")
+    assert run.returncode == 0, run.stderr
+    design = tomllib.loads(run.stdout)
+    asked = design["evaluate"]["tunnel"]["settings"]
+    assert asked["controllers"] == ["timed"]
+    assert asked["tunnel"]["turns_deg"] == [75.0]
+    assert "timed.walk_time" in design["search"]
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["tune", "tunnel"], "tune: expected the group tunnel and one file"),
+        (["recover", "wall", "one"], "recover: expected a folder of hidden settings, then"),
+        (["hidden", "tunnel", "--count", "0"], "--count and --trials: expected at least 1"),
+    ],
+)
+def test_parts_that_lack_something_say_so(words, line):
+    run = part(*words)
+    assert run.returncode == 2
+    assert line in run.stderr
+    assert "Traceback" not in run.stderr
