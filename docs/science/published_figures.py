@@ -86,9 +86,8 @@ def screening(effects: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
     panel = drawn.subplots()
     panel.imshow(np.sign(value) * size, cmap="RdBu", vmin=-1.5, vmax=1.5, aspect="auto")
     for row, column in zip(*np.nonzero(size >= 1.0), strict=True):
-        ink = "white" if size[row, column] > 1.2 else INK
         text = f"{value[row, column]:+.2f}"
-        panel.text(column, row, text, ha="center", va="center", fontsize=SMALL, color=ink)
+        panel.text(column, row, text, ha="center", va="center", fontsize=SMALL, color="white")
     panel.set_xticks(range(len(outcomes)), [o.replace(" ", "\n", 1) for o in outcomes])
     panel.set_yticks(range(len(names)), [short(n) for n in names])
     panel.tick_params(labelsize=SMALL, top=True, labeltop=True, bottom=False, labelbottom=False)
@@ -102,6 +101,8 @@ def trade(
 ) -> Figure:
     """What the rule makes of settings in which robots without feedback cross so often.
 
+    Dots are moved a little, so that none hides others.
+
     Args:
         shares: Of each setting how many cross without and with the rule, of how many trials.
         judged: Likewise of settings that were judged on fresh trials.
@@ -112,7 +113,8 @@ def trade(
     panel.axvspan(0.45, 0.75, color=FAINT, linewidth=0)
     panel.plot([0, 1], [0, 1], color=INK, linewidth=0.8)
     panel.axhline(0.95, color=INK, linewidth=0.8, linestyle="--")
-    panel.scatter(x, y, s=3 * trials, color=SERIES[0], alpha=0.35, linewidth=0)
+    apart = np.random.default_rng(0).uniform(-0.02, 0.02, (2, len(x)))
+    panel.scatter(x + apart[0], y + apart[1], s=3 * trials, color=SERIES[0], alpha=0.4, linewidth=0)
     if judged:
         panel.scatter(*np.array(judged).T, marker="D", s=36, color=SERIES[1])
     panel.set_xlabel("share that crosses without feedback")
