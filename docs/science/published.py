@@ -27,7 +27,7 @@ from typing import Any, NoReturn
 import numpy as np
 import tuning
 from numpy.typing import NDArray
-from published_figures import marginals, pairs, screening, trade
+from published_figures import marginals, screening, trade
 from scipy.stats import binom, norm
 
 from antennate.figures import render
@@ -52,11 +52,15 @@ PAIR_BINS, PAIRS = 5, 4
 """Parts of a range in a pair, and pairs that are drawn."""
 ENOUGH = 4
 """Trials from which on a setting is drawn alone."""
-JUDGED: Sequence[tuple[float, float]] = (
-    *((0.62, 0.74), (0.845, 0.897), (0.717, 0.8), (0.44, 0.74), (0.585, 0.75)),
+JUDGED = (
+    ("our default", 62, 100, 74, 100),
+    ("75 degrees, fast", 24, 29, 25, 29),
+    ("75 degrees, slow", 23, 30, 24, 30),
+    ("fitted but for 90 degrees", 88, 200, 148, 200),
+    ("fitted", 117, 200, 150, 200),
 )
-"""Shares without and with the rule on trials by which nothing was chosen: our default, two settings
-that were walked again, the fitted one at 90 and at 87.5 degrees (docs/science/published.md)."""
+"""How many crossed without and with the rule where settings were walked again or judged: the rows
+of docs/science/published.md."""
 SHUFFLES = 200
 """Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
@@ -176,16 +180,19 @@ def _crossed(name: str) -> Callable[[Mapping[str, Row]], float]:
 def _speed(name: str) -> Callable[[Mapping[str, Row]], float]:
     def logarithm(rows: Mapping[str, Row]) -> float:
         row = rows[name]
-        speed = float(row["progress_m"]) / float(row["time_s"])
-        return math.log(speed) if row["outcome"] == "success" else math.nan
+        if row["outcome"] != "success":
+            return math.nan
+        return math.log(float(row["progress_m"]) / float(row["time_s"]))
 
     return logarithm
 
 
 def _nearer(rows: Mapping[str, Row]) -> float:
-    both = all(row["outcome"] == "success" for row in rows.values())
-    off = [float(rows[name]["offset_m"]) if both else math.nan for name in ("paper", "open")]
-    return float(off[0] < off[1]) if both else math.nan
+    pair = rows["paper"], rows["open"]
+    if any(row["outcome"] != "success" for row in pair):
+        return math.nan
+    ours, without = (float(row["offset_m"]) for row in pair)
+    return float(ours < without)
 
 
 def _ended(name: str, outcome: str) -> Callable[[Mapping[str, Row]], float]:
@@ -328,6 +335,8 @@ class Unknowns:
         for name, axis in self.axes.items():
             value = values[name]
             if isinstance(axis, list):
+                if value not in axis:
+                    refuse(f"{name}: expected one of {axis}, found {value}")
                 found += _choices(axis)[axis.index(value)].tolist()
             elif axis.get("log"):
                 found.append(math.log(value / axis["low"]) / math.log(axis["high"] / axis["low"]))
@@ -405,19 +414,19 @@ class Rows:
     points: NDArray[np.int64]
 
 
-def lines(files: Iterable[Path]) -> Iterable[dict[str, str]]:
-    """Rows of tables of studies; points are numbered on from one file to the next."""
-    number = 0
+def lines(files: Iterable[Path], names: Iterable[str]) -> Iterable[dict[str, str]]:
+    """Rows of tables of studies; one point is one setting, whichever stages walked it."""
+    points: dict[tuple[str, ...], int] = {}
     for file in files:
-        points: dict[str, int] = {}
         path = file / "trials.csv" if file.is_dir() else file
         if not path.is_file():
             refuse(f"{path}: expected the rows of a study, found no such file")
         with path.open(encoding="utf-8", newline="") as table:
             for row in csv.DictReader(table):
-                place = points.setdefault(row["point"], number + len(points))
-                yield row | {"point": str(place)}
-        number += len(points)
+                if missing := [name for name in names if name not in row]:
+                    refuse(f"{path}: expected a column {missing[0]}, found none")
+                setting = tuple(_short(row[name]) for name in names)
+                yield row | {"point": str(points.setdefault(setting, len(points)))}
 
 
 def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
@@ -426,13 +435,12 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     Raises:
         SystemExit: There are none, or an unknown has no column.
     """
-    found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
-    for row in lines(files):
-        if missing := [name for name in unknowns.axes if name not in row]:
-            refuse(f"{files[0]}: expected a column {missing[0]}, found none")
+    found: dict[tuple[str, ...], dict[str, dict[str, str]]] = {}
+    for row in lines(files, unknowns.axes):
         if row["status"] in group.told:
             who = row[group.who] or group.all[0]  # a trial that failed has no columns
-            found.setdefault((row["point"], row.get("trial", "")), {})[who] = row
+            scene = row["point"], row.get("seed", ""), row.get("trial", "")
+            found.setdefault(scene, {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
         refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
@@ -444,7 +452,7 @@ def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
             name: np.array([of(rows) for rows in whole.values()])
             for name, of in group.outcomes.items()
         },
-        np.array([int(point) for point, _ in whole]),
+        np.array([int(point) for point, *_ in whole]),
     )
 
 
@@ -711,14 +719,16 @@ def measured(names: Sequence[str], x: Floats, weights: Floats, chance: Floats) -
 def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
     """Of each outcome the change from one end of each unknown to the other, and its size as noise.
 
-    Least squares over all unknowns at once. The second number is the size as a share of the
-    largest that outcomes in random order reach in one study of twenty.
+    Least squares over all unknowns at once, of means of settings. The second number is the size as
+    a share of the largest that means in random order reach in one study of twenty.
     """
     found = {}
     rng = np.random.default_rng(0)
     for name, outcome in rows.outcomes.items():
         known = np.isfinite(outcome)
-        y, design = outcome[known], np.insert(rows.x[known], 0, 1.0, axis=1)
+        _, first, place = np.unique(rows.points[known], return_index=True, return_inverse=True)
+        y = np.bincount(place, outcome[known]) / np.bincount(place)
+        design = np.insert(rows.x[known][first], 0, 1.0, axis=1)
         solve = np.linalg.pinv(design)
         orders = np.column_stack([y, *(rng.permutation(y) for _ in range(SHUFFLES))])
         slopes = solve @ orders
@@ -769,11 +779,10 @@ def weigh(name: str, files: Sequence[Path]) -> None:
     result["pairs"] = pairs_of([unknowns.names[k] for k in these], x[:, these], weights, PAIRS)
     figures = {
         "": marginals(narrowed, ends),
-        "-pairs": pairs(result["pairs"], ends),
         "-screening": screening(result["effects"]),
     }
     if name == "tunnel":
-        figures["-trade"] = trade(traded(rows), JUDGED)
+        figures["-trade"] = trade(traded(rows), [(a / n, b / m) for _, a, n, b, m in JUDGED])
     for kind, drawn in figures.items():
         image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
         image.write_bytes(render(drawn)["png"])
@@ -829,6 +838,8 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
+    if strange := set(told.only or ()) - set(group.paper):
+        refuse(f"--only: expected some of {', '.join(group.paper)}, found {', '.join(strange)}")
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
     likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
@@ -868,7 +879,7 @@ def likeliest(
     """
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
-    values = {row["point"]: _values(unknowns, row) for row in lines(files)}
+    values = {row["point"]: _values(unknowns, row) for row in lines(files, unknowns.axes)}
     same: dict[str, list[int]] = {}  # points of one setting, as of a study that varies the seed
     for point in np.unique(rows.points).tolist():
         same.setdefault(json.dumps(values[str(point)]), []).append(point)
@@ -981,7 +992,7 @@ def keep(name: str, files: Sequence[Path]) -> None:
     read_here += [f"calibration.speeds.{k}.r2" for k in range(3)]
     read_here += [f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")]
     columns = ["point", "seed", *unknowns.axes, "trial", group.who, *read_here, "status"]
-    rows = [*lines(files)]
+    rows = [*lines(files, unknowns.axes)]
     columns = [column for column in columns if column in rows[0]]
     with (HERE / f"published_{name}.csv").open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
@@ -1015,6 +1026,12 @@ def main() -> None:
     parser.add_argument("--near", type=int, help="search near so many of the likeliest settings")
     told = parser.parse_args()
     name = told.group
+    if min(told.count, told.trials) < 1:
+        parser.error("--count and --trials: expected at least 1")
+    if told.part == "tune" and (name != "tunnel" or len(told.files) != 1):
+        parser.error("tune: expected the group tunnel and one file of a setting")
+    if told.part == "recover" and len(told.files) < 2:
+        parser.error("recover: expected a folder of hidden settings, then those of stages")
     files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
         draws = prior(Unknowns.of(study_file(name)), told.count, HIDDEN)

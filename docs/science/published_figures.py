@@ -21,8 +21,10 @@ Ends = Mapping[str, tuple[str, str]]
 
 
 def short(name: str) -> str:
-    """The last part of the name of an unknown, without its unit."""
-    return name.rpartition(".")[2].split("_n_mm")[0].replace("_", " ")
+    """The last part of the name of an unknown without its unit; of a friction whose it is, too."""
+    *parents, last = name.split(".")
+    whose = f"{parents[-1]} " * (last == "friction")
+    return whose + last.split("_n_mm")[0].replace("_", " ")
 
 
 def _ends(panel: Axes, ends: tuple[str, str]) -> None:
@@ -49,26 +51,6 @@ def marginals(left: Mapping[str, Any], ends: Ends) -> Figure:
         panel.set_title(short(n).replace(" ", "\n", 1), fontsize=SMALL)
         panel.tick_params(axis="y", labelsize=SMALL)
         _ends(panel, ends[n])
-    return drawn
-
-
-@styled
-def pairs(found: Sequence[Mapping[str, Any]], ends: Ends) -> Figure:
-    """How much likelier than in their ranges values of two unknowns are together."""
-    rows = max(1, math.ceil(len(found) / 2))
-    drawn = canvas(WIDTH, 2.2 * rows)
-    panels = drawn.subplots(rows, 2, squeeze=False).ravel()
-    for panel in panels[len(found) :]:
-        panel.set_visible(False)
-    for panel, pair in zip(panels, found, strict=False):
-        share = np.array(pair["share"])
-        at = [np.linspace(0.0, 1.0, count + 1) for count in share.shape]
-        image = panel.pcolormesh(at[0], at[1], share.T, cmap="Blues", vmin=0.0)
-        panel.set_xlabel(short(pair["names"][0]), fontsize=SMALL)
-        panel.set_ylabel(short(pair["names"][1]), fontsize=SMALL)
-        _ends(panel, ends[pair["names"][0]])
-        panel.set_yticks([0, 1], ends[pair["names"][1]], fontsize=SMALL)
-        drawn.colorbar(image, ax=panel).ax.tick_params(labelsize=SMALL)
     return drawn
 
 

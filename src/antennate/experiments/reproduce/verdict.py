@@ -180,7 +180,7 @@ class Claim:
 
     def reason(self, finding: Finding) -> str:
         """Why the verdict is what it is."""
-        more = "The fit knew other trials than these." if self.fitted else finding.by_default
+        more = "Numbers were fitted." if self.fitted else finding.by_default
         return f"{finding.reason} {more}".strip()
 
     def verdict(self, finding: Finding) -> Verdict:
