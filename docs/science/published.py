@@ -5,9 +5,10 @@ fits the outcome over the unknowns, and writes what is left of their ranges to
 docs/science/published_GROUP.json and figures. `hidden` prints a study of hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
 prints a study of settings drawn from what is left, or searched by some of the statements. `best`
-names the likeliest settings by their own trials. `tune` prints a search of the published rule or
-of a clock in the setting of a file. `rows` keeps the rows of folders as one table. Needs
-`uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
+names the likeliest settings by their own trials, and writes the first to published_GROUP_best.toml
+there. `tune` prints a search of the published rule or of a clock in the setting of a file. `rows`
+keeps the rows of folders as one table. Needs `uv run --with scikit-learn`. The likelihoods are
+those of docs/science/published.md.
 """
 
 from __future__ import annotations
@@ -789,6 +790,7 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         image.write_bytes(render(drawn)["png"])
     text = json.dumps(result, indent=1)
     (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
+    print(f"written: docs/science/published_{name}.json and its figures in docs/images")
     for n, found in result["models"].items():
         print(f"{n}: {found}, likelihood {result['evidence'][n]}, at most {result['largest'][n]}")
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
@@ -913,7 +915,9 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
         table, _, key = path.rpartition(".")
         tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
     text = "\n\n".join("\n".join([f"[{t}]"] * bool(t) + tables[t]) for t in sorted(tables))
-    (HERE / f"published_{name}_best.toml").write_text(text + "\n", encoding="utf-8")
+    file = HERE / f"published_{name}_best.toml"
+    file.write_text(text + "\n", encoding="utf-8")
+    print(f"the first one is written to {file.relative_to(ROOT)}")
 
 
 SEARCHED = {
