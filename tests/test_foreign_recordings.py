@@ -90,13 +90,15 @@ def test_the_divider_is_said_with_its_source_unless_it_is_given(
     file = written(tmp_path / "r.csv", time=t, counts=resistances(bend) / 1e3, bend=bend)
     out = ["--recording", file, "--out", str(tmp_path / "out"), "--columns.reading-unit", "kohm"]
     told = said(capsys, *out)
-    assert "fixed resistor to ground 10000 Ohm (assumed: what makers pair with it)" in told
+    assert (
+        "fixed resistor to ground (or supply) 10000 Ohm (assumed: what makers pair with it)" in told
+    )
     assert "3.3 V (datasheet: ESP32 supply)" in told
     assert "Readings in kohm became counts" in told
     held = json.loads((tmp_path / "out" / "calibration.json").read_text())
     assert 0 < held["counts_low"] < held["counts_high"] < 4095
     told = said(capsys, *out, "--antenna.sensor.divider-resistance", "22000")
-    assert "fixed resistor to ground 22000 Ohm (given)" in told
+    assert "fixed resistor to ground (or supply) 22000 Ohm (given)" in told
     error = refused(capsys, "--recording", file, "--antenna.sensor.divider-resistance", "22000")
     assert "antenna.sensor.divider_resistance: expected the default" in error
     words = ["--columns.reading-unit", "kohm", "--antenna.length", "0.2"]

@@ -68,7 +68,7 @@ class SensorParams(Params):
     )
     """Whether the flex sensor sees bending towards the tail only (one) or either way."""
     divider_resistance: float = number(10e3, "Ohm", "assumed: what makers pair with it", gt=0)
-    """Fixed resistor of the divider."""
+    """Fixed resistor to ground (or supply)."""
     fixed_resistor: Literal["ground", "supply"] = number(
         "ground", "1", "assumed: as makers wire it; the paper does not say"
     )
