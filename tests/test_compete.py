@@ -493,6 +493,7 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
     write_wheel(wheel)
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")  # what an installer does with this one
     words = ["compete", "--controllers", "rival", "open", "--scenes", "mile", "--trials", "2"]
+    words += ["--decision-limit", "10"]  # on a busy machine a reset waits long
     done = subprocess.run(
         [sys.executable, "-m", "antennate", *words, "--no-figures", "--json", "--out", "run"],
         cwd=tmp_path,
