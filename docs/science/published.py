@@ -57,6 +57,7 @@ JUDGED = (
     ("our default", 62, 100, 74, 100),
     ("75 degrees, fast", 24, 29, 25, 29),
     ("75 degrees, slow", 23, 30, 24, 30),
+    ("75 degrees, slow, another seed", 42, 60, 49, 60),
     ("fitted but for 90 degrees", 88, 200, 148, 200),
     ("fitted", 117, 200, 150, 200),
     ("fitted, another seed", 57, 100, 75, 100),
