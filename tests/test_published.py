@@ -233,12 +233,12 @@ def test_the_page_tells_what_the_rows_of_the_tunnel_say(published):
     assert with_rule == 36 + 86  # as the page says of the first and of the later tunnels
     assert "crossed 36 of 36, and then crossed 86 of 108" in page
     assert 75 <= without <= 75 + 36
-    for _, a, n, b, m in published.JUDGED:
+    for a, n, b, m in published.judged().values():
         assert f"{a} of {n} | {b} of {m} |" in page
 
 
 def test_a_clock_is_searched_in_the_setting_of_a_file(tmp_path):
-    run = part("tune", "tunnel", FOLDER / "published_tunnel_best.toml", "--controller", "timed")
+    run = part("tune", "tunnel", FOLDER / "published_tunnel_slow.toml", "--controller", "timed")
     assert run.returncode == 0, run.stderr
     design = tomllib.loads(run.stdout)
     asked = design["evaluate"]["tunnel"]["settings"]

@@ -53,17 +53,6 @@ PAIR_BINS, PAIRS = 5, 4
 """Parts of a range in a pair, and pairs that are drawn."""
 ENOUGH = 4
 """Trials from which on a setting is drawn alone."""
-JUDGED = (
-    ("our default", 62, 100, 74, 100),
-    ("75 degrees, fast", 24, 29, 25, 29),
-    ("75 degrees, slow", 23, 30, 24, 30),
-    ("75 degrees, slow, another seed", 42, 60, 49, 60),
-    ("fitted but for 90 degrees", 88, 200, 148, 200),
-    ("fitted", 117, 200, 150, 200),
-    ("fitted, another seed", 57, 100, 75, 100),
-)
-"""How many crossed without and with the rule where settings were walked again or judged: the rows
-of docs/science/published.md."""
 SHUFFLES = 200
 """Random orders of the outcomes, which say what an effect must exceed."""
 LATER = 571000
@@ -785,7 +774,9 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         "-screening": screening(result["effects"]),
     }
     if name == "tunnel":
-        figures["-trade"] = trade(traded(rows), [(a / n, b / m) for _, a, n, b, m in JUDGED])
+        figures["-trade"] = trade(
+            traded(rows), [(a / n, b / m) for a, n, b, m in judged().values()]
+        )
     for kind, drawn in figures.items():
         image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
         image.write_bytes(render(drawn)["png"])
@@ -801,6 +792,19 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         print(f"{n}: settled most by {', '.join(f'{u} ({v:.0%})' for u, v in first)}")
     for n, found in sorted(result["left"].items(), key=lambda item: -item[1]["narrowed"])[:12]:
         print(f"{n:45} {found['narrowed']:6.3f} nats, 90 % in {found['region']}")
+
+
+def judged() -> dict[tuple[str, str], tuple[int, int, int, int]]:
+    """By setting and seed how many crossed of how many, without and with the rule, when judged."""
+    found: dict[tuple[str, str], dict[str, list[bool]]] = {}
+    with (HERE / "published_judged.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            of = found.setdefault((row["setting"], row["seed"]), {})
+            of.setdefault(row["controller"], []).append(row["outcome"] == "success")
+    return {
+        key: (sum(of["open"]), len(of["open"]), sum(of["paper"]), len(of["paper"]))
+        for key, of in found.items()
+    }
 
 
 def traded(rows: Rows) -> list[tuple[float, float, int]]:

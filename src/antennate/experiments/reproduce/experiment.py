@@ -203,9 +203,9 @@ def run(
         def step(done: int, total: int, before: int = before, own: int = own) -> None:
             on_step(100 * (before + own * done // total) // sum(work.values()), 100)
 
-        told = configured(name, config)
+        setting = configured(name, config)
         try:
-            result = experiment.run(told, workers_from(workers), step, no_row).result()
+            result = experiment.run(setting, workers_from(workers), step, no_row).result()
         except KeyboardInterrupt:
             result = {"interrupted": True}
         if result.get("interrupted"):
