@@ -183,7 +183,8 @@ uv run antennate drive --arm \\
 - A policy made for another robot, rate, gait, observation or action is refused before the first
   trial, with what was expected and what was found. Ids, directions and zeros of servos may differ,
   and so may the calibration of the antennae: one that is given `counts` is right for the sensor it
-  was trained with alone, `flex` and `level` are made of any sensor by its own calibration.
+  was trained with alone, `flex` and `level` are made of any sensor by its own calibration. A
+  parameter of the robot that is newer than the file had its default.
 - `write_policy` refuses arrays of other lengths than the contract says, NaN, numbers that float32
   does not hold, and a `scale` or `clip` that is not above 0. `add_contract` refuses constants that
   are NaN, infinite (but for masks and bounds) or 0 where they divide. Whoever loads a file first

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import math
 import resource
@@ -348,6 +349,31 @@ def test_other_ids_and_directions_are_no_other_robot(tmp_path: Path) -> None:
     ids = tuple(range(101, 101 + robot.yaw_count))
     other = robot.model_copy(update={"yaw": robot.yaw.model_copy(update={"ids": ids})})
     require_match(contract(), ControlParams(), other, "p.onnx")
+
+
+def with_robot(made: Contract, table: dict[str, Any]) -> Contract:
+    """The contract of a file that names these parameters of its robot."""
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"))
+    new = {"robot": table, "robot_hash": hashlib.sha256(text.encode()).hexdigest()}
+    return made.model_copy(update=new)
+
+
+def test_a_parameter_that_is_newer_than_the_file_had_its_default() -> None:
+    made = contract()
+    table = made.model_dump()["robot"]
+    del table["antenna"]["sensor"]["outlier_share"]
+    made = with_robot(made, table)
+    require_match(made, ControlParams(), RobotSpec(), "p.onnx")
+    other = RobotSpec.model_validate({"antenna": {"sensor": {"outlier_share": 0.25}}})
+    with pytest.raises(ConfigError, match=r"sensor.outlier_share 0\.\d+, found 0.25"):
+        require_match(made, ControlParams(), other, "p.onnx")
+
+
+def test_a_parameter_that_is_no_longer_there_is_refused() -> None:
+    made = contract()
+    made = with_robot(made, made.model_dump()["robot"] | {"tail": 1})
+    with pytest.raises(ConfigError, match=r"robot.tail 1, found None"):
+        require_match(made, ControlParams(), RobotSpec(), "p.onnx")
 
 
 @pytest.mark.parametrize(

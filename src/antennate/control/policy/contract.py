@@ -1,7 +1,8 @@
 """The contract of a policy: what it was made for, as one JSON value in its file.
 
 A policy runs only where all of it holds: the same robot, rate and gait, the same observation and
-action. What a robot's wiring alone differs in, ids, directions and zeros, may differ.
+action. What a robot's wiring alone differs in, ids, directions and zeros, may differ. A parameter
+of the robot that the file does not name is newer than the file, and had its default.
 """
 
 from __future__ import annotations
@@ -158,6 +159,8 @@ def require_match(contract: Contract, control: ControlParams, robot: RobotSpec, 
         )
     for name in ("rate", "averaging_time", "gait", "joints", "robot", "observations", "actions"):
         theirs, ours = (_plain(getattr(side, name)) for side in (contract, own))
+        if name == "robot":
+            theirs = _completed(theirs, _robot_table(RobotSpec()))
         what = "robot" if name in ("joints", "robot") else "setting"
         for path, expected, found in _differences(theirs, ours, name):
             raise ConfigError(
@@ -195,6 +198,15 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     return value
+
+
+def _completed(table: Mapping[str, Any], default: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested parameters, and the default of each one that they lack."""
+    full = {**default, **table}
+    for key, value in full.items():
+        if isinstance(value, dict) and isinstance(default.get(key), dict):
+            full[key] = _completed(value, default[key])
+    return full
 
 
 def _differences(old: Any, new: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
