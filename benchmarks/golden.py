@@ -2,9 +2,10 @@
 
 Made before a change and after it, two such folders are compared with `same_numbers.py OLD NEW`: not
 one value may differ. There are runs of the experiments with one worker and with two, one that was
-killed and resumed, logs of simulated trials and what a replay decides upon them, each tick of a
-drive in lock-step, and the bytes that a twin and its board sent in a minute. Six minutes on two
-cores. Parts by name: `golden.py FOLDER springs tunnel drive`.
+killed and resumed, logs of simulated trials and what a replay decides upon them, environments under
+drawn actions, a learned policy, each tick of a drive in lock-step, and the bytes that a twin and
+its board sent in a minute. Ten minutes on two cores. Parts by name: `golden.py FOLDER springs
+tunnel drive`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ ALONE = {
     "gait": "gait --cycles 2 --settling-cycles 1 --sweep-points 4",
     "gait_hexapod": "gait --robot hexapod --cycles 2 --settling-cycles 1 --sweep-points 4",
     "calibrate": "calibrate",
+    "geometry": "geometry --gaits 3 --wave-numbers 1 --leads 5 --front-waves 1 --turns 1 "
+    "--cells 6 --repeats 1",
+    "dataset": "dataset --trials 10",
     "force": "bench force --profiles stiff descending --traverses 6 --loads 6 --place-step 0.25",
 }
 """Runs without workers, or whose trials are few."""
@@ -46,6 +50,11 @@ POOLED = {
     "tunnel": f"tunnel {TRIALS}",
     "corridors": "tunnel --scene corridors --trials 2 --time-limit 20 --controllers random map",
     "links": f"tunnel --robot {ROOT / 'examples' / 'eight_links.toml'} --trials 1 --time-limit 20",
+    "climb": "climb --heights 0.08 --grounds gap:0.1 --conditions rhythm climb --divisors 128 "
+    "--sensing 1 --time-limit 8",
+    "compete": "compete --controllers open closed --scenes corner --trials 1 --decision-limit 10",
+    "policy": f"tunnel --controllers {ROOT / 'entries' / 'apprentice' / 'policy.onnx'} --trials 3 "
+    "--time-limit 20",
     "readings": f"tunnel {TRIALS} --controllers closed --readings swapped yoked delayed:0.2",
     "knows": f"tunnel {TRIALS} --controllers timed closed --knows side jam",
     "study": f"study {ROOT / 'studies' / 'smoke.toml'}",
@@ -57,6 +66,9 @@ MINUTE = 6000
 """Control ticks."""
 DRIVEN = (("closed", 1, math.inf), ("paper", 0, 600.0))
 """Controller, trial and most ticks of each drive in lock-step."""
+ENVIRONMENTS = (("Tunnel-v1", "maneuver"), ("UTurn-v1", "gait"), ("Corner120-v1", "joints"))
+STEPS = 60
+"""Decisions in each environment."""
 
 
 def antennate(words: str, *more: str | Path) -> None:
@@ -187,13 +199,34 @@ def driven(folder: Path) -> None:
                 table.writerow([*map(repr, reading), maneuver, command.hex(), *goals])
 
 
+def stepped(folder: Path) -> None:
+    """Observations and rewards of environments in lockstep, under actions drawn by a seed."""
+    import gymnasium as gym
+
+    importlib.import_module("antennate.envs")
+    folder.mkdir(parents=True)
+    for name, action in ENVIRONMENTS:
+        env = gym.make_vec(f"antennate/{name}", 2, action=action)
+        env.action_space.seed(4)
+        state, _ = env.reset(seed=4)
+        with (folder / f"{name}-{action}.csv").open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(["step", "robot", "reward", "ended", "cut", "state"])
+            for step in range(STEPS):
+                state, reward, ended, cut, _ = env.step(env.action_space.sample())
+                for i, row in enumerate(state):
+                    cells = reward[i].item(), bool(ended[i]), bool(cut[i])
+                    table.writerow([step, i, *cells, row.tobytes().hex()])
+        env.close()
+
+
 def main(folder: Path, wanted: list[str]) -> None:
     """Make the parts that are wanted, all without names; a part that is there is made anew."""
     parts = {name: lambda f, w=words: run(w, f) for name, words in ALONE.items()}
     for name, words in POOLED.items():
         for count in (1, 2):
             parts[f"{name}-{count}"] = lambda f, w=words, c=count: run(w, f, "--workers", str(c))
-    parts |= {"killed": killed, "logged": logged, "twin": served, "drive": driven}
+    parts |= {"killed": killed, "logged": logged, "twin": served, "drive": driven, "envs": stepped}
     if unknown := [each for each in wanted if each not in parts and f"{each}-1" not in parts]:
         sys.exit(f"expected parts of {', '.join(parts)}, found {', '.join(unknown)}")
     names = [name for name in parts if not wanted or name in wanted or name[:-2] in wanted]

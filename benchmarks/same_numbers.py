@@ -22,6 +22,9 @@ RENAMED = {
 }
 KEYS = (
     "point",
+    "part",
+    "cell",
+    "scene",
     "arm",
     "controller",
     "kind",

@@ -5,7 +5,7 @@ import select
 import socket
 import threading
 
-from antennate.hardware.host import LEVEL, claim
+from antennate.host import LEVEL, claim
 
 
 class Cable:

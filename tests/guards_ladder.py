@@ -17,10 +17,10 @@ from hardware_rig import PERIOD
 
 from antennate.hardware.safety import channel, supervisor
 from antennate.hardware.safety import supervisor as rate
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact, Maneuver, State
 
 
 class Pulse:

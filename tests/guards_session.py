@@ -26,13 +26,13 @@ from guard_tools import Guard, around, before, constant, put
 from antennate.control import loop
 from antennate.hardware import joints
 from antennate.hardware.driving import connect
-from antennate.hardware.driving.stopping import StopOnce
 from antennate.hardware.dynamixel import actuators
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.safety import deadlines, session, torque
 from antennate.hardware.safety.controller import StepResult, SupervisedController
 from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.hardware.setup.jog import Jog
+from antennate.host import StopOnce
 from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from antennate.control.registry import make_controller
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding
 from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.safety import SupervisorParams
-from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver, State
 
 PERIOD = 0.01
 FREE, BENT = 1872.0, 1450.0

@@ -11,11 +11,11 @@ from hardware_rig import BAND, BENT, FREE, LIMIT, PERIOD, healthy
 
 from antennate.hardware.esp32 import frame
 from antennate.hardware.esp32.board import Board, BoardReader
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.channel import ChannelDiagnosis
 from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact
+from antennate.types import Contact, State
 
 DRIFT = 50e-6
 """The board's clock against the host's, [s/s]: ages at the ticks take every value in a day."""

@@ -12,13 +12,12 @@ from antennate.hardware.actuators import ActuatorError, ActuatorState, JointFaul
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.joints import CommandError
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
-from antennate.types import JointCommand
+from antennate.types import JointCommand, State
 
 CONFIG = DriveConfig(dry_run=0.5, duration=1.0, stand=0.1, fault_time=0.2, bus_return=0.0)
 

@@ -10,10 +10,10 @@ from twin_rig import rig
 
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.safety import SupervisorParams
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 TICK = 2 * math.pi / 4096
 PERIOD = 0.01

@@ -17,13 +17,13 @@ from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, in_one_line
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.causes import Active, Cause, State
+from antennate.hardware.safety.causes import Active, Cause
 from antennate.hardware.safety.controller import Tracebacks
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams
 from antennate.telemetry.ticks import Tick, angles_of
 from antennate.twin.config import TwinConfig
-from antennate.types import JointCommand
+from antennate.types import JointCommand, State
 
 
 class Wordless(Exception):

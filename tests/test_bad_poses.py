@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twin_rig import rig
 
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.supervisor import Supervisor
 from antennate.params.safety import SupervisorParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
-from antennate.types import JointCommand
+from antennate.types import JointCommand, State
 
 SHAPES = {"yaw": (1, 5), "leg": (1, 6, 2), "antenna": (1, 2)}
 LIMITED = [*range(5), 17, 18]

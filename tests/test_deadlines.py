@@ -9,9 +9,9 @@ from twin_rig import rig
 from antennate.errors import ConfigError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import deadlines
-from antennate.hardware.safety.causes import State
 from antennate.params.safety import SupervisorParams
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 PERIOD = 0.01
 

@@ -20,11 +20,12 @@ import antennate
 from antennate.antenna.sensor import reading_noise
 from antennate.errors import CalibrationError
 from antennate.hardware.safety import channel as diagnosis
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.channel import Band, ChannelDiagnosis, Finding, Reading
 from antennate.params.control import CurveParams
 from antennate.params.safety import SupervisorParams
 from antennate.robots.antenna import SensorParams
+from antennate.types import State
 
 RECORDED = Path(__file__).parents[2] / "shared/data/flex_static_12bit/derived/flex_static.csv"
 DAY = 8_640_000

@@ -8,13 +8,13 @@ from hardware_rig import BAND, PERIOD, Ticker, armed
 
 from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import bending_level, contact_of
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import Drift, SignalQuality
 from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.safety import DriftParams
 from antennate.robots.antenna import SensorParams
-from antennate.types import Contact, Floats
+from antennate.types import Contact, Floats, State
 
 SPAN = BAND.high - BAND.low
 MEAN = 10

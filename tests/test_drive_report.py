@@ -26,7 +26,7 @@ from antennate.hardware.driving.report import (
     link_heights,
     raised_links,
 )
-from antennate.hardware.safety.causes import Cause, State, what_to_do
+from antennate.hardware.safety.causes import Cause, what_to_do
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ConditioningParams
@@ -35,7 +35,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.telemetry.feed import Feed
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.types import AntennaFrame, Contact, JointCommand
+from antennate.types import AntennaFrame, Contact, JointCommand, State
 
 CONFIG = DriveConfig(dry_run=0.5, duration=1.0, touch=TouchCheckParams(patience=2.0))
 

@@ -8,8 +8,7 @@ import pytest
 from driven_rig import driven, simulated_alike
 
 from antennate.experiments.tunnel.physics import TunnelConfig
-from antennate.hardware.safety.causes import State
-from antennate.types import Maneuver
+from antennate.types import Maneuver, State
 
 CONFIG = TunnelConfig(seed=0)
 

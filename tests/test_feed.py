@@ -16,7 +16,7 @@ import pytest
 
 from antennate.cli.viewer import REQUIRED
 from antennate.errors import LogError
-from antennate.hardware.driving.stopping import STOPS
+from antennate.host import STOPS
 from antennate.params.control import ControlParams
 from antennate.telemetry.feed import KEPT, Feed, messages
 from antennate.telemetry.header import Header, part

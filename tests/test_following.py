@@ -17,13 +17,13 @@ from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.types import Floats
+from antennate.types import Floats, State
 
 ROBOT = RobotSpec()
 YAW, LEG = 1, 8

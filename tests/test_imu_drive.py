@@ -33,7 +33,6 @@ from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.recording import Recorder, read_esp32
 from antennate.hardware.ports.network import Verifier
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.imu import ImuDiagnosis, ImuFinding
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
@@ -48,7 +47,7 @@ from antennate.telemetry.topics import IMU
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
-from antennate.types import AntennaFrame, Floats, JointCommand
+from antennate.types import AntennaFrame, Floats, JointCommand, State
 
 ROBOT = RobotSpec.named("scuttle3d")
 G = 9.81

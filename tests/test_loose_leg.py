@@ -15,10 +15,10 @@ from antennate.dxl.servo import Servo
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
-from antennate.types import Floats
+from antennate.types import Floats, State
 
 LEG = 6
 AT = LEG - 1

@@ -23,7 +23,6 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.scenes.registry import SCENES, make_scene
@@ -31,7 +30,7 @@ from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.trial import draw_trial
 from antennate.testing import check_controller
 from antennate.twin.config import TwinConfig, watched
-from antennate.types import AntennaFrame, JointCommand, Maneuver
+from antennate.types import AntennaFrame, JointCommand, Maneuver, State
 
 EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
 SHORT = {"trials": 3, "time_limit": 1.0, "seed": 3}

@@ -37,13 +37,12 @@ from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
 from antennate.twin.config import TwinConfig, watched
-from antennate.types import AntennaFrame, Maneuver
+from antennate.types import AntennaFrame, Maneuver, State
 
 MODES = ("maneuver", "gait", "joints")
 

@@ -18,12 +18,12 @@ from antennate.hardware.driving.connect import prepare, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
 from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2
 """When torque comes on, a cable is pulled and put back, and an arm event comes [s]."""

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from antennate.hardware.host import Priority, urgent
-from antennate.hardware.safety.causes import State
+from antennate.host import Priority, urgent
+from antennate.types import State
 
 
 def scheduling() -> int:
@@ -68,7 +68,7 @@ def test_T3_who_has_a_limit_but_no_privilege_gets_back_what_may_be_given_back(
 
 UNPRIVILEGED = """
 import os, resource, sys
-from antennate.hardware.host import Priority, urgent
+from antennate.host import Priority, urgent
 try:
     resource.setrlimit(resource.RLIMIT_RTPRIO, (30, 30))
     os.setgid(65534)

@@ -21,10 +21,11 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.safety import torque
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
 from antennate.port import PortError
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)
 TORQUE, GOAL = b"\x40\0", b"\x74\0"

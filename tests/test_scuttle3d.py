@@ -27,7 +27,6 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report, link_heights
 from antennate.hardware.joints import CommandError, Joints
-from antennate.hardware.safety.causes import State
 from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing
 from antennate.params.control import ControlParams
@@ -39,7 +38,7 @@ from antennate.telemetry.reader import LogReader
 from antennate.telemetry.view.player import LogScene
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, JointCommand, State
 
 ROBOT = RobotSpec.named("scuttle3d")
 PITCH, ELEVATION = ROBOT.places("pitch"), ROBOT.places("elevation")

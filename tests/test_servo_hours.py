@@ -21,7 +21,8 @@ from antennate.dxl.parser import Parser
 from antennate.dxl.servo import Servo
 from antennate.dxl.servo_bus import ServoBus
 from antennate.hardware.dynamixel.actuators import ServoMonitor
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
+from antennate.types import State
 
 GOAL = 116
 

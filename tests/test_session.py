@@ -21,10 +21,10 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_quick, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
-from antennate.hardware.driving.stopping import STOPS
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
+from antennate.host import STOPS
 from antennate.params.control import ControlParams
 from antennate.params.safety import TouchCheckParams
 from antennate.port import PortError
@@ -34,7 +34,7 @@ from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.types import AntennaFrame, JointCommand, Maneuver
+from antennate.types import AntennaFrame, JointCommand, Maneuver, State
 
 DRY = 0.3
 """Dry run [s]; long enough for readings to be believed, and torque comes on right after it."""

@@ -16,10 +16,10 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 COUNTS = math.ceil(1.25 * 4.5 / (0.229 * 2 * math.pi / 60))
 """A quarter more than the 4.5 rad/s of goals, in units of 0.229 rev/min: 235."""

@@ -11,13 +11,13 @@ from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.board import TouchStimulus
 from antennate.twin.config import TwinConfig
-from antennate.types import Floats
+from antennate.types import Floats, State
 
 TOUCHED = TwinConfig(touch=("left@0.5s", "right@2s"))
 CONFIG = DriveConfig(dry_run=1.0, duration=1.0)

@@ -12,7 +12,7 @@ from twin_rig import Rig, rig
 
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import Operator, drive
-from antennate.hardware.driving.stopping import STOPS, StopOnce
+from antennate.host import STOPS, StopOnce
 from antennate.twin.config import TwinConfig
 
 CONFIG = DriveConfig(dry_run=0.5, duration=4.0)

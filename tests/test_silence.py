@@ -22,9 +22,9 @@ from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.wire import Sample
-from antennate.hardware.host import HostClock, claim, urgent
 from antennate.hardware.ports.serial_line import SerialPort
 from antennate.hardware.safety.session import Session
+from antennate.host import HostClock, claim, urgent
 from antennate.params.safety import SupervisorParams
 from antennate.twin.serve import Terminal
 

@@ -14,11 +14,11 @@ from hardware_faults import BAD, causes, together
 from hardware_rig import Ticker, armed, healthy
 
 from antennate.errors import ConfigError
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.supervisor import Inputs
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact, Maneuver, State
 
 
 @pytest.mark.parametrize("cause", list(BAD))

@@ -13,10 +13,10 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from antennate.hardware.safety.causes import DATA, OF_CONTROLLER, Active, Cause, State
+from antennate.hardware.safety.causes import DATA, OF_CONTROLLER, Active, Cause
 from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact, Maneuver, State
 
 
 def first_told(active: Active) -> tuple[int, int, bool, float]:

@@ -14,10 +14,10 @@ from hardware_rig import BENT, FREE, LIMIT, PERIOD, Rig, armed, pose_change
 from antennate.control.registry import make_controller
 from antennate.hardware.esp32.clock import DeviceClock, SampleState
 from antennate.hardware.esp32.wire import Hello, Reset
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.supervisor import Outputs
 from antennate.params.control import ControlParams
-from antennate.types import Maneuver
+from antennate.types import Maneuver, State
 
 
 def test_L8_silence_at_a_thousand_random_phases() -> None:

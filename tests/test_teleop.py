@@ -17,12 +17,11 @@ from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.teleop import Gamepad, KeyController
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams
 from antennate.twin.config import TwinConfig
-from antennate.types import AntennaFrame, Maneuver
+from antennate.types import AntennaFrame, Maneuver, State
 
 FREE = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), 1872.0))
 NOTHING = AntennaFrame(t=np.zeros(1), counts=np.full((1, 2), math.nan))

@@ -21,7 +21,6 @@ from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
@@ -29,7 +28,7 @@ from antennate.hardware.safety.supervisor import Outputs
 from antennate.params.control import ConditioningParams
 from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver, State
 
 PERIOD = 0.01
 ROBOT = RobotSpec()

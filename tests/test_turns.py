@@ -13,14 +13,13 @@ from antennate.control.registry import make_controller
 from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
-from antennate.types import AntennaFrame, JointCommand
+from antennate.types import AntennaFrame, JointCommand, State
 
 LEGS = slice(5, 17)
 REACH = math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))

@@ -16,7 +16,6 @@ from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.esp32.wire import FrameDecoder, Sample
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec
@@ -24,6 +23,7 @@ from antennate.twin.board import Converter
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
+from antennate.types import State
 
 IDS = RobotSpec().ids
 

@@ -16,10 +16,10 @@ from antennate.hardware.driving.drive import drive
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.board import Board, BoardReader
 from antennate.hardware.ports.network import Verifier
-from antennate.hardware.safety.causes import State
 from antennate.hardware.safety.session import Session
 from antennate.params.hardware import NetworkParams
 from antennate.twin.config import TwinConfig
+from antennate.types import State
 
 KEY = bytes(range(32))
 

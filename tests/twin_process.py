@@ -10,7 +10,7 @@ import os
 import select
 import sys
 
-from antennate.hardware.host import LEVEL, urgent
+from antennate.host import LEVEL, urgent
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot

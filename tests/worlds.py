@@ -10,10 +10,10 @@ from typing import Any
 
 from twin_rig import Stage, before_twin, rig, simulation
 
+from antennate.control.decision import decision_of
 from antennate.control.loop import run_loop
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.driving.connect import await_board
-from antennate.hardware.safety.controller import decision_of
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader

@@ -47,6 +47,20 @@ class Maneuver(IntEnum):
         return cls(value).name if value in set(cls) else str(value)
 
 
+class State(IntEnum):
+    """State of the supervisor of a real robot; each is safer than the one before.
+
+    DEGRADED walks. HOLD keeps the last command, torque on. FAULT is a HOLD that only an arm event
+    ends. OFF has no torque and also needs an arm event.
+    """
+
+    OK = 0
+    DEGRADED = 1
+    HOLD = 2
+    FAULT = 3
+    OFF = 4
+
+
 @dataclass(frozen=True, slots=True)
 class AntennaFrame:
     """What a robot feels: one reading of both antennae, its joints, and how its head moves.

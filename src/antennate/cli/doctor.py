@@ -20,8 +20,8 @@ from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
-from antennate.hardware.host import HostClock
 from antennate.hardware.setup.zeros import forgotten
+from antennate.host import HostClock
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
 from antennate.studies.measures import Table

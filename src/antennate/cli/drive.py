@@ -26,11 +26,11 @@ from antennate.hardware.config import DriveConfig, TeleopConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import Operator, drive
 from antennate.hardware.driving.report import MANY, Recent
-from antennate.hardware.driving.stopping import Arrival, StopOnce
+from antennate.hardware.driving.stopping import Arrival
 from antennate.hardware.driving.teleop import Gamepad, KeyController
-from antennate.hardware.host import HostClock, urgent
 from antennate.hardware.joints import zeros_lack
 from antennate.hardware.safety.session import Session
+from antennate.host import HostClock, StopOnce, urgent
 from antennate.messages import typed
 from antennate.robots.spec import require_antennae
 from antennate.studies.formats import to_json

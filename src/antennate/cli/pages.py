@@ -17,8 +17,7 @@ from pydantic.dataclasses import dataclass
 from antennate.cli.options import option
 from antennate.cli.terminal import write
 from antennate.errors import AntennateError
-from antennate.hardware.driving.stopping import STOPS
-from antennate.hardware.host import give_way
+from antennate.host import STOPS, give_way
 from antennate.messages import one_line
 from antennate.studies.run_files import BY_HAND
 from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT

@@ -26,7 +26,7 @@ from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.recording import Recorder
-from antennate.hardware.host import HostClock
+from antennate.host import HostClock
 from antennate.messages import typed
 from antennate.params.hardware import RecordParams
 

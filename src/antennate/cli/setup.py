@@ -22,9 +22,7 @@ from antennate.hardware.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.driving.connect import require_servos
-from antennate.hardware.driving.stopping import StopOnce
 from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.host import HostClock
 from antennate.hardware.joints import unmeasured
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import JOG_PERIOD
@@ -33,6 +31,7 @@ from antennate.hardware.setup.person import Quit, all_ports, confirm, find_port,
 from antennate.hardware.setup.robot_toml import change, require_changeable
 from antennate.hardware.setup.servos import Assembly, Joint, JointState, ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, forgotten, measured
+from antennate.host import HostClock, StopOnce
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.measures import Table

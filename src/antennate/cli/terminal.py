@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator
 from textwrap import fill, wrap
 from typing import Any, TextIO
 
-from antennate.hardware.driving.stopping import STOPS, StopOnce
+from antennate.host import STOPS, StopOnce
 from antennate.messages import one_line
 
 _ASCII = {"·": ".", "×": "x", "–": "-", "−": "-", "±": "+-", "²": "^2", "→": "->", "…": "..."}

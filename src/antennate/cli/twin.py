@@ -28,10 +28,10 @@ from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
-from antennate.hardware.host import LEVEL, urgent
 from antennate.hardware.ports.finder import read_key
 from antennate.hardware.setup.robot_toml import edited
 from antennate.hardware.setup.zeros import measured
+from antennate.host import LEVEL, urgent
 from antennate.params.base import changes, paths_of
 from antennate.robots.antenna import SensorParams
 from antennate.robots.spec import RobotSpec
@@ -48,7 +48,7 @@ from antennate.twin.servos import ServoBox, ServoEntry, read_list
 from antennate.types import AntennaFrame
 
 if TYPE_CHECKING:
-    from antennate.telemetry.log_film import TwinFilm
+    from antennate.telemetry.twin_film import TwinFilm
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
@@ -382,7 +382,7 @@ class Recording:
             self._log = TwinLog(path, self._robot, config, start, _say_lost)
             self.watchers.append(self._log.take)
         if self._options.video is not None:
-            from antennate.telemetry.log_film import TwinFilm  # slow to import
+            from antennate.telemetry.twin_film import TwinFilm  # slow to import
 
             self._film = TwinFilm(self._robot, passage, config)
             self.watchers.append(self._film.take)

@@ -24,9 +24,8 @@ from antennate.control.loop import void_sentence
 from antennate.control.readings import short_names
 from antennate.errors import AntennateError, LogError
 from antennate.hardware.driving.report import late_sentence
-from antennate.hardware.driving.stopping import STOPS
-from antennate.hardware.host import Priority
-from antennate.hardware.safety.causes import State, what_to_do
+from antennate.hardware.safety.causes import what_to_do
+from antennate.host import STOPS, Priority
 from antennate.messages import one_line
 from antennate.studies.measures import Measure, Table
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
@@ -35,7 +34,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import HEADER, STATE, TICK, Channel
 from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.writer import SYNC, LogWriter
-from antennate.types import Maneuver
+from antennate.types import Maneuver, State
 
 MODULE = "antennate.cli.viewer"
 """What Python runs as the process beside a drive."""

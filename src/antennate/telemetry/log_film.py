@@ -1,25 +1,14 @@
-"""Films of what was not recorded for one: of a log, and of a twin while it serves.
-
-Both are drawn afterwards, a log from what it tells of joints and coordinates. A twin shows what it
-knows: readings, how far the head has come, true contact and torque.
-"""
+"""Film of a log, drawn afterwards from what it tells of joints and coordinates."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from antennate.robots.spec import ANTENNA_PREFIXES
 from antennate.sim.world import World
-from antennate.telemetry import film
 from antennate.telemetry.film import MOST_PICTURES, Film, WalkRecorder
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.strip import Band
 from antennate.telemetry.topics import COORDINATES
 from antennate.telemetry.view.player import LogScene
-from antennate.twin.config import Passage, TwinConfig
-from antennate.twin.robot import TwinRobot
 
 _LONGEST = 0.1
 """Longest time between two ticks that is shown [s]: a twin that stands between two drives, and a
@@ -72,57 +61,3 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
             break
     log.require_ticks()
     return recorder.decided(title, threshold)
-
-
-_TOUCHES = {0: ("free", "#DDDDDD"), 1: ("touches", "#222222")}
-_TORQUES = {0: ("off", "#DDDDDD"), 1: ("on", "#999999")}
-
-
-class TwinFilm:
-    """The film of a twin, from the first torque on; it is drawn when all is over.
-
-    Args:
-        robot: The twin.
-        passage: How far it has come.
-        config: What is served.
-    """
-
-    def __init__(self, robot: TwinRobot, passage: Passage, config: TwinConfig) -> None:
-        self._robot, self._passage, self._config = robot, passage, config
-        self._recorder, self._ticks = WalkRecorder(config.robot), 0
-
-    @property
-    def full(self) -> bool:
-        """Whether no more pictures are kept."""
-        return len(self._recorder) >= MOST_PICTURES
-
-    def take(self, world: World) -> None:
-        """Offer a tick."""
-        t = self._ticks * self._config.control.period
-        self._ticks += 1
-        if self.full or not self._recorder.due(t):
-            return
-        _, names, _, _ = world.obstacle_contacts()
-        self._recorder.see(
-            world,
-            t,
-            counts=self._robot.counts,
-            progress=[self._passage.progress],
-            touches=[any(name.startswith(side) for name in names) for side in ANTENNA_PREFIXES],
-            torque=any(servo.torque for servo in self._robot.servos),
-        )
-
-    def film(self) -> Film | None:
-        """The film, None if the physics never began."""
-        recorder = self._recorder
-        if not len(recorder):
-            return None
-        touches = recorder.values("touches").astype(np.int64)
-        return recorder.walk(
-            f"twin, trial {self._config.trial}",
-            [film.trace("way of the head [m]", recorder.values("progress"))],
-            [
-                Band("torque", recorder.values("torque").astype(np.int64), _TORQUES),
-                *(Band(side, touches[:, i], _TOUCHES) for i, side in enumerate(("left", "right"))),
-            ],
-        )

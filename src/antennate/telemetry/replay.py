@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import field_validator
 
+from antennate.control.decision import Decision, decision_of, no_command
 from antennate.control.knowledge import require_own_senses
 from antennate.control.loop import run_loop
 from antennate.control.readings import (
@@ -24,7 +25,6 @@ from antennate.control.readings import (
 )
 from antennate.control.registry import BUILT_IN, PRIVILEGED, check_for_robots, make_controller
 from antennate.errors import LogError, raised
-from antennate.hardware.safety.controller import Decision, decision_of, no_command
 from antennate.messages import shortened
 from antennate.params.base import Params, number
 from antennate.robots.imu import AXES

@@ -9,12 +9,11 @@ import math
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from antennate.hardware.safety.controller import Decision
-from antennate.hardware.safety.session import Session
+from antennate.control.decision import Decision
 from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.cdr import MessageType
@@ -34,6 +33,9 @@ from antennate.telemetry.topics import (
     imu_values,
 )
 from antennate.types import AntennaFrame, Controller, JointCommand
+
+if TYPE_CHECKING:  # a log of a simulation loads no hardware
+    from antennate.hardware.safety.session import Session
 
 _LONGEST_CAUSE = 160
 _ONE = dict(zip(JOINTS[1:], ("position", "velocity", "effort"), strict=True))

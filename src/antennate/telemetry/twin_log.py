@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from antennate.errors import LogError, in_one_line
-from antennate.hardware.host import LEVEL, claim
+from antennate.host import LEVEL, claim
 from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World

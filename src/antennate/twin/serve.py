@@ -11,7 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from antennate.dxl.endpoints import Endpoint, Terminal
 from antennate.dxl.server import LONGEST_WAIT, Server
 from antennate.dxl.servo_bus import ServoBus
-from antennate.hardware.host import claim
+from antennate.host import claim
 from antennate.twin.faults import Faults
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot

@@ -22,12 +22,12 @@ from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
 from antennate.hardware.esp32.wire import require_sensor
-from antennate.hardware.host import HostClock
 from antennate.hardware.joints import Joints, settings, wrong_settings, zeros_lack
 from antennate.hardware.ports.finder import Reconnecting, finder
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
+from antennate.host import HostClock
 from antennate.messages import typed
 from antennate.params.hardware import DoctorParams
 from antennate.port import Port, PortError

@@ -11,12 +11,13 @@ from functools import partial
 from antennate.control.loop import run_loop
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.report import Report, raised_links
-from antennate.hardware.driving.stopping import DeadMan, StopOnce
-from antennate.hardware.safety.causes import OF_CONTROLLER, Cause, State
+from antennate.hardware.driving.stopping import DeadMan
+from antennate.hardware.safety.causes import OF_CONTROLLER, Cause
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Outputs
-from antennate.types import AntennaFrame, JointCommand
+from antennate.host import StopOnce
+from antennate.types import AntennaFrame, JointCommand, State
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from antennate.control.loop import void_decisions
-from antennate.hardware.safety.causes import DATA, Active, Cause, State
+from antennate.hardware.safety.causes import DATA, Active, Cause
 from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.supervisor import Outputs
 from antennate.hardware.timing import LoopTiming
-from antennate.types import Floats, Maneuver
+from antennate.types import Floats, Maneuver, State
 
 
 class Walk:

@@ -1,28 +1,14 @@
-"""States of the supervisor, causes that ask for them, and what to do about each."""
+"""Causes that ask for a state of the supervisor, and what to do about each."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum
 
 from antennate.hardware.safety.channel import Finding
-
-
-class State(IntEnum):
-    """The ladder; each state is safer than the one before.
-
-    DEGRADED walks. HOLD keeps the last command, torque on. FAULT is a HOLD that only an arm event
-    ends. OFF has no torque and also needs an arm event.
-    """
-
-    OK = 0
-    DEGRADED = 1
-    HOLD = 2
-    FAULT = 3
-    OFF = 4
-
+from antennate.types import State
 
 _ARM = "start `drive --arm` again"
 _BUS = "check cables, plugs and supply of the servos (`antennate doctor`)"

@@ -11,12 +11,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from antennate.errors import ControllerError, in_one_line, reason
+from antennate.control.decision import Decision, decision_of, no_command
+from antennate.errors import in_one_line, reason
 from antennate.hardware.joints import CommandError
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Contact, Controller, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Controller, JointCommand, Maneuver
 
 EVERY = 1.0
 """Shortest time between two tracebacks that are kept [s], so that one a tick floods nothing
@@ -24,8 +23,6 @@ EVERY = 1.0
 _KEPT = 16
 _LONGEST_TEXT = 20_000
 """Characters of a traceback; an exception may quote anything."""
-_MOST = (1 << 31) - 1
-"""Largest number of a decision that is accepted; a log keeps 64 bits of each."""
 
 
 class Tracebacks:
@@ -56,14 +53,6 @@ class Tracebacks:
         self.kept.append(text[-_LONGEST_TEXT:])
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """A `Maneuver` and a `Contact` a side; the defaults stand until the first step."""
-
-    maneuver: int = int(Maneuver.HOLD)
-    contact: tuple[int, int] = (int(Contact.UNKNOWN), int(Contact.UNKNOWN))
-
-
 @dataclass(slots=True)
 class StepResult:
     """The result of a controller's step in one tick.
@@ -79,38 +68,6 @@ class StepResult:
     decided_at: float = -math.inf
     bad_command: str = ""
     failure: str = ""
-
-
-def decision_of(controller: Controller) -> Decision:
-    """The decision of a controller of one robot after its step.
-
-    Whether the number is a valid `Maneuver` is checked by the supervisor.
-
-    Raises:
-        ControllerError: `maneuver` or `contact` is not of the form that `Controller` asks for.
-    """
-    (maneuver,) = _integers(controller, "maneuver", (1,))
-    left, right = _integers(controller, "contact", (1, 2))
-    return Decision(maneuver, (left, right))
-
-
-def _integers(controller: Controller, name: str, shape: tuple[int, ...]) -> list[int]:
-    value: object = getattr(controller, name, None)
-    array = np.asarray(value)
-    fits = array.shape == shape and array.dtype.kind in "iu"
-    numbers = [int(number) for number in array.ravel()] if fits else []
-    if not numbers or max(map(abs, numbers)) > _MOST:
-        raise ControllerError(
-            f"expected {name} of shape {shape}, small whole numbers, found {value!r}; see "
-            f"antennate.types.{name.capitalize()}"
-        )
-    return numbers
-
-
-def no_command(robot: RobotSpec) -> JointCommand:
-    """The command in place of one that a controller did not give: NaN for every joint."""
-    shapes = robot.command_shapes().items()
-    return JointCommand(**{name: np.full(shape, math.nan) for name, shape in shapes})
 
 
 class SupervisedController:

@@ -26,7 +26,7 @@ from antennate.hardware.actuators import ActuatorError, Actuators
 from antennate.hardware.esp32.board import Board, BoardReader
 from antennate.hardware.joints import CommandError
 from antennate.hardware.safety import deadlines
-from antennate.hardware.safety.causes import Cause, State
+from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.controller import SupervisedController
 from antennate.hardware.safety.imu import ImuDiagnosis
 from antennate.hardware.safety.signal_quality import SignalQuality
@@ -34,7 +34,7 @@ from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.hardware.timing import LoopTiming
 from antennate.params.safety import SupervisorParams
 from antennate.port import PortError
-from antennate.types import AntennaFrame, Clock, Controller, JointCommand
+from antennate.types import AntennaFrame, Clock, Controller, JointCommand, State
 
 
 @dataclass(slots=True)

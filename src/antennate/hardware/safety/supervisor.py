@@ -18,11 +18,10 @@ from antennate.hardware.safety.causes import (
     OF_FINDING,
     Active,
     Cause,
-    State,
 )
 from antennate.hardware.safety.channel import Finding
 from antennate.params.safety import SupervisorParams
-from antennate.types import Contact, Maneuver
+from antennate.types import Contact, Maneuver, State
 
 
 class RateMeter:

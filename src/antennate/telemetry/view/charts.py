@@ -11,12 +11,11 @@ import viser
 from viser import uplot
 
 from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
-from antennate.hardware.safety.causes import State
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import Poses
-from antennate.types import Contact, Floats, Maneuver
+from antennate.types import Contact, Floats, Maneuver, State
 
 _WINDOW = 10.0
 """Time that charts show [s]."""

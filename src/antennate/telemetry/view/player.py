@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from antennate.colours import SERIES, rgba
-from antennate.hardware.safety.controller import Decision
+from antennate.control.decision import Decision
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams
 from antennate.sim.shapes import VisibleModel

@@ -1,8 +1,12 @@
-"""The host of the loop: its monotonic clock, and real-time scheduling where that is allowed.
+r"""The host of a program: its monotonic clock, real-time scheduling, and signals that ask to end.
 
 Linux runs a process of the real-time class SCHED_FIFO whenever it has something to do, before all
 ordinary ones (sched(7)). That needs a privilege. Without it the loop runs as an ordinary process,
 and a busy machine makes it miss ticks.
+
+Signals that ask to end are Ctrl-C, Ctrl-\, SIGTERM and the loss of the terminal. A controller with
+a bare `except`, a destructor or a callback may swallow the exception. So the signal is also kept,
+and the loop looks at it.
 """
 
 from __future__ import annotations
@@ -10,10 +14,14 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import signal
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 
 class HostClock:
@@ -100,3 +108,63 @@ def claim(level: int = LEVEL) -> Priority:
     except OSError:
         return Priority.ORDINARY
     return Priority.REAL_TIME
+
+
+STOPS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
+    if hasattr(signal, name)
+)
+"""Signals that ask a program to end; a terminal whose connection is lost sends SIGHUP."""
+
+
+class StopOnce:
+    """Makes signals that ask to end raise KeyboardInterrupt inside the block, until it is closed.
+
+    Close it before the torque goes off: a second Ctrl-C must not interrupt that. Python delivers
+    signals to the main thread only; a drive in another thread has to be ended otherwise, as by
+    `orders.stop`.
+
+    Args:
+        last: The program ends after the block: once a signal came, later ones are ignored, so that
+            the report is written and shown.
+        numbers: The signals.
+
+    Attributes:
+        received: A signal came, even if its exception was swallowed.
+        insists: Every signal raises, not only the first; for code that may swallow one.
+        within: Signals raise only while this function runs, so that of several at once none
+            interrupts what the first has begun; None for everywhere.
+        closed: Signals do not raise any more; set by the code that owns the block.
+    """
+
+    def __init__(self, last: bool = False, numbers: Sequence[int] = STOPS) -> None:
+        self.received = self.closed = False
+        self.insists = not last
+        self._last, self._numbers = last, numbers
+        self.within: Callable[..., object] | None = None
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> StopOnce:
+        if threading.current_thread() is threading.main_thread():
+            self._before = {number: signal.signal(number, self.receive) for number in self._numbers}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, signal.SIG_IGN if self._last and self.received else handler)
+
+    def receive(self, number: int, frame: FrameType | None) -> None:
+        """Take note of a signal."""
+        first, self.received = not self.received, True
+        if not self.closed and (first or self.insists) and self._inside(frame):
+            raise KeyboardInterrupt
+
+    def _inside(self, frame: FrameType | None) -> bool:
+        """Whether `within` runs at this frame."""
+        if self.within is None:
+            return True
+        code = getattr(self.within, "__code__", None)
+        while frame is not None and frame.f_code is not code:
+            frame = frame.f_back
+        return frame is not None
