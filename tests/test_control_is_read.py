@@ -10,8 +10,7 @@ import pytest
 from recorded import act, climb_all, leaves, press, recorded
 
 from antennate.cli import main
-from antennate.control.readers import BY_CONTACT, TELEOP, UNREAD, unread_by_all
-from antennate.control.registry import BUILT_IN, PRIVILEGED
+from antennate.control.registry import BUILT_IN, KINDS, PRIVILEGED, TELEOP, unread_by_all
 from antennate.experiments import load
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.study import run as study
@@ -77,10 +76,6 @@ def test_what_a_controller_is_said_not_to_read_is_that(
     read -= NO_EFFECT.get(name, set())
     unread = {f"control.{leaf}" for leaf in set(leaves(ControlParams)) - read}
     assert unread == set(unread_by_all([name], control, spec))
-
-
-def test_all_controllers_of_ours_are_told_of() -> None:
-    assert set(UNREAD) == {*ACTS, BY_CONTACT}
 
 
 TURN = "expected a parameter that is read, such as {}control.escape.turn{}offset, found 0.2, but"
@@ -201,7 +196,7 @@ def test_a_study_varies_assumptions_that_nothing_reads_but_only_those() -> None:
 )
 def test_a_page_changes_only_what_the_controller_reads(name: str, places: dict[str, str]) -> None:
     control = ControlParams()
-    tuning = Tuning(name, control, lambda values: BUILT_IN["open"](values, RobotSpec(), 1))
+    tuning = Tuning(name, control, lambda values: KINDS["open"](values, RobotSpec(), 1))
     every = {"threshold": "rule", "averaging_time": "conditioning", **places}
     assert tuning.values.keys() == every.keys()
     for field, group in every.items():

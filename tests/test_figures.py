@@ -18,7 +18,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from antennate import figures as style
-from antennate.control.registry import BUILT_IN, USUAL
+from antennate.control.registry import BUILT_IN, USUAL, looks
 from antennate.experiments.compete import figure as compete
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.gait import figure as gait
@@ -30,7 +30,6 @@ from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.experiments.wall import experiment as wall
 from antennate.experiments.wall.physics import Traverse
-from antennate.figures import controller_colours
 from antennate.robots.spec import RobotSpec
 from antennate.robots.wiring import wiring
 from antennate.types import Maneuver
@@ -321,7 +320,8 @@ def test_every_maneuver_has_its_own_colour_on_the_course():
     drawn = {line.get_color() for line in panel.lines}
     assert set(style.MANEUVER_COLOURS.values()) <= drawn
     assert len(set(style.MANEUVER_COLOURS.values())) == len(Maneuver)
-    assert set(BUILT_IN) == set(style.CONTROLLER_COLOURS) == set(style.CONTROLLER_LINES)
+    drawn = looks(BUILT_IN).values()
+    assert len({colour for colour, _ in drawn}) == len({str(line) for _, line in drawn}) == 14
 
 
 def test_trials_without_a_course_leave_an_empty_panel():
@@ -439,5 +439,4 @@ def test_paths_are_kept_of_the_trials_that_are_drawn():
 
 def test_no_two_controllers_of_a_figure_have_one_colour():
     names = ["timed", "closed", "closed@yoked", "closed@swapped", "a.py:a", "b.py:b"]
-    colours = controller_colours(names)
-    assert len({colours[name] for name in names}) == len(names)
+    assert len({colour for colour, _ in looks(names).values()}) == len(names)

@@ -16,7 +16,7 @@ from stated import stated
 
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
-from antennate.control.registry import CONTROLLERS, make_controller
+from antennate.control.registry import CONTROLLERS, looks, make_controller
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.experiment import run
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -212,6 +212,25 @@ def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
 @pytest.mark.slow
 def test_the_example_keeps_the_protocol() -> None:
     check_controller(EXAMPLE)
+
+
+def test_a_file_with_a_kind_brings_sentence_and_colour(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "straight.py"
+    file.write_text(
+        "from antennate.control.controllers import open_loop\n"
+        "from antennate.control.kind import ControllerKind\n"
+        'STRAIGHT = ControllerKind("straight", "walks on and on", open_loop, colour="#123456")\n'
+    )
+    name = f"{file}:STRAIGHT"
+    words = f"tunnel --trials 1 --time-limit 1 --controllers {name} open --out {tmp_path / 'run'}"
+    assert main(words.split()) == 0
+    assert f"{name}: walks on and on" in capsys.readouterr().out
+    assert looks([name, "open"]) == {name: ("#123456", "solid"), "open": ("#8C8C8C", (0, (4, 1.5)))}
+    (first, _) = json.loads((tmp_path / "run/result.json").read_text())["controllers"].items()
+    assert first[0] == name
+    assert "walks on and on" in (tmp_path / "run/report.html").read_text()
 
 
 def test_the_example_is_short() -> None:

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from antennate.figures import WIDTH, canvas, controller_colours, render, styled
+from antennate.control.registry import looks
+from antennate.figures import WIDTH, canvas, render, styled
 from antennate.jackknife import jackknife95
 from antennate.studies.statistics import mcnemar, mean95, signed_rank, wilson95
 from antennate.types import Floats
@@ -155,7 +156,7 @@ def figure_of(rows: Rows) -> Figure:
     """Share of the draws that are crossed within a share of their limits, a line a controller."""
     figure = canvas(WIDTH, 2.8)
     panel = figure.subplots()
-    colours = controller_colours(list(rows))
+    colours = {name: colour for name, (colour, _) in looks(rows).items()}
     for name, cell in rows.items():
         used = np.sort(shares(cell, sorted(cell)))
         used = used[used < 1.0]

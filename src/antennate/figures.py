@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import io
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -33,40 +32,6 @@ WIDTH = 4.5
 
 INK, MUTED, FAINT = "#222222", "#6E6E6E", "#D5D5D5"
 """Text and robots; secondary lines; things in the background."""
-
-CONTROLLER_COLOURS = {
-    "open": "#8C8C8C",
-    "timed": "#E69F00",
-    "paper": "#CC79A7",
-    "closed": "#332288",
-    "closed-1": "#882255",
-    "geometric": "#117733",
-    "follow": "#0072B2",
-    "centre": "#AA4499",
-    "schedule": "#D55E00",
-    "zigzag": "#009E73",
-    "random": "#56B4E9",
-    "climb": "#661100",
-    "lifted": "#999933",
-    "rhythm": "#44AA99",
-}
-CONTROLLER_LINES = {
-    "open": (0, (4, 1.5)),
-    "timed": (0, (6, 1, 1, 1, 1, 1)),
-    "paper": (0, (4, 1.5, 1, 1.5)),
-    "closed": "solid",
-    "closed-1": (0, (8, 2)),
-    "geometric": (0, (6, 1.5, 2, 1.5)),
-    "follow": (0, (3, 1, 1, 1, 1, 1)),
-    "centre": (0, (10, 1.5, 3, 1.5)),
-    "schedule": (0, (5, 1.5)),
-    "zigzag": (0, (1, 1.2)),
-    "random": (0, (2, 2)),
-    "climb": (0, (12, 1.5)),
-    "lifted": (0, (1, 3)),
-    "rhythm": (0, (3, 3)),
-}
-"""A second mark beside the colour, for print in grey."""
 
 PROFILE_LOOKS = {
     "stiff": ("#0072B2", "o", "solid"),
@@ -151,18 +116,6 @@ def plain(names: Mapping[str, str]) -> dict[str, str]:
 def series(count: int) -> list[str]:
     """As many colours, the first ones first; they repeat after seven."""
     return [SERIES[i % len(SERIES)] for i in range(count)]
-
-
-def controller_colours(names: Sequence[str]) -> dict[str, str]:
-    """A colour for each controller: ours have their own, others take free ones in turn.
-
-    Free are those of `SERIES`, then of ours, that no other of these controllers has.
-    """
-    others = [name for name in names if name not in CONTROLLER_COLOURS]
-    used = {CONTROLLER_COLOURS[name] for name in names if name in CONTROLLER_COLOURS}
-    free = dict.fromkeys([*series(len(SERIES)), *CONTROLLER_COLOURS.values()])
-    colours = [colour for colour in free if colour not in used] or [*free]
-    return {**CONTROLLER_COLOURS, **dict(zip(others, itertools.cycle(colours), strict=False))}
 
 
 @functools.cache

@@ -102,6 +102,7 @@ class Registry(Generic[T]):
         self._files = files or {}
         self._ours: dict[str, T] = dict(ours)
         self.added: dict[str, T] = ADDED.setdefault(group, {})
+        self._found: dict[str, T] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,6 +121,10 @@ class Registry(Generic[T]):
                 f"expected a new name without a colon for a {self._kind}, found {name!r}"
             )
         self.added[name] = value
+
+    def known(self, name: str) -> T | None:
+        """The object of a name that was added or found before in this process; no code runs."""
+        return self.added.get(name, self._found.get(name))
 
     def check(self, name: str) -> str:
         """Return the name if it may be valid, that of a file in its shortest form; no code runs.
@@ -171,7 +176,8 @@ class Registry(Generic[T]):
             raise ConfigError(
                 f"expected a class or a function at {name!r}, found {type(value).__name__}"
             )
-        return cast("T", value)
+        found = self._found[name] = cast("T", value)
+        return found
 
     def _load(self, name: str) -> Any:
         for point in installed(self._group):

@@ -16,12 +16,13 @@ A reading that cannot be used still means HOLD. While it holds, the time of a ma
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
+from antennate.control.kind import ControllerKind
 from antennate.control.knowledge import Knowledge
 from antennate.params.control import (
     ControlParams,
@@ -234,3 +235,51 @@ def zigzag(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControll
     return RuleController(
         RoundRule(zigzagging(control.zigzag), control, batch), control, robot, batch
     )
+
+
+def _timed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
+    """Parameters that `timed` reads; told that it is stuck, it needs no clock."""
+    told = {"facing": _KNOWING_ESCAPE, "map": _KNOWING_ESCAPE[1:]}
+    escape = (
+        *_BLIND_ESCAPE,
+        "turn_offset",
+        *(name for kind in knows for name in told.get(kind, ())),
+    )
+    clock = () if "jam" in knows else ("timed",)
+    return *clock, *(f"escape.{name}" for name in escape)
+
+
+KINDS = (
+    ControllerKind(
+        name="timed",
+        about="backs off and turns by the clock, whatever it feels: what closed has to beat",
+        make=timed,
+        reads=_timed_reads,
+        colour="#E69F00",
+        line=(0, (6, 1, 1, 1, 1, 1)),
+    ),
+    ControllerKind(
+        name="schedule",
+        about="blind: backs off by the clock and turns right and left, farther and farther",
+        make=schedule,
+        reads=("schedule", "escape.turn_offset"),
+        colour="#D55E00",
+        line=(0, (5, 1.5)),
+    ),
+    ControllerKind(
+        name="zigzag",
+        about="blind: turns right and left by the clock, always by as much",
+        make=zigzag,
+        reads=("zigzag", "escape.turn_offset"),
+        colour="#009E73",
+        line=(0, (1, 1.2)),
+    ),
+    ControllerKind(
+        name="random",
+        about="blind: backs off and turns at random times, to random sides, by random angles",
+        make=RandomController,
+        reads=("random", "escape.turn_offset"),
+        colour="#56B4E9",
+        line=(0, (2, 2)),
+    ),
+)

@@ -12,6 +12,7 @@ Conditioning, contact and gait are the same in all. The rule that chooses the ma
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,9 +26,10 @@ from antennate.control.conditioning import (
 )
 from antennate.control.escape import Escape, SearchRule
 from antennate.control.gait import Gait
+from antennate.control.kind import ControllerKind, all_but
 from antennate.control.knowledge import ALIGNED, Kind, Knowledge, aligned
 from antennate.errors import ConfigError
-from antennate.params.control import ControlParams, EscapeParams, RuleParams
+from antennate.params.control import ControlParams, EscapeParams, RuleParams, SearchParams
 from antennate.robots.spec import RobotSpec, require_antennae
 from antennate.types import (
     LEFT,
@@ -367,3 +369,63 @@ def closed_loop(control: ControlParams, robot: RobotSpec, batch: int) -> RuleCon
 def by_map(control: ControlParams, robot: RobotSpec, batch: int) -> RuleController:
     """`map`: walks along the route, which a simulation tells it."""
     return RuleController(MapRule(control, batch), control, robot, batch)
+
+
+def _closed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
+    """Parameters that `closed` reads; told that it is stuck, it is not patient and finds it out."""
+    if "jam" in knows:
+        search = all_but(SearchParams, "search", "patience")
+        return *search, "repetition.pressure", "escape.turn_offset"
+    return "search", "repetition", "escape.turn_offset"
+
+
+def _closed_1_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
+    """Parameters that `closed-1` reads, by its trigger."""
+    if "jam" in knows:
+        return *all_but(EscapeParams, "escape", "trigger"), "repetition.pressure"
+    if control.escape.trigger == "contact":
+        return "escape", "repetition.pressure", "rule.strong", "rule.similar"
+    return "escape", "repetition"
+
+
+KINDS = (
+    ControllerKind(
+        name="open",
+        about="walks forward whatever its antennae feel; it shows what a robot does without touch",
+        make=open_loop,
+        reads=(),
+        colour="#8C8C8C",
+        line=(0, (4, 1.5)),
+    ),
+    ControllerKind(
+        name="paper",
+        about="turns away from the side that touches, backs off where both do: the published table",
+        make=paper,
+        reads=("rule", "gait.turn_offset"),
+        colour="#CC79A7",
+        line=(0, (4, 1.5, 1, 1.5)),
+    ),
+    ControllerKind(
+        name="closed",
+        about="walks on until its readings repeat: then it backs off and searches for the way on",
+        make=closed_loop,
+        reads=_closed_reads,
+        colour="#332288",
+    ),
+    ControllerKind(
+        name="closed-1",
+        about="the closed of former versions: stuck, it backs off and turns, then the other way",
+        make=closed_1,
+        reads=_closed_1_reads,
+        colour="#882255",
+        line=(0, (8, 2)),
+    ),
+    ControllerKind(
+        name="map",
+        about="walks along the route, which only a simulation can tell it, to show what that is "
+        "worth",
+        make=by_map,
+        reads=("escape.reverse_time", "escape.return_time", "escape.turn_offset"),
+        needs=MapRule.needs,
+    ),
+)

@@ -10,6 +10,7 @@ body wave goes over from one to the other at limited rates: no joint target jump
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from functools import lru_cache
 
@@ -18,10 +19,11 @@ import numpy as np
 from antennate.control.controllers import RuleController
 from antennate.control.escape import SearchRule, Sizes
 from antennate.control.gait import DIRECTION, STEER, targets
+from antennate.control.kind import ControllerKind, all_but
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE
 from antennate.errors import ConfigError
 from antennate.mechanics.twist import Wave
-from antennate.params.control import ControlParams
+from antennate.params.control import ControlParams, SearchParams
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles
 from antennate.robots.spec import RobotSpec
@@ -31,6 +33,9 @@ NUMBER_RATE = 0.25
 """Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
 _SLOWEST, _LEAST_TURN = 0.02, 0.03
 """Least speed [m/s] and rate of turns [rad/s]: an escape would take half a minute (assumed)."""
+
+_SIZES = ("reverse_time", "reverse_most", "turn_time", "lost_turn", "return_time")
+"""Of the search, what `geometric` has in metres and degrees."""
 
 
 @lru_cache
@@ -155,3 +160,22 @@ def geometric(control: ControlParams, robot: RobotSpec, batch: int) -> RuleContr
     gait = TwoGaits(control, robot, batch)
     rule = GeometricRule(control, gait, batch)
     return RuleController(rule, control, robot, batch, gait)
+
+
+def _reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
+    """Parameters that it reads; told that it is stuck, it needs neither detector nor patience."""
+    search = all_but(SearchParams, "search", *_SIZES, *(["patience"] if "jam" in knows else []))
+    detector = "repetition.pressure" if "jam" in knows else "repetition"
+    return *search, "geometric", detector, "escape.turn_offset"
+
+
+KINDS = (
+    ControllerKind(
+        name="geometric",
+        about="closed by a faster gait; its escapes are in metres and degrees, by a model",
+        make=geometric,
+        reads=_reads,
+        colour="#117733",
+        line=(0, (6, 1.5, 2, 1.5)),
+    ),
+)

@@ -2,67 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import itertools
+from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import Any
 
 from antennate import checks
+from antennate.colours import SERIES
 from antennate.control import blind, controllers, geometric, steering
 from antennate.control.climbing import controllers as climbing
+from antennate.control.kind import ControllerFactory, ControllerKind, unread_of
+from antennate.control.readers import UNREAD_BY_POLICIES, unread_lift
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, MissingPackageError, raised
 from antennate.lookup import Registry
+from antennate.params.base import paths_of
+from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
 
-ControllerFactory = Callable[[ControlParams, RobotSpec, int], Controller]
-"""Makes a controller of B robots. A class whose `__init__` takes these three is one."""
-
 ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
 """Makes the controller of a name for B robots, as `make_controller` does."""
 
-BUILT_IN: dict[str, ControllerFactory] = {
-    "open": controllers.open_loop,
-    "timed": blind.timed,
-    "paper": controllers.paper,
-    "closed": controllers.closed_loop,
-    "closed-1": controllers.closed_1,
-    "geometric": geometric.geometric,
-    "follow": steering.follow,
-    "centre": steering.centre,
-    "schedule": blind.schedule,
-    "zigzag": blind.zigzag,
-    "random": blind.RandomController,
-    "climb": climbing.climb,
-    "lifted": climbing.lifted,
-    "rhythm": climbing.rhythm,
-}
 USUAL = ("open", "timed", "paper", "closed")
 """Those of ours that are run if none is named; the others are further controls without touch."""
-PRIVILEGED: dict[str, ControllerFactory] = {
-    "map": controllers.by_map,
-    "edges": climbing.edges,
-}
-"""Controllers that need what only a simulation knows."""
-
-ABOUT = {
-    "open": "walks forward whatever its antennae feel; it shows what a robot does without touch",
-    "timed": "backs off and turns by the clock, whatever it feels: what closed has to beat",
-    "paper": "turns away from the side that touches, backs off where both do: the published table",
-    "closed": "walks on until its readings repeat: then it backs off and searches for the way on",
-    "closed-1": "the closed of former versions: stuck, it backs off and turns, then the other way",
-    "geometric": "closed by a faster gait; its escapes are in metres and degrees, by a model",
-    "follow": "steers along a wall that one antenna feels, by PD control; it never backs off",
-    "centre": "steers away from the antenna that is bent more, by as much; it never backs off",
-    "schedule": "blind: backs off by the clock and turns right and left, farther and farther",
-    "zigzag": "blind: turns right and left by the clock, always by as much",
-    "random": "blind: backs off and turns at random times, to random sides, by random angles",
-    "climb": "feels steps and drops with lowered antennae, climbs steps, steers by walls as closed",
-    "lifted": "blind: walks with its head up, so that it gets on to low steps",
-    "rhythm": "blind: climbs by the clock, as climb does where it feels a step",
-    "edges": "climbs at edges that only a simulation can tell it, to show what knowing is worth",
-    "map": "walks along the route, which only a simulation can tell it, to show what that is worth",
-}
-"""What ours do, for who meets them for the first time."""
+_MODULES = (controllers, blind, geometric, steering, climbing)
+_ALL = {kind.name: kind for module in _MODULES for kind in module.KINDS}
+BUILT_IN = (*dict.fromkeys([*USUAL, *(name for name, kind in _ALL.items() if not kind.needs)]),)
+"""Names of ours that a robot may have."""
+PRIVILEGED = tuple(name for name, kind in _ALL.items() if kind.needs)
+"""Names of ours that need what only a simulation knows."""
+KINDS = {name: _ALL[name] for name in (*BUILT_IN, *PRIVILEGED)}
+"""Controllers of ours by name."""
 RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
@@ -76,12 +47,12 @@ def _of_policy(name: str) -> ControllerFactory:
 
 _FILES: dict[str, Callable[[str], ControllerFactory]] = {".onnx": _of_policy}
 CONTROLLERS: Registry[ControllerFactory] = Registry(
-    "controller", "antennate.controllers", BUILT_IN | PRIVILEGED, _FILES
+    "controller", "antennate.controllers", KINDS, _FILES
 )
 """All controllers: ours, of installed packages, one's own as MODULE:NAME or FILE.py:NAME, and
 learned policies as FILE.onnx."""
 _FOR_ROBOTS: Registry[ControllerFactory] = Registry(
-    "controller", "antennate.controllers", BUILT_IN, _FILES
+    "controller", "antennate.controllers", {name: KINDS[name] for name in BUILT_IN}, _FILES
 )
 
 
@@ -99,10 +70,34 @@ def check_for_robots(name: str) -> str:
     return _FOR_ROBOTS.check(name)
 
 
+def kind_of(name: str) -> ControllerKind | None:
+    """The kind of a controller, if it has one and this process knows it; no code is loaded."""
+    found = KINDS.get(name, CONTROLLERS.known(name))
+    return found if isinstance(found, ControllerKind) else None
+
+
+def looks(names: Iterable[str]) -> dict[str, tuple[str, Any]]:
+    """Colour and line of controllers in figures, by name.
+
+    Whoever has no colour of its own takes one in turn that no other of these controllers has.
+    """
+    kinds = {name: kind_of(name) for name in names}
+    own = {name: kind.colour for name, kind in kinds.items() if kind is not None and kind.colour}
+    ours = (kind.colour for kind in KINDS.values() if kind.colour)
+    palette = [*dict.fromkeys([*SERIES, *ours])]
+    free = [colour for colour in palette if colour not in own.values()] or palette
+    others = itertools.cycle(free)
+    return {
+        name: (own.get(name) or next(others), "solid" if kind is None else kind.line)
+        for name, kind in kinds.items()
+    }
+
+
 def about(names: Iterable[str]) -> str:
-    """What the controllers of ours among these conditions do, a line each, then their readings."""
+    """What the controllers among these conditions do, a line each, then their readings."""
     plain = dict.fromkeys(parts_of(name)[0] for name in names)
-    lines = [f"{name}: {ABOUT[name]}" for name in plain if name in ABOUT]
+    kinds = ((name, kind_of(name)) for name in plain)
+    lines = [f"{name}: {kind.about}" for name, kind in kinds if kind is not None and kind.about]
     return "\n".join([*lines, *about_readings(names)])
 
 
@@ -167,3 +162,51 @@ def make_controller(
             f"expected a controller with reset and step, found {name!r} without {lacking[0]}"
         )
     return controller
+
+
+TELEOP = "keys of teleop"
+"""Stands for the controller of `drive teleop`, which has no name."""
+KEPT_BY_CLIMBERS = ("robot.pitch.limit", "robot.elevation.limit")
+"""Parameters of the hardware that controllers that climb keep, in a simulation too."""
+
+
+def unread(name: str, control: ControlParams, knows: Collection[str] = ()) -> set[str]:
+    """Parameters of the control, dotted, that a controller does not read on any robot.
+
+    A controller of one's own may read all.
+
+    Args:
+        name: The controller.
+        control: All numbers of the control.
+        knows: What a simulation tells it; a robot tells nothing.
+    """
+    if name == TELEOP:
+        return unread_of(("gait.turn_offset",), False, control)
+    if name in KINDS:
+        return unread_of(KINDS[name].reads, KINDS[name].climbs, control, knows)
+    return set(UNREAD_BY_POLICIES) if name.endswith(".onnx") else set()
+
+
+def unread_by_all(
+    names: Sequence[str],
+    control: ControlParams,
+    robot: RobotSpec,
+    knows: Collection[str] = (),
+) -> dict[str, str]:
+    """Parameters that none of these controllers reads, as `control.rule.strong`, and why."""
+    who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
+    paths = set.intersection(*(unread(name, control, knows) for name in names))
+    reasons = {f"control.{path}": who for path in sorted(paths)}
+    if not set(names) <= {*KINDS, TELEOP}:
+        return reasons
+    if not robot.has_imu:
+        for path in paths_of(HeadingParams, "control.climb.heading"):
+            reasons.setdefault(path, "the robot has no inertial sensor")
+    return reasons | unread_lift(robot, "control.gait")
+
+
+def unread_limits(names: Sequence[str]) -> dict[str, str]:
+    """Limits of joints that none of these controllers keeps, and why."""
+    if not set(names) <= {TELEOP, *(name for name, kind in KINDS.items() if not kind.climbs)}:
+        return {}
+    return dict.fromkeys(KEPT_BY_CLIMBERS, "only controllers that climb read it in a simulation")

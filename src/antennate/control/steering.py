@@ -26,6 +26,7 @@ import numpy as np
 
 from antennate.control.controllers import RuleController
 from antennate.control.gait import Gait
+from antennate.control.kind import ControllerKind
 from antennate.params.control import CentreParams, ControlParams, FollowParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import LEFT, RIGHT, Bools, Floats, Ints, JointCommand, Maneuver
@@ -115,3 +116,23 @@ def _steered(
     rule = SteeringRule(error, own, control.escape.turn_offset, batch, control.period)
     gait = SteeredGait(control.gait, robot, batch, control.period)
     return RuleController(rule, control, robot, batch, gait)
+
+
+KINDS = (
+    ControllerKind(
+        name="follow",
+        about="steers along a wall that one antenna feels, by PD control; it never backs off",
+        make=follow,
+        reads=("follow", "escape.turn_offset"),
+        colour="#0072B2",
+        line=(0, (3, 1, 1, 1, 1, 1)),
+    ),
+    ControllerKind(
+        name="centre",
+        about="steers away from the antenna that is bent more, by as much; it never backs off",
+        make=centre,
+        reads=("centre", "escape.turn_offset"),
+        colour="#AA4499",
+        line=(0, (10, 1.5, 3, 1.5)),
+    ),
+)

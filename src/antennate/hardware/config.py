@@ -9,15 +9,8 @@ from typing import Any, ClassVar, Self
 from pydantic import field_validator, model_validator
 
 from antennate.antenna.calibration import Calibration
-from antennate.control.readers import (
-    SIMULATION_ALONE,
-    TELEOP,
-    UNDRIVEN,
-    UNREAD,
-    unread_by_all,
-    unused,
-)
-from antennate.control.registry import BUILT_IN, check_for_robots
+from antennate.control.readers import SIMULATION_ALONE, UNDRIVEN, unused
+from antennate.control.registry import BUILT_IN, TELEOP, check_for_robots, unread, unread_by_all
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.hardware.safety import deadlines
@@ -195,9 +188,7 @@ class DriveConfig(RobotConfig):
     unread: ClassVar[tuple[str, ...]] = (*UNDRIVEN, "zeros.measured")
 
     controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
-    """Open, timed, paper, closed, closed-1, geometric, follow, centre, schedule, zigzag, random,
-    climb, lifted, rhythm, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned
-    policy."""
+    """{examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
@@ -300,7 +291,7 @@ class TeleopConfig(DriveConfig):
         *DriveConfig.unread,
         "controller",
         *paths_of(DeadManParams, "dead_man"),
-        *(f"control.{path}" for path in UNREAD[TELEOP]),
+        *(f"control.{path}" for path in sorted(unread(TELEOP, ControlParams()))),
     )
     teleop: TeleopParams = TeleopParams()
 

@@ -190,7 +190,7 @@ def number(
 
 
 def meaning(model: Any, name: str, unit: bool = True) -> str:
-    """What a parameter is, as a phrase without a full stop.
+    """What a parameter is, as a phrase without a full stop; `{examples}` in it are its examples.
 
     Args:
         model: The group that it belongs to, or a pydantic dataclass.
@@ -200,6 +200,7 @@ def meaning(model: Any, name: str, unit: bool = True) -> str:
     field = getattr(model, "__pydantic_fields__")[name]  # noqa: B009  # also of dataclasses
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     text = field.description or _docstrings(model).get(name, "")
+    text = text.replace("{examples}", ", ".join(map(str, field.examples or ())))
     words = " ".join(text.split()).removesuffix(".")
     first = words.partition(" ")[0]
     phrase = first.lower() + words[len(first) :] if first.istitle() else words

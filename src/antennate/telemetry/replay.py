@@ -38,8 +38,7 @@ class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
     controller: str | None = number(None, "1", "assumed: the one recorded", examples=[*BUILT_IN])
-    """Open, timed, paper, closed, closed-1, geometric, follow, centre, schedule, zigzag, random,
-    climb, lifted, rhythm, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, in place of the
+    """{examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, in place of the
     recorded."""
 
     readings: str = number(OWN, "1", "assumed: what was recorded", examples=[*KINDS])

@@ -17,7 +17,9 @@ import numpy as np
 from antennate.control.climbing.body import Body, require_pitch
 from antennate.control.climbing.rule import ClimbRule
 from antennate.control.controllers import Rule, RuleController
+from antennate.control.kind import ControllerKind, all_but
 from antennate.control.knowledge import Kind, Knowledge
+from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import (
@@ -173,3 +175,61 @@ def rhythm(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingCont
 def edges(control: ControlParams, robot: RobotSpec, batch: int) -> ClimbingController:
     """`edges`: climbs where a simulation says that there are edges."""
     return ClimbingController(_EdgesRule, control, robot, batch)
+
+
+_CARRY = ("climb.carry_gain", "climb.carry_rate")
+"""What holds a raised head in spite of its load."""
+_RAISED = tuple(
+    f"climb.{name}"
+    for name in (
+        *("rise", "ramp", "before", "over", "settle", "amplitude", "amplitude_rate", "rate"),
+        *("frequency", "ahead", "heading", "feel.highest"),
+    )
+)
+"""What raises a body with its antennae up and keeps its heading, but for `_CARRY`."""
+_ROUND_OF_RHYTHM = tuple(
+    f"climb.{name}" for name in ("walk_time", "retreat_time", "lift_time", "come_time", "pace")
+)
+
+
+KINDS = (
+    ControllerKind(
+        name="climb",
+        about="feels steps and drops with lowered antennae, climbs steps, steers by walls as "
+        "closed",
+        make=climb,
+        reads=(
+            *all_but(ClimbParams, "climb", "lift", "walk_time", "come_time"),
+            *("search", "repetition", "escape.turn_offset"),
+        ),
+        colour="#661100",
+        line=(0, (12, 1.5)),
+        climbs=True,
+    ),
+    ControllerKind(
+        name="lifted",
+        about="blind: walks with its head up, so that it gets on to low steps",
+        make=lifted,
+        reads=("climb.rate", "climb.lift"),
+        colour="#999933",
+        line=(0, (1, 3)),
+        climbs=True,
+    ),
+    ControllerKind(
+        name="rhythm",
+        about="blind: climbs by the clock, as climb does where it feels a step",
+        make=rhythm,
+        reads=(*_RAISED, *_CARRY, *_ROUND_OF_RHYTHM),
+        colour="#44AA99",
+        line=(0, (3, 3)),
+        climbs=True,
+    ),
+    ControllerKind(
+        name="edges",
+        about="climbs at edges that only a simulation can tell it, to show what knowing is worth",
+        make=edges,
+        reads=(*_RAISED, "climb.pace"),
+        needs=_EdgesRule.needs,
+        climbs=True,
+    ),
+)

@@ -9,13 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, field_validator, model_validator
 
 from antennate.control.climbing.body import require_pitch
-from antennate.control.readers import (
-    HARDWARE_ALONE,
-    KEPT_BY_CLIMBERS,
-    unread_by_all,
-    unread_limits,
-    unused,
-)
+from antennate.control.readers import HARDWARE_ALONE, unused
+from antennate.control.registry import KEPT_BY_CLIMBERS, unread_by_all, unread_limits
 from antennate.errors import ConfigError
 from antennate.experiments.climb.grounds import FLAT, FLAT_TIME, USUAL, Terrain
 from antennate.experiments.tunnel.physics import TunnelConfig

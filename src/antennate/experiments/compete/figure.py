@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from antennate import figures as style
 from antennate.control.readings import short_names
+from antennate.control.registry import looks
 from antennate.experiments.compete.experiment import CompeteOutcome
 from antennate.experiments.compete.page import ordered
 from antennate.experiments.compete.scenes import label
@@ -38,7 +39,8 @@ def drawn(result: Mapping[str, Any], rows: Rows) -> dict[str, Figure]:
 def ranks(result: Mapping[str, Any]) -> Figure:
     """Rank and success of each controller with their intervals, a line each."""
     names = ordered(result)
-    colours, short = style.controller_colours(names), style.plain(short_names(names))
+    colours = {name: colour for name, (colour, _) in looks(names).items()}
+    short = style.plain(short_names(names))
     figure = style.canvas(style.WIDTH, 2 * (0.9 + 0.27 * len(names)))
     rank, success = figure.subplots(2, 1)
     for i, name in enumerate(names):
@@ -101,17 +103,17 @@ def profile(rows: Rows, names: Sequence[str]) -> Figure:
     """Share of the draws crossed within a factor of the fastest, a line for each of these names."""
     factors, by_name = profiles(rows)
     shares = {name: by_name[name] for name in names}
-    colours = style.controller_colours(list(shares))
+    drawn = looks(shares)
     short = style.plain(short_names(shares))
     figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()
     for name, share in shares.items():
-        line: Any = style.CONTROLLER_LINES.get(name, "solid")
+        colour, line = drawn[name]
         panel.step(
             factors,
             100.0 * share,
             where="post",
-            color=colours[name],
+            color=colour,
             linestyle=line,
             linewidth=1.5,
             label=short[name],

@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 
 from antennate import figures as style
 from antennate.control.readings import short_names
+from antennate.control.registry import looks
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS
 from antennate.experiments.tunnel.experiment import TunnelOutcome
 from antennate.experiments.tunnel.physics import TrialPath, TrialResult
@@ -225,10 +226,10 @@ def summary(
     figure = style.canvas(style.WIDTH, 2.6 + 2 * (1.0 + 0.4 * len(controllers)))
     heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
     rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
-    colours = style.controller_colours(list(controllers))
+    drawn = looks(controllers)
     short = style.plain(short_names(controllers))
     for i, (name, row) in enumerate(controllers.items()):
-        valid, colour = row["trials"] - row["invalid"], colours[name]
+        valid, (colour, line) = row["trials"] - row["invalid"], drawn[name]
         if not valid:
             continue
         time = row[key if time_limit is None else f"{key}_s"]
@@ -245,7 +246,7 @@ def summary(
             [*(left := 1.0 - np.arange(len(exits) + 1) / valid), left[-1]],
             where="post",
             color=colour,
-            linestyle=style.CONTROLLER_LINES.get(name, "solid"),
+            linestyle=line,
             linewidth=max(1.2, 3.2 - 0.8 * i),
             label=short[name],
         )

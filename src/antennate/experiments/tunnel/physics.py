@@ -17,12 +17,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from antennate.control.knowledge import KNOWABLE, Kind
-from antennate.control.readers import (
-    HARDWARE_ALONE,
-    KEPT_BY_CLIMBERS,
-    unread_by_all,
-    unread_limits,
-)
+from antennate.control.readers import HARDWARE_ALONE
 from antennate.control.readings import (
     KINDS,
     OWN,
@@ -31,7 +26,15 @@ from antennate.control.readings import (
     condition,
     require_whole_delay,
 )
-from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED, USUAL
+from antennate.control.registry import (
+    BUILT_IN,
+    CONTROLLERS,
+    KEPT_BY_CLIMBERS,
+    PRIVILEGED,
+    USUAL,
+    unread_by_all,
+    unread_limits,
+)
 from antennate.errors import SceneError
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
@@ -70,9 +73,8 @@ class TunnelConfig(TrialConfig):
         min_length=1,
         examples=[*BUILT_IN, *PRIVILEGED],
     )
-    """Controllers to run: open, timed, paper, closed, closed-1, geometric, follow, centre,
-    schedule, zigzag, random, climb, lifted, rhythm, map, edges, MODULE:NAME or FILE.py:NAME of your
-    own, or FILE.onnx, a learned policy."""
+    """Controllers to run: {examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a
+    learned policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from antennate.control.loop import Retunable
-from antennate.control.readers import unread
+from antennate.control.registry import unread
 from antennate.errors import ConfigError
 from antennate.messages import one_line
 from antennate.params.base import Params, from_values

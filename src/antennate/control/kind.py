@@ -1,0 +1,91 @@
+"""Controller with a name as one object: what it does, reads and needs, how it is made and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+from antennate.control.knowledge import Kind
+from antennate.params.base import Params, paths_of
+from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Controller
+
+ControllerFactory = Callable[[ControlParams, RobotSpec, int], Controller]
+"""Makes a controller of B robots. A class whose `__init__` takes these three is one."""
+
+Reads = tuple[str, ...] | Callable[[ControlParams, Collection[str]], tuple[str, ...]]
+"""Parameters of the control, dotted, or groups of them; a function where they depend on others, and
+on what a simulation tells the controller."""
+
+_SWEEP = tuple(f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency"))
+"""How the gait moves the bases; controllers that climb move them themselves."""
+_SHARED = tuple(
+    path
+    for path in paths_of(ControlParams)
+    if path.split(".")[0] in ("rate", "gait", "conditioning", "conditioning_right")
+    or path in ("rule.threshold", "rule.hysteresis")
+)
+
+
+@dataclass(frozen=True)
+class ControllerKind:
+    """Controller with a name. The module of a controller lists its kinds as `KINDS`.
+
+    One may be named wherever a controller is, as any factory, in a file of one's own too.
+
+    Attributes:
+        name: Its name.
+        about: What it does, for somebody who meets it for the first time.
+        make: Makes it of (control, robot, batch).
+        reads: Parameters of the control that it reads: of ours, others are refused. All read the
+            rate, the conditioning, the rule's threshold and hysteresis, and the gait but for
+            `turn_offset`. One of a user's own may read all, whatever stands here.
+        colour: Its colour in figures, #RRGGBB; empty takes one that no other has.
+        line: Its line in figures, as matplotlib takes it: a second mark, for print in grey.
+        needs: What it cannot do without, and only a simulation knows.
+        climbs: Whether it raises links and antennae of the robot.
+    """
+
+    name: str
+    about: str
+    make: ControllerFactory
+    reads: Reads = ()
+    colour: str = ""
+    line: Any = "solid"
+    needs: tuple[Kind, ...] = ()
+    climbs: bool = False
+
+    def __call__(self, control: ControlParams, robot: RobotSpec, batch: int) -> Controller:
+        """The controller of `batch` robots."""
+        return self.make(control, robot, batch)
+
+
+def unread_of(
+    reads: Reads, climbs: bool, control: ControlParams, knows: Collection[str] = ()
+) -> set[str]:
+    """Parameters of the control, dotted, that are neither read by all nor among `reads`.
+
+    Args:
+        reads: Those that a controller reads.
+        climbs: Whether it climbs.
+        control: All numbers of the control.
+        knows: What a simulation tells it; a robot tells nothing.
+    """
+    own = reads if isinstance(reads, tuple) else reads(control, knows)
+    apart = {"gait.turn_offset", *(_SWEEP if climbs else ())}
+    read = {*own, *(path for path in _SHARED if path not in apart)}
+    return {path for path in paths_of(ControlParams) if not read & {path, *_groups(path)}}
+
+
+def all_but(model: type[Params], group: str, *names: str) -> tuple[str, ...]:
+    """Parameters of a group, dotted, but for some names in it."""
+    left_out = {f"{group}.{name}" for name in names}
+    return tuple(path for path in paths_of(model, group) if path not in left_out)
+
+
+def _groups(path: str) -> list[str]:
+    """Groups around a parameter."""
+    parts = path.split(".")[:-1]
+    return [".".join(parts[: i + 1]) for i in range(len(parts))]
