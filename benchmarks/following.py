@@ -23,8 +23,9 @@ from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
+from antennate.sim.judge import LOOK_EVERY, time_limit_of
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
+from antennate.sim.trial import draw_trial, scene_of
 from antennate.types import AntennaFrame, Controller, JointCommand
 
 

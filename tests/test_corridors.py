@@ -19,19 +19,18 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.scene import CorridorsParams, VariationParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.judge import Judge, time_limit_of
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.geometry import Arm, Plan, Room
 from antennate.sim.scenes.registry import HARD, SHIPPED, make_scene
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.trial import (
-    Judge,
     TrialConfig,
     draw_scene,
     draw_trial,
     make_world,
     scene_of,
-    time_limit_of,
     variation_of,
 )
 from antennate.sim.warp.robot import PaddedTunnels

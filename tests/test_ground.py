@@ -18,11 +18,12 @@ from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.judge import Judge
 from antennate.sim.places import HEIGHT_LIMIT
 from antennate.sim.scenes.ground import Edge, Ground, GroundScene
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import FlatScene
-from antennate.sim.trial import Judge, draw_trial, make_world, place_at_start, scene_of
+from antennate.sim.trial import draw_trial, make_world, place_at_start, scene_of
 from antennate.sim.world import World, new_spec
 from antennate.testing import check_scene
 from antennate.types import Floats

@@ -12,11 +12,11 @@ import pytest
 from antennate.errors import SceneError
 from antennate.params.scene import TunnelParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.judge import Judge
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.scene import Route, SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel, TunnelScene
-from antennate.sim.trial import Judge
 from antennate.types import Floats
 
 LOOK = 0.01

@@ -29,8 +29,9 @@ from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.port import Port
+from antennate.sim.judge import LOOK_EVERY, time_limit_of
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import LOOK_EVERY, draw_trial, scene_of, time_limit_of
+from antennate.sim.trial import draw_trial, scene_of
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot

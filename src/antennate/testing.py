@@ -18,8 +18,9 @@ from antennate.params.gaits import GaitParams
 from antennate.params.scene import GRAVITY, PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
+from antennate.sim.judge import Judge
 from antennate.sim.scenes.scene import Scene, SceneInstance
-from antennate.sim.trial import MEMBERS, Judge, make_world, place_at_start, require_room
+from antennate.sim.trial import MEMBERS, make_world, place_at_start, require_room
 from antennate.sim.world import World, compile_world
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver, joint_angles
 

@@ -20,21 +20,10 @@ from antennate.envs.config import EnvConfig, Randomisation, varied
 from antennate.envs.reward import terms_of
 from antennate.envs.truth import OUTCOMES, Truth, replace_rows
 from antennate.errors import SceneError
+from antennate.sim.judge import LOOK_EVERY, Judge, Outcome, progress_of, time_limit_of
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import (
-    LOOK_EVERY,
-    Judge,
-    Outcome,
-    Trial,
-    draw_trial,
-    in_time,
-    mishap,
-    progress_of,
-    require_room,
-    scene_of,
-    time_limit_of,
-)
+from antennate.sim.trial import Trial, draw_trial, require_room, scene_of
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Bools, Floats, Ints
 
@@ -224,7 +213,7 @@ class Episodes:
                 continue
             self._body.load(row, trial.world, trial.chance)
             self._gains[row], self._offsets[row], self._limits[row] = gains, offsets, limit
-            judge = Judge(trial.scene)
+            judge = Judge(trial.scene, limit, on_its_back=True)
             self._episodes[row] = Episode(seed, number, trial.scene, judge, progress)
             return trial.phase
         raise SceneError(
@@ -255,14 +244,10 @@ class Episodes:
 
     def _look(self, row: int, episode: Episode) -> tuple[Outcome | None, str]:
         """How the episode of a row has ended, None if it goes on, and why it is invalid."""
-        world = self._body.world(row)
         try:
-            outcome = episode.judge.look(world.head[:2])
+            return episode.judge.watch(self._body.world(row), float(self._t[row])), ""
         except SceneError as error:
             return "invalid", str(error)
-        outcome = outcome or mishap(episode.scene, world)
-        outcome = outcome or ("overturned" if world.overturned else None)
-        return in_time(outcome, float(self._t[row]), float(self._limits[row])), ""
 
     def _end(self, row: int, truth: Truth, outcome: Outcome, reason: str) -> None:
         """Note how the episode of a row ended, and empty the row."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from numbers import Real
-from typing import Any, Literal, Protocol
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -15,7 +13,6 @@ from pydantic import field_validator, model_validator
 from antennate.control.gait import targets
 from antennate.control.readers import unused
 from antennate.errors import AntennateError, ConfigError, SceneError, raised
-from antennate.messages import shortened
 from antennate.params.base import Params, changes, from_values, number, paths_of
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
@@ -28,23 +25,14 @@ from antennate.params.scene import (
 )
 from antennate.robots.antenna import require_own_curve
 from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.geometry import crossing
 from antennate.sim.scenes.ground import READS
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
-from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
+from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
 from antennate.sim.world import World, compile_world
-from antennate.types import Floats
 
-Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
-"""How a trial ends."""
-LOOK_EVERY = 10
-"""Ticks between two looks at a trial: 10 Hz at the usual rate."""
 MOST_OVERLAP = 0.005
 """Deepest that the robot may be in an obstacle at the start [m]: legs stand on edges."""
-FALL = 0.175
-"""How far a link has fallen that is lower than the ground at the start [m] (assumed: half the depth
-of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
 MEMBERS = ("start", "length", "exit", "build", "progress", "left")
 """What a SceneInstance has."""
 
@@ -110,22 +98,6 @@ def scene_of(config: TrialConfig) -> Scene:
         SceneError: The file cannot be used, or the constructor failed.
     """
     return make_scene(config.scene, config.tunnel, config.corridors, config.ground)
-
-
-def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
-    """Time after which a trial has failed [s]: the one that is wanted, or else the scene's own.
-
-    Raises:
-        SceneError: That of the scene is no time.
-    """
-    if wanted is not None:
-        return wanted
-    limit = getattr(scene, "time_limit", TIME_LIMIT)
-    if not _is_finite(limit) or limit <= 0:
-        raise SceneError(
-            f"scene: expected time_limit to be a time above 0 s, found {shortened(repr(limit))}"
-        )
-    return float(limit)
 
 
 def require_own_curves(robot: RobotSpec, control: ControlParams) -> None:
@@ -261,141 +233,6 @@ def _errors_of(name: str) -> Iterator[None]:
         raise
     except BaseException as error:  # SystemExit too
         raise SceneError(f"scene {name!r} failed: {raised(error)}") from error
-
-
-class Walker(Protocol):
-    """A robot in its scene, on the CPU or in a batch on a device."""
-
-    @property
-    def overturned(self) -> bool:
-        """Whether the undersides of most links point up."""
-        ...
-
-    def link_places(self) -> Floats:
-        """Positions of the links, head first [m], shape (L, 3)."""
-        ...
-
-
-def progress_of(scene: SceneInstance, head: Floats) -> float:
-    """What a scene says of how far a head at this position, shape (2,), has come [m].
-
-    Raises:
-        SceneError: It raises an exception, or does not say a finite number.
-    """
-    return _answer(scene, "progress", head, "a finite number [m]", _is_finite)
-
-
-class Judge:
-    """Says how a trial ends in its scene, from one look at the head to the next.
-
-    The head succeeds when it crosses the exit between its ends, outwards and from inside: who went
-    round and came in there has to go out twice. A scene with a rule of its own, `succeeded(head)`,
-    is asked instead.
-
-    Args:
-        scene: The scene of the trial.
-    """
-
-    def __init__(self, scene: SceneInstance) -> None:
-        self._scene = scene
-        self._head: Floats = np.array(scene.start[:2], float)
-        self._crossings = 0
-
-    def look(self, head: Floats) -> Literal["success", "left"] | None:
-        """How the trial has ended with the head at this position, shape (2,); None if it goes on.
-
-        Raises:
-            SceneError: The scene raises an exception, or does not say True or False.
-        """
-        if self._succeeded(head):
-            return "success"
-        return "left" if _answer(self._scene, "left", head, "True or False", _is_bool) else None
-
-    def _succeeded(self, head: Floats) -> bool:
-        if hasattr(self._scene, "succeeded"):
-            return bool(_answer(self._scene, "succeeded", head, "True or False", _is_bool))
-        before, self._head = self._head, head.copy()
-        self._crossings += crossing(_exit_of(self._scene), before, head)
-        return self._crossings > 0
-
-
-def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
-    """How a trial ends at time t [s], of which a look says this; None if it goes on.
-
-    At its limit [s] it ends as `late`, and so does what is seen after it; a table has whole µs.
-    """
-    if outcome is not None:
-        return outcome if round(t, 6) <= limit else late
-    return late if t >= limit else None
-
-
-def require_times(time: float, limit: float, close: float = 0.0) -> None:
-    """Check that a row can have this time and this time limit [s], but for an error of `close` [s].
-
-    Raises:
-        ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.
-    """
-    if not 0.0 < limit < math.inf:
-        raise ValueError(f"limit_s: expected a finite number above 0, found {limit}")
-    if not 0.0 <= time <= limit + close:
-        raise ValueError(
-            f"time_s: expected a finite number of 0 to limit_s, {limit:g}, found {time}"
-        )
-
-
-def has_fallen(links: Floats, ground: float) -> bool:
-    """Whether the centre of any link is lower than the ground at the start by more than FALL.
-
-    Args:
-        links: Places of the links [m], shape (L, 3).
-        ground: Height of that ground [m].
-    """
-    return bool(links[:, 2].min() < ground - FALL)
-
-
-def mishap(scene: SceneInstance, world: Walker) -> Literal["overturned", "fell"] | None:
-    """What ends a trial on ground that is not flat: a robot on its back, or a fall."""
-    ground = getattr(scene, "ground", None)
-    if ground is None:
-        return None
-    if world.overturned:
-        return "overturned"
-    return "fell" if has_fallen(world.link_places(), float(ground)) else None
-
-
-def _exit_of(scene: SceneInstance) -> Floats:
-    try:
-        line = np.asarray(scene.exit, float)
-    except Exception as error:
-        raise SceneError(f"scene: exit raised {raised(error)}") from error
-    if line.shape != (2, 2) or not np.isfinite(line).all():
-        raise SceneError(
-            "scene: expected exit to be two points, finite, shape (2, 2) [m], found "
-            f"{shortened(repr(line.tolist()))}"
-        )
-    return line
-
-
-def _answer(
-    scene: SceneInstance, name: str, head: Floats, wanted: str, fits: Callable[[Any], bool]
-) -> Any:
-    try:
-        answer = getattr(scene, name)(head.copy())
-    except Exception as error:
-        raise SceneError(f"scene: {name} raised {raised(error)}") from error
-    if not fits(answer):
-        raise SceneError(
-            f"scene: expected {name} to return {wanted}, found {shortened(repr(answer))}"
-        )
-    return answer
-
-
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, Real) and math.isfinite(value)
-
-
-def _is_bool(value: Any) -> bool:
-    return isinstance(value, bool | np.bool_)
 
 
 def require_room(world: World) -> None:

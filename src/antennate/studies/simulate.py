@@ -16,19 +16,15 @@ from antennate.errors import ConfigError, ControllerError
 from antennate.params.base import from_values
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.judge import LOOK_EVERY, Judge, time_limit_of
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
-    LOOK_EVERY,
-    Judge,
     Trial,
     TrialConfig,
     draw_trial,
-    in_time,
-    mishap,
     require_own_curves,
     require_room,
     scene_of,
-    time_limit_of,
 )
 from antennate.telemetry.header import Header
 from antennate.telemetry.simulated import Decisions, SimulatedLog
@@ -154,7 +150,7 @@ class _Walk:
         self.decisions = Decisions(spec, self.checked)
         self.log: SimulatedLog | None = None
         self.outcome = "timeout"
-        self._ticks, self._judge = 0, Judge(start.scene)
+        self._ticks, self._judge = 0, Judge(start.scene, time_limit)
 
     def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
         """Keep a tick; whether there is a next one."""
@@ -169,7 +165,6 @@ class _Walk:
             return False
         world, limit, ended = self._start.world, self._time_limit, None
         if world.t >= limit or self._ticks % LOOK_EVERY == 0:
-            seen = self._judge.look(world.head[:2]) or mishap(self._start.scene, world)
-            ended = in_time(seen, world.t, limit)
+            ended = self._judge.watch(world, world.t)
         self.outcome = ended or "timeout"
         return ended is None

@@ -10,17 +10,10 @@ from antennate.params.base import Params, number, paths_of
 from antennate.params.gaits import GaitParams, LiftParams
 from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
+from antennate.sim.judge import LOOK_EVERY, Judge, progress_of
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import (
-    LOOK_EVERY,
-    Judge,
-    TrialConfig,
-    draw_trial,
-    progress_of,
-    require_room,
-    scene_of,
-)
+from antennate.sim.trial import TrialConfig, draw_trial, require_room, scene_of
 from antennate.sim.world import World
 from antennate.twin.board import TouchStimulus
 from antennate.twin.robot import TwinRobot

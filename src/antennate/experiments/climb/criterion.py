@@ -8,8 +8,8 @@ from antennate.control.climbing.rule import Ground as Felt
 from antennate.experiments.climb.config import CLIFF, LEVEL, Cell
 from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.sensing import Verdict
+from antennate.sim.judge import Judge, has_fallen, in_time
 from antennate.sim.scenes.scene import SceneInstance
-from antennate.sim.trial import Judge, has_fallen, in_time
 from antennate.sim.world import World
 from antennate.types import Floats
 

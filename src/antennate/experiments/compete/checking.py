@@ -22,7 +22,7 @@ from antennate.files import read_limited
 from antennate.messages import nearest, shown
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
-from antennate.sim.trial import require_times
+from antennate.sim.judge import require_times
 from antennate.studies.statistics import sign_flips, signed_rank
 from antennate.types import Floats
 

@@ -23,8 +23,9 @@ from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult
+from antennate.sim.judge import Outcome, time_limit_of
 from antennate.sim.scenes.scene import TIME_LIMIT
-from antennate.sim.trial import Outcome, draw_scene, scene_of, time_limit_of
+from antennate.sim.trial import draw_scene, scene_of
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 from antennate.types import Controller

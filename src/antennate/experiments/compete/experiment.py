@@ -30,8 +30,9 @@ from antennate.experiments.compete.scenes import require_different_scenes, tunne
 from antennate.experiments.compete.standings import CONTROLLER, none_valid, standings
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
+from antennate.sim.judge import time_limit_of
 from antennate.sim.knowledge import require_route
-from antennate.sim.trial import check_start, draw_scene, scene_of, time_limit_of
+from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
 from antennate.studies.run_files import span

@@ -20,16 +20,11 @@ from antennate.experiments.tunnel.physics import (
     TrialResult,
     TunnelConfig,
 )
+from antennate.sim.judge import LOOK_EVERY, time_limit_of
 from antennate.sim.knowledge import Truths, require_route
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene, SceneInstance
 from antennate.sim.sim_robot import SimRobot
-from antennate.sim.trial import (
-    LOOK_EVERY,
-    draw_trial,
-    require_room,
-    scene_of,
-    time_limit_of,
-)
+from antennate.sim.trial import draw_trial, require_room, scene_of
 from antennate.sim.world import World
 from antennate.telemetry.header import Header, log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog

@@ -38,18 +38,10 @@ from antennate.control.registry import (
 from antennate.errors import SceneError
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
+from antennate.sim.judge import Judge, Outcome, progress_of, require_times
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
-from antennate.sim.trial import (
-    Judge,
-    Outcome,
-    TrialConfig,
-    in_time,
-    mishap,
-    progress_of,
-    require_own_curves,
-    require_times,
-)
+from antennate.sim.trial import TrialConfig, require_own_curves
 from antennate.sim.world import World
 from antennate.types import Floats, Ints, Maneuver
 
@@ -255,7 +247,7 @@ class TrialMonitor:
     _offsets: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
 
     def __post_init__(self) -> None:
-        self._judge = Judge(self.scene)
+        self._judge = Judge(self.scene, self.time_limit)
 
     def bend(self, world: Watched) -> None:
         """Note how the antennae are bent."""
@@ -274,7 +266,7 @@ class TrialMonitor:
         progress = progress_of(self.scene, head)
         self._note_progress(progress, t)
         self._note_offset(progress, head)
-        return in_time(self._judge.look(head) or mishap(self.scene, world), t, self.time_limit)
+        return self._judge.watch(world, t)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
