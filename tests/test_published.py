@@ -1,5 +1,6 @@
 """What the paper's statements leave of ranges: docs/science/published.py."""
 
+import csv
 import importlib.util
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antennate.cli import main
 from antennate.experiments.study.config import StudyConfig
 
 FOLDER = Path(__file__).parents[1] / "docs" / "science"
@@ -64,10 +66,10 @@ def test_a_setting_and_its_shares(published):
         }
     )
     values = {"a.even": 3.0, "a.log": 0.1, "a.whole": 3, "a.choice": True, "a.word": "off"}
-    shares = unknowns.shares(values | {"a.pair": [1.4, 0.8]})
+    shares = unknowns.shares(values | {"a.pair": [1.4, 0.8]}, "here")
     assert shares == pytest.approx([0.5, 0.5, 1.0, 1.0, 0.5, 1.0, 0.0])
     draws = published.prior(unknowns, 4000, 3)
-    assert np.allclose(draws.x[7], unknowns.shares(draws.setting(7)))
+    assert np.allclose(draws.x[7], unknowns.shares(draws.setting(7), "here"))
     assert np.allclose(draws.x.mean(axis=0)[:5], 0.5, atol=0.03)
     assert set(map(str, (draws.setting(k)["a.pair"] for k in range(50)))) == {
         "[0.8, 0.8]",
@@ -237,26 +239,66 @@ def test_the_page_tells_what_the_rows_of_the_tunnel_say(published):
         assert f"{a} of {n} | {b} of {m} |" in page
 
 
-def test_a_clock_is_searched_in_the_setting_of_a_file(tmp_path):
-    run = part("tune", "tunnel", FOLDER / "published_tunnel_slow.toml", "--controller", "timed")
+@pytest.mark.parametrize("controller", ["timed", "schedule", "paper"])
+def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path, capsys):
+    slow = FOLDER / "published_tunnel_slow.toml"
+    run = part("tune", "tunnel", slow, "--controller", controller, "--trials", "1")
     assert run.returncode == 0, run.stderr
-    design = tomllib.loads(run.stdout)
-    asked = design["evaluate"]["tunnel"]["settings"]
-    assert asked["controllers"] == ["timed"]
+    asked = tomllib.loads(run.stdout)["evaluate"]["tunnel"]["settings"]
+    assert asked["controllers"] == [controller]
     assert asked["tunnel"]["turns_deg"] == [75.0]
-    assert "timed.walk_time" in design["search"]
+    pytest.importorskip("optuna")
+    file, out = tmp_path / "tune.toml", tmp_path / "run"
+    file.write_text(f"{run.stdout}\ntime_limit = 1.0\n")
+    words = f"study design {file} --proposals 1 --validated 0 --no-figures --out {out}"
+    assert main([*words.split(), "--workers", "1"]) in (0, 2)  # no trial ends within a second
+    said = capsys.readouterr()
+    assert (out / "trials.csv").exists(), said.err
 
 
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["tune", "tunnel"], "tune: expected the group tunnel and one file"),
+        (["tune", "tunnel"], "the following arguments are required: files"),
+        (["tune", "wall", "x"], "argument group: invalid choice: 'wall'"),
+        (["tune", "tunnel", "none.toml"], "none.toml: No such file"),
         (["recover", "wall", "one"], "recover: expected a folder of hidden settings, then"),
-        (["hidden", "tunnel", "--count", "0"], "--count and --trials: expected at least 1"),
+        (["hidden", "tunnel", "--count", "0"], "argument --count: expected at least 1, found 0"),
+        (["next", "wall", "--power", "-5"], "--power: expected a number above 0, at most 1000"),
+        (["next", "wall", "--near", "3", "--only", "x"], "--only: expected some of stiff jams, "),
+        (["best", "wall", "--only", "x"], "unrecognized arguments: --only x"),
     ],
 )
 def test_parts_that_lack_something_say_so(words, line):
     run = part(*words)
     assert run.returncode == 2
     assert line in run.stderr
-    assert "Traceback" not in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "line"),
+    [
+        ("hinge_max_deg", "nan", "hinge_max_deg: expected a finite number, found 'nan'"),
+        ("outcome", "jammed", "outcome: expected one of success, jam, slip, invalid, found 'jam"),
+        ("antenna.range", "99", "antenna.range: expected 0.5 to 1.6, found 99"),
+        ("antenna.link_mass", "", "antenna.link_mass: expected a finite number, found ''"),
+        ("wall.gravity", "sideways", "wall.gravity: expected one of ['down', 'off', 'up']"),
+    ],
+)
+def test_a_cell_that_cannot_be_is_told_with_its_line(column, cell, line, tmp_path):
+    with (FOLDER / "published_wall.csv").open(newline="") as file:
+        rows = [row for _, row in zip(range(6), csv.DictReader(file), strict=False)]
+    rows[2][column] = cell  # of the descending antenna
+    rows[0][column] = cell if column != "hinge_max_deg" else rows[0][column]
+    rows[1] |= {column: rows[0][column]} if column in list(rows[0])[2:13] else {}
+    table = tmp_path / "rows.csv"
+    with table.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    run = part("best", "wall", table)
+    assert run.returncode == 2
+    assert line in run.stderr
+    assert ", line " in run.stderr
+    assert run.stderr.count("\n") == 1

@@ -1,14 +1,14 @@
 """Weighs settings by what the paper says: `python docs/science/published.py PART GROUP FILE...`.
 
 Parts, over folders of `antennate study studies/published_GROUP.toml` or of later stages: `weigh`
-fits the outcome over the unknowns, and writes what is left of their ranges to
+fits the outcome over the unknowns, and tells what is left of their ranges; with `--write` it is
 docs/science/published_GROUP.json and figures. `hidden` prints a study of hidden settings;
 `recover` weighs by what came out there, the first folder, and asks whether they are found. `next`
 prints a study of settings drawn from what is left, or searched by some of the statements. `best`
-names the likeliest settings by their own trials, and writes the first to published_GROUP_best.toml
-there. `tune` prints a search of the published rule or of a clock in the setting of a file. `rows`
-keeps the rows of folders as one table. Needs `uv run --with scikit-learn`. The likelihoods are
-those of docs/science/published.md.
+names the likeliest settings by their own trials; with `--write` the first is
+docs/science/published_GROUP_best.toml. `tune` prints a search of the published rule or of a clock
+in the setting of a file. `rows` keeps the rows of folders as docs/science/published_GROUP.csv.
+Needs `uv run --with scikit-learn`. The likelihoods are those of docs/science/published.md.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from numpy.typing import NDArray
 from published_figures import marginals, screening, trade
 from scipy.stats import binom, norm
 
+from antennate.control.registry import unread
 from antennate.figures import render
+from antennate.params.control import ControlParams
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, str]
@@ -65,9 +67,14 @@ HIDDEN = 20261130
 """Seed of hidden settings."""
 
 
+def say(text: str) -> None:
+    """Say one line beside what is printed."""
+    sys.stderr.write(f"published.py: {text}\n")
+
+
 def refuse(text: str) -> NoReturn:
     """End with one line and exit code 2."""
-    sys.stderr.write(f"published.py: {text}\n")
+    say(text)
     raise SystemExit(2)
 
 
@@ -155,6 +162,8 @@ class Group:
         all: Who has to be there.
         outcomes: What the paper speaks of, from the rows of all; NaN where a trial does not tell.
         paper: What it says of each.
+        columns: What is read of a row.
+        ends: How a trial may end; empty where that is not read.
         told: Status of rows that are read.
     """
 
@@ -162,7 +171,20 @@ class Group:
     all: tuple[str, ...]
     outcomes: Mapping[str, Callable[[Mapping[str, Row]], float]]
     paper: Mapping[str, Statement]
+    columns: tuple[str, ...]
+    ends: tuple[str, ...] = ()
     told: tuple[str, ...] = ("ok",)
+
+
+def number_in(row: Row, column: str) -> float:
+    """A finite number of a row."""
+    try:
+        number = float(row[column])
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        refuse(f"{row['place']}: {column}: expected a finite number, found {row[column]!r}")
+    return number
 
 
 def _crossed(name: str) -> Callable[[Mapping[str, Row]], float]:
@@ -174,7 +196,7 @@ def _speed(name: str) -> Callable[[Mapping[str, Row]], float]:
         row = rows[name]
         if row["outcome"] != "success":
             return math.nan
-        return math.log(float(row["progress_m"]) / float(row["time_s"]))
+        return math.log(number_in(row, "progress_m") / number_in(row, "time_s"))
 
     return logarithm
 
@@ -183,7 +205,7 @@ def _nearer(rows: Mapping[str, Row]) -> float:
     pair = rows["paper"], rows["open"]
     if any(row["outcome"] != "success" for row in pair):
         return math.nan
-    ours, without = (float(row["offset_m"]) for row in pair)
+    ours, without = (number_in(row, "offset_m") for row in pair)
     return float(ours < without)
 
 
@@ -192,7 +214,7 @@ def _ended(name: str, outcome: str) -> Callable[[Mapping[str, Row]], float]:
 
 
 def _below(name: str, degrees: float) -> Callable[[Mapping[str, Row]], float]:
-    return lambda rows: float(float(rows[name]["hinge_max_deg"]) < degrees)
+    return lambda rows: float(number_in(rows[name], "hinge_max_deg") < degrees)
 
 
 def _calibrated(rows: Mapping[str, Row]) -> float:
@@ -204,7 +226,9 @@ def _number(of: Callable[[Callable[[str], float]], float]) -> Callable[[Mapping[
 
     def number(rows: Mapping[str, Row]) -> float:
         row = rows["calibrate"]
-        return of(lambda name: float(row[f"calibration.{name}"])) if _calibrated(rows) else math.nan
+        if not _calibrated(rows):
+            return math.nan
+        return of(lambda name: number_in(row, f"calibration.{name}"))
 
     return number
 
@@ -241,6 +265,8 @@ GROUPS = {
             "speed of paper": Mean(0.12, 10),
             "centred": AtLeast(1, 1),
         },
+        columns=("outcome", "time_s", "progress_m", "offset_m"),
+        ends=("success", "timeout", "left", "overturned", "fell", "invalid"),
     ),
     "wall": Group(
         "profile",
@@ -257,6 +283,8 @@ GROUPS = {
             "descending passes": AtLeast(17, 20),
             "springs below 30 deg": AtLeast(20, 20),
         },
+        columns=("outcome", "hinge_max_deg"),
+        ends=("success", "jam", "slip", "invalid"),
     ),
     "calibration": Group(
         "command",
@@ -275,6 +303,11 @@ GROUPS = {
             "one curve": Near(0.0, 0.2, below=True),
             "sigmoid": Near(0.0, 0.05, below=True),
         },
+        columns=(
+            *("calibration.slope", "calibration.midpoint"),
+            *(f"calibration.speeds.{k}.r2" for k in range(3)),
+            *(f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")),
+        ),
         told=("ok", "failed"),
     ),
 }
@@ -321,16 +354,21 @@ class Unknowns:
                 found.append((str(axis[0]).lower(), str(axis[-1]).lower()))
         return found
 
-    def shares(self, values: Mapping[str, Any]) -> list[float]:
-        """A setting as numbers from 0 to 1, one a name."""
+    def shares(self, values: Mapping[str, Any], place: str) -> list[float]:
+        """A setting, as it stands at a place, as numbers from 0 to 1, one a name."""
         found: list[float] = []
         for name, axis in self.axes.items():
             value = values[name]
             if isinstance(axis, list):
                 if value not in axis:
-                    refuse(f"{name}: expected one of {axis}, found {value}")
+                    refuse(f"{place}: {name}: expected one of {axis}, found {value}")
                 found += _choices(axis)[axis.index(value)].tolist()
-            elif axis.get("log"):
+                continue
+            low, high = axis["low"], axis["high"]
+            close = 1e-5 * max(abs(low), abs(high))  # kept rows have six digits
+            if not low - close <= value <= high + close:
+                refuse(f"{place}: {name}: expected {low:g} to {high:g}, found {value}")
+            if axis.get("log"):
                 found.append(math.log(value / axis["low"]) / math.log(axis["high"] / axis["low"]))
             else:
                 found.append((value - axis["low"]) / (axis["high"] - axis["low"]))
@@ -406,40 +444,54 @@ class Rows:
     points: NDArray[np.int64]
 
 
-def lines(files: Iterable[Path], names: Iterable[str]) -> Iterable[dict[str, str]]:
-    """Rows of tables of studies; one point is one setting, whichever stages walked it."""
+def lines(files: Iterable[Path], names: Sequence[str], group: Group) -> Iterable[dict[str, str]]:
+    """Rows of tables of studies; one point is one setting, whichever stages walked it.
+
+    A row has its place in the files as `place`.
+    """
     points: dict[tuple[str, ...], int] = {}
     for file in files:
         path = file / "trials.csv" if file.is_dir() else file
         if not path.is_file():
             refuse(f"{path}: expected the rows of a study, found no such file")
         with path.open(encoding="utf-8", newline="") as table:
-            for row in csv.DictReader(table):
-                if missing := [name for name in names if name not in row]:
-                    refuse(f"{path}: expected a column {missing[0]}, found none")
+            rows = csv.DictReader(table)
+            wanted = (*names, group.who, "status", *group.columns)
+            if missing := [name for name in wanted if name not in (rows.fieldnames or ())]:
+                refuse(f"{path}: expected a column {missing[0]}, found none")
+            for row in rows:
+                if None in row or None in row.values():
+                    refuse(f"{path}, line {rows.line_num}: expected a cell for each column")
                 setting = tuple(_short(row[name]) for name in names)
-                yield row | {"point": str(points.setdefault(setting, len(points)))}
+                yield row | {
+                    "point": str(points.setdefault(setting, len(points))),
+                    "place": f"{path}, line {rows.line_num}",
+                }
 
 
 def read(files: Sequence[Path], group: Group, unknowns: Unknowns) -> Rows:
     """Trials that ended, of all of a group.
 
     Raises:
-        SystemExit: There are none, or an unknown has no column.
+        SystemExit: There are none, or a row has a cell that cannot be.
     """
     found: dict[tuple[str, ...], dict[str, dict[str, str]]] = {}
-    for row in lines(files, unknowns.axes):
+    for row in lines(files, [*unknowns.axes], group):
         if row["status"] in group.told:
+            if group.ends and row["outcome"] not in group.ends:
+                ends = ", ".join(group.ends)
+                refuse(f"{row['place']}: outcome: expected one of {ends}, found {row['outcome']!r}")
             who = row[group.who] or group.all[0]  # a trial that failed has no columns
             scene = row["point"], row.get("seed", ""), row.get("trial", "")
             found.setdefault(scene, {})[who] = row
     whole = {key: rows for key, rows in found.items() if set(group.all) <= set(rows)}
     if not whole:
         refuse(f"{files[0]}: expected trials of {', '.join(group.all)}, found none")
+    if few := len(found) - len(whole):
+        say(f"{few} of {len(found)} trials lack a row of {' or '.join(group.all)}: left out")
+    firsts = [rows[group.all[0]] for rows in whole.values()]
     return Rows(
-        np.array(
-            [unknowns.shares(_values(unknowns, rows[group.all[0]])) for rows in whole.values()]
-        ),
+        np.array([unknowns.shares(_values(unknowns, row), row["place"]) for row in firsts]),
         {
             name: np.array([of(rows) for rows in whole.values()])
             for name, of in group.outcomes.items()
@@ -460,7 +512,7 @@ def _values(unknowns: Unknowns, row: Mapping[str, str]) -> dict[str, Any]:
         elif isinstance(axis, list) and isinstance(axis[0], str):
             found[name] = text
         else:
-            found[name] = int(text) if text.isdigit() else float(text)
+            found[name] = int(text) if text.isdigit() else number_in(row, name)
     return found
 
 
@@ -734,8 +786,8 @@ def effects_of(rows: Rows, names: Sequence[str]) -> dict[str, dict[str, list[flo
     return found
 
 
-def weigh(name: str, files: Sequence[Path]) -> None:
-    """Write what the paper's data leave of the ranges."""
+def weigh(name: str, files: Sequence[Path], write: bool) -> None:
+    """Tell what the paper's data leave of the ranges, and perhaps write it."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
     outcome = Outcome.of(rows, group)
@@ -765,24 +817,21 @@ def weigh(name: str, files: Sequence[Path]) -> None:
         },
         "left": left_of(unknowns.names, x, weights),
     }
-    ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
     narrowed = {n: f for n, f in result["left"].items() if f["narrowed"] > NARROWED}
     these = [k for k, n in enumerate(unknowns.names) if n in narrowed]
     result["pairs"] = pairs_of([unknowns.names[k] for k in these], x[:, these], weights, PAIRS)
-    figures = {
-        "": marginals(narrowed, ends),
-        "-screening": screening(result["effects"]),
-    }
-    if name == "tunnel":
-        figures["-trade"] = trade(
-            traded(rows), [(a / n, b / m) for a, n, b, m in judged().values()]
-        )
-    for kind, drawn in figures.items():
-        image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
-        image.write_bytes(render(drawn)["png"])
-    text = json.dumps(result, indent=1)
-    (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
-    print(f"written: docs/science/published_{name}.json and its figures in docs/images")
+    if write:
+        ends = dict(zip(unknowns.names, unknowns.ends, strict=True))
+        figures = {"": marginals(narrowed, ends), "-screening": screening(result["effects"])}
+        if name == "tunnel" and (shares := traded(rows)):
+            crossed = [(a / n, b / m) for a, n, b, m in judged().values()]
+            figures["-trade"] = trade(shares, crossed)
+        for kind, drawn in figures.items():
+            image = ROOT / "docs" / "images" / f"published-{name}{kind}.png"
+            image.write_bytes(render(drawn)["png"])
+        text = json.dumps(result, indent=1)
+        (HERE / f"published_{name}.json").write_text(text + "\n", encoding="utf-8")
+        print(f"written: docs/science/published_{name}.json and its figures in docs/images")
     for n, found in result["models"].items():
         print(f"{n}: {found}, likelihood {result['evidence'][n]}, at most {result['largest'][n]}")
     print(f"effective draws: {result['effective_draws']} of {DRAWS}")
@@ -846,11 +895,13 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     draws = prior(unknowns, DRAWS, told.seed)
     outcome = Outcome.of(read(files, group, unknowns), group)
-    if strange := set(told.only or ()) - set(group.paper):
-        refuse(f"--only: expected some of {', '.join(group.paper)}, found {', '.join(strange)}")
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
     likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
+    if told.count > (some := int((weights > 0).sum())):
+        refuse(
+            f"--count: expected at most {some}, the draws that have a weight, found {told.count}"
+        )
     rng = np.random.default_rng(told.seed)
     chosen = rng.choice(DRAWS, size=told.count, replace=False, p=weights)
     return study_of(name, [draws.setting(k) for k in chosen], told.trials, LATER + told.seed)
@@ -887,7 +938,8 @@ def likeliest(
     """
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
-    values = {row["point"]: _values(unknowns, row) for row in lines(files, unknowns.axes)}
+    names = [*unknowns.axes]
+    values = {row["point"]: _values(unknowns, row) for row in lines(files, names, group)}
     same: dict[str, list[int]] = {}  # points of one setting, as of a study that varies the seed
     for point in np.unique(rows.points).tolist():
         same.setdefault(json.dumps(values[str(point)]), []).append(point)
@@ -909,8 +961,8 @@ def likeliest(
     return sorted(found, key=lambda item: -item[0])
 
 
-def best(name: str, files: Sequence[Path], count: int) -> None:
-    """Print the settings that are likeliest by their own trials, and write the first one."""
+def best(name: str, files: Sequence[Path], count: int, write: bool) -> None:
+    """Print the settings that are likeliest by their own trials, and perhaps write the first."""
     found = likeliest(name, files)
     for logarithm, point, told, _ in found[:count]:
         print(f"{logarithm:8.2f}  point {point}: {told}")
@@ -920,9 +972,11 @@ def best(name: str, files: Sequence[Path], count: int) -> None:
         table, _, key = path.rpartition(".")
         tables.setdefault(table, []).append(f"{key} = {json.dumps(value)}")
     text = "\n\n".join("\n".join([f"[{t}]"] * bool(t) + tables[t]) for t in sorted(tables))
-    file = HERE / f"published_{name}_best.toml"
-    file.write_text(text + "\n", encoding="utf-8")
-    print(f"the first one is written to {file.relative_to(ROOT)}")
+    if write:
+        (HERE / f"published_{name}_best.toml").write_text(text + "\n", encoding="utf-8")
+        print(f"the first one is written to docs/science/published_{name}_best.toml")
+    else:
+        print(f"\n{text}")
 
 
 SEARCHED = {
@@ -942,11 +996,13 @@ SEARCHED = {
 
 def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
     """A search by `antennate study design` of one controller in a setting."""
-    searched = {"control." + name for name in tomllib.loads(SEARCHED[controller])}
+    left_out = {"trials", "seed", "controllers"}
+    left_out |= {"control." + name for name in tomllib.loads(SEARCHED[controller])}
+    left_out |= {"control." + name for name in unread(controller, ControlParams())}
     fixed = [
         f"{path} = {json.dumps(value)}"
         for path, value in _paths(tomllib.loads(file.read_text(encoding="utf-8")))
-        if path not in searched | {"trials", "seed", "controllers"}
+        if path not in left_out
     ]
     return "\n".join(
         [
@@ -997,12 +1053,10 @@ def recover(name: str, files: Sequence[Path]) -> None:
 def keep(name: str, files: Sequence[Path]) -> None:
     """Keep the rows of studies as one table, only what is read here."""
     unknowns, group = Unknowns.of(study_file(name)), GROUPS[name]
-    read_here = ["outcome", "time_s", "limit_s", "progress_m", "offset_m", "hinge_max_deg"]
-    read_here += ["calibration.slope", "calibration.midpoint"]
-    read_here += [f"calibration.speeds.{k}.r2" for k in range(3)]
-    read_here += [f"calibration.cross_validated_rmse.{n}" for n in ("sigmoid", "line", "isotonic")]
-    columns = ["point", "seed", *unknowns.axes, "trial", group.who, *read_here, "status"]
-    rows = [*lines(files, unknowns.axes)]
+    rows = [*lines(files, [*unknowns.axes], group)]
+    if not rows:
+        refuse(f"{files[0]}: expected rows, found none")
+    columns = ["point", "seed", *unknowns.axes, "trial", group.who, *group.columns, "status"]
     columns = [column for column in columns if column in rows[0]]
     with (HERE / f"published_{name}.csv").open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
@@ -1018,43 +1072,102 @@ def _short(text: str) -> str:
         return text
 
 
-PARTS = ("weigh", "hidden", "recover", "next", "best", "tune", "rows")
+class Words(argparse.ArgumentParser):
+    """Words of the command line; what is wrong with them is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with one line and exit code 2."""
+        refuse(message)
 
 
-def main() -> None:
-    """Run one part."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=PARTS)
-    parser.add_argument("group", choices=GROUPS)
-    parser.add_argument("files", nargs="*", type=Path)
-    parser.add_argument("--count", type=int, default=60)
-    parser.add_argument("--trials", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=1, choices=range(1, 1000), metavar="1..999")
-    parser.add_argument("--controller", choices=SEARCHED, default="paper")
-    parser.add_argument("--power", type=float, default=1.0, help="of the likelihood, to search")
-    parser.add_argument("--only", nargs="+", help="statements to search by")
-    parser.add_argument("--near", type=int, help="search near so many of the likeliest settings")
-    told = parser.parse_args()
+def words() -> Words:
+    """The parts, each with the options that it reads."""
+    parser = Words(description=__doc__)
+    parts = parser.add_subparsers(dest="part", required=True, parser_class=Words)
+    options: dict[str, dict[str, Any]] = {
+        "--count": {"type": _from(1), "default": 60, "help": "settings (default: 60)"},
+        "--trials": {"type": _from(1), "default": 8, "help": "of each setting (default: 8)"},
+        "--seed": {"type": int, "default": 1, "choices": range(1, 1000), "metavar": "1..999"},
+        "--power": {"type": _power, "default": 1.0, "help": "of the likelihood, to search"},
+        "--only": {"nargs": "+", "help": "statements to search by"},
+        "--near": {"type": _from(1), "help": "search near so many of the likeliest settings"},
+        "--controller": {"choices": SEARCHED, "default": "paper"},
+        "--write": {"action": "store_true", "help": "write it into docs"},
+    }
+    for part, names in {
+        "weigh": ["--write"],
+        "hidden": ["--count", "--trials"],
+        "recover": [],
+        "next": ["--count", "--trials", "--seed", "--power", "--only", "--near"],
+        "best": ["--count", "--write"],
+        "tune": ["--controller", "--count", "--trials"],
+        "rows": [],
+    }.items():
+        one = parts.add_parser(part)
+        one.add_argument("group", choices=["tunnel"] if part == "tune" else GROUPS)
+        least = {"recover": 2, "tune": 1}.get(part, 0)
+        if part != "hidden":
+            one.add_argument(
+                "files", nargs=1 if part == "tune" else "+" if least else "*", type=Path
+            )
+        for name in names:
+            one.add_argument(name, **options[name])
+    return parser
+
+
+def _from(least: int) -> Callable[[str], int]:
+    def number(text: str) -> int:
+        if not text.isdigit() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"expected at least {least}, found {text}")
+        return int(text)
+
+    return number
+
+
+def _power(text: str) -> float:
+    number = float(text) if text.replace(".", "", 1).isdigit() else math.nan
+    if not 0.0 < number <= 1000.0:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, at most 1000, found {text}")
+    return number
+
+
+def carry_out(told: argparse.Namespace, files: Sequence[Path]) -> None:
+    """Carry out the part that is asked for."""
     name = told.group
-    if min(told.count, told.trials) < 1:
-        parser.error("--count and --trials: expected at least 1")
-    if told.part == "tune" and (name != "tunnel" or len(told.files) != 1):
-        parser.error("tune: expected the group tunnel and one file of a setting")
-    if told.part == "recover" and len(told.files) < 2:
-        parser.error("recover: expected a folder of hidden settings, then those of stages")
-    files = told.files or [HERE / f"published_{name}.csv"]
     if told.part == "hidden":
         draws = prior(Unknowns.of(study_file(name)), told.count, HIDDEN)
         settings = [draws.setting(k) for k in range(told.count)]
         sys.stdout.write(study_of(name, settings, told.trials, LATER))
+    elif told.part == "weigh":
+        weigh(name, files, told.write)
     elif told.part == "best":
-        best(name, files, told.count)
+        best(name, files, told.count, told.write)
     elif told.part == "tune":
         sys.stdout.write(tuned(files[0], told.controller, told.count, told.trials))
     elif told.part == "next":
         sys.stdout.write((near if told.near else following)(name, files, told))
     else:
-        {"weigh": weigh, "recover": recover, "rows": keep}[told.part](name, files)
+        {"recover": recover, "rows": keep}[told.part](name, files)
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Run one part."""
+    told = words().parse_args()
+    files = getattr(told, "files", None) or [HERE / f"published_{told.group}.csv"]
+    if told.part == "recover" and len(files) < 2:
+        refuse("recover: expected a folder of hidden settings, then those of stages")
+    known = GROUPS[told.group].paper
+    if strange := set(getattr(told, "only", None) or ()) - set(known):
+        refuse(f"--only: expected some of {', '.join(known)}, found {', '.join(sorted(strange))}")
+    try:
+        carry_out(told, files)
+    except ModuleNotFoundError as error:
+        refuse(f"expected the package scikit-learn ({error}); uv run --with scikit-learn has it")
+    except OSError as error:
+        refuse(f"{error.filename or 'output'}: {error.strerror}")
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        refuse(f"{files[0]}: {error}")
 
 
 if __name__ == "__main__":

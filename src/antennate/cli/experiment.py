@@ -169,7 +169,10 @@ def _file_of(experiment: Experiment[Any, Any], path: Path | None) -> Path | None
         return path
     if (ours := fitted().get(experiment.name)) is None and not path.is_file():
         those = ", ".join(map(command_words, fitted()))
-        raise ConfigError(f"expected a FILE, found {FITTED}, a word that only these take: {those}")
+        raise ConfigError(
+            f"expected a FILE, found {FITTED}, a word that only these take: {those}; "
+            f"reproduce takes --setting {FITTED}"
+        )
     if ours and path.is_file():
         raise ConfigError(
             f"--config: expected {FITTED} to be numbers of ours, found a file of that name, too; "

@@ -112,13 +112,16 @@ def one_curve(result: Mapping[str, Any]) -> Finding:
     """One calibration curve serves pushes at 5, 10 and 15 cm/s."""
     speeds = result["calibration"]["speeds"]
     r2 = [row["r2"] for row in speeds]
+    holds = min(r2) >= _FIT and max(r2) - min(r2) < _ALIKE
     return Finding(
         "R² " + ", ".join(f"{value:.3f}" for value in r2),
-        min(r2) >= _FIT and max(r2) - min(r2) < _ALIKE,
-        "A running mean lags by half of its length, so that the same reading means more bend the "
-        "faster the push.",
+        holds,
+        ""
+        if holds
+        else "A running mean lags by half of its length, so that the same reading means more bend "
+        "the faster the push.",
         tuple(Bar(f"ours, {100 * s['speed_m_s']:g} cm/s", s["r2"]) for s in speeds),
-        "Without a mean (`--averaging-time 0`) one curve serves all three.",
+        "" if holds else "Without a mean (`--averaging-time 0`) one curve serves all three.",
     )
 
 
