@@ -9,7 +9,7 @@ import pytest
 
 from antennate.params.base import Params, number
 from antennate.studies.experiment import OneByOne, Trials, no_row, no_step
-from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view import Restart
 
 
 class Config(Params):

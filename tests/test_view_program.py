@@ -21,6 +21,7 @@ from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams, RuleParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, picture, snapshot
+from antennate.telemetry.view import Restart
 from antennate.telemetry.view.channel import (
     END,
     ORDER,
@@ -32,7 +33,7 @@ from antennate.telemetry.view.channel import (
     Channel,
     read,
 )
-from antennate.telemetry.view.pace import Pace, Restart
+from antennate.telemetry.view.pace import Pace
 from antennate.telemetry.view.process import ViewProcess
 from antennate.types import AntennaFrame, Contact
 

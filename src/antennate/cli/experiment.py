@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic.dataclasses import dataclass
 
@@ -40,7 +40,9 @@ from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.telemetry import FilmView
-from antennate.telemetry.view.simulation import SimulationView
+
+if TYPE_CHECKING:
+    from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True)

@@ -337,7 +337,7 @@ def view(argv: Sequence[str]) -> int:
     _, options = parse("view", VIEW_DESCRIPTION, Params, argv, ShownOptions)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")
-    from antennate.telemetry.view.pace import Restart  # slow to import
+    from antennate.telemetry.view import Restart  # slow to import
     from antennate.telemetry.view.player import LogPlayer
     from antennate.telemetry.view.process import ViewProcess
 

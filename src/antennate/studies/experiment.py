@@ -19,7 +19,7 @@ from antennate.studies.measures import Measure, Table
 from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.report import Body, View
 from antennate.studies.work import Fail, Failure, no_failure
-from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view import Restart
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

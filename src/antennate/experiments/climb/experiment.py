@@ -22,10 +22,10 @@ from antennate.experiments.tunnel.batch import BATCH, watched
 from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
 from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
-from antennate.telemetry.view.simulation import SimulationView
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
+    from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,11 +31,11 @@ from antennate.studies.experiment import Experiment, OnRow, OnStep, Outcome, no_
 from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.pool import Workers, gather
 from antennate.telemetry.header import log_name
-from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Maneuver
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
+    from antennate.telemetry.view.simulation import SimulationView
 
 MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
 WAVE_OFF, OPTIMISED = "wave_off", "optimised"

@@ -27,12 +27,12 @@ from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, require_room, scene_of
 from antennate.sim.world import World
 from antennate.telemetry.header import Header, log_name
-from antennate.telemetry.simulated import Decisions, SimulatedLog
-from antennate.telemetry.view.pace import Restart
+from antennate.telemetry.view import Restart
 from antennate.types import AntennaFrame, Controller, Floats, Ints, JointCommand, Maneuver
 
 if TYPE_CHECKING:
     from antennate.sim.warp.robot import WarpRobot
+    from antennate.telemetry.simulated import Decisions, SimulatedLog
     from antennate.telemetry.view.simulation import SimulationView
 
 BATCH = 24
@@ -186,6 +186,12 @@ def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> T
     return TrialResult(*key, "invalid", limit, limit_s=limit, reason=reason)
 
 
+def _decisions(config: TunnelConfig, control: CheckedController, batch: int) -> Decisions:
+    from antennate.telemetry.simulated import Decisions  # not without logs
+
+    return Decisions(config.robot, control, batch)
+
+
 class _Rows:
     """The trials that run at once; a row takes the next trial when its own has ended."""
 
@@ -206,7 +212,8 @@ class _Rows:
         self._controller, self._readings = parts_of(name)
         self._donors, self._read, self._counts = donors or {}, read, list[Floats]()
         self._config, self._name, self._emit, self._batch = config, name, emit, batch
-        self._folder, self._logs, self._looks = logs, dict[int, SimulatedLog](), watch
+        self._folder, self._looks = logs, watch
+        self._logs: dict[int, SimulatedLog] = {}
         self._waiting = list(trials)
         self._scene, self._robot = made
         self._monitors: dict[int, Monitor] = {}
@@ -232,7 +239,7 @@ class _Rows:
             return
         made = self._made = self._make(make)
         control = CheckedController(made, config.robot, self._batch)
-        decisions = Decisions(config.robot, control, self._batch)
+        decisions = None if self._folder is None else _decisions(config, control, self._batch)
         nothing = [np.full((1, 2), np.nan)] * self._batch
         readings = make_readings(self._readings, config.control, self._batch, nothing)
         given = Given(control, readings)
@@ -244,7 +251,7 @@ class _Rows:
             if self._read is not None:
                 self._counts.append(frame.counts.copy())
             frame = given.frame or frame
-            if self._logs:
+            if decisions is not None and self._logs:
                 decided = decisions.take(frame, command)
                 for log in self._logs.values():
                     log.take(decided)
@@ -311,7 +318,7 @@ class _Rows:
         phase: float | None,
         control: CheckedController,
         readings: Readings,
-        decisions: Decisions,
+        decisions: Decisions | None,
     ) -> None:
         """Let the controller, its readings and the log begin with the trial in a row, if any."""
         if phase is not None:
@@ -334,11 +341,13 @@ class _Rows:
         """The log of a trial."""
         return (self._folder or Path()) / log_name(f"{self._name}-{trial}")
 
-    def _log(self, row: int, phase: float, decisions: Decisions) -> None:
+    def _log(self, row: int, phase: float, decisions: Decisions | None) -> None:
         """Begin the log of the trial that was put into a row."""
         config, monitor, world = self._config, self._monitors[row], self._robot.world(row)
-        if self._folder is None or not isinstance(world, World):
+        if decisions is None or not isinstance(world, World):
             return
+        from antennate.telemetry.simulated import SimulatedLog  # not without logs
+
         header = Header(
             controller=self._controller,
             readings=self._readings,

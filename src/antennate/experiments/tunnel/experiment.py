@@ -30,11 +30,11 @@ from antennate.sim.world import World
 from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
 from antennate.studies.pool import Workers
 from antennate.telemetry.header import log_name
-from antennate.telemetry.view.simulation import SimulationView
 from antennate.types import AntennaFrame, Controller
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
+    from antennate.telemetry.view.simulation import SimulationView
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,11 +33,12 @@ from antennate.studies.experiment import (
 )
 from antennate.studies.measures import Measure, Table, few, largest, median, successes, summarise
 from antennate.studies.pool import Workers
-from antennate.telemetry.view.simulation import SimulationView
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from antennate.telemetry.view.simulation import SimulationView
 
 _COUNTS = {"successes": "success", "jams": "jam", "slips": "slip", "invalid": "invalid"}
 """Names of the counts, and the outcome that each counts."""

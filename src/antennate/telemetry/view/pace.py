@@ -76,18 +76,6 @@ _LATE = 0.2
 """A program that is later than this does not catch up [s]."""
 
 
-class Restart(Exception):
-    """A person wants the trial anew, with a seed; a log from its beginning.
-
-    Attributes:
-        seed: The seed.
-    """
-
-    def __init__(self, seed: int) -> None:
-        super().__init__(f"restart with seed {seed}")
-        self.seed = seed
-
-
 class Pace:
     """Lets a simulation or a log run at a speed, stand and step, as the page wants it.
 

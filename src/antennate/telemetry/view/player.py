@@ -22,8 +22,9 @@ from antennate.telemetry.replay import recorded_controller
 from antennate.telemetry.survey import Record
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS
+from antennate.telemetry.view import Restart
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TICK, Channel, Poses
-from antennate.telemetry.view.pace import Pace, Restart, Tuning
+from antennate.telemetry.view.pace import Pace, Tuning
 from antennate.types import Controller, Floats
 
 

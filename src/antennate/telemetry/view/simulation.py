@@ -16,8 +16,9 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
 from antennate.telemetry.ticks import Tick, numbers_of
+from antennate.telemetry.view import Restart
 from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
-from antennate.telemetry.view.pace import Pace, Restart, Tuning
+from antennate.telemetry.view.pace import Pace, Tuning
 from antennate.types import AntennaFrame, Contact, Controller
 
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
