@@ -10,7 +10,14 @@ import pytest
 from recorded import act, climb_all, leaves, press, recorded
 
 from antennate.cli import main
-from antennate.control.registry import BUILT_IN, KINDS, PRIVILEGED, TELEOP, unread_by_all
+from antennate.control.registry import (
+    BUILT_IN,
+    KINDS,
+    PRIVILEGED,
+    TELEOP,
+    unread,
+    unread_by_all,
+)
 from antennate.experiments import load
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.study import run as study
@@ -37,6 +44,8 @@ LINE = {
         *("frequency", "ahead"),
     )
 }
+JAM = {"repetition.window_cycles", "repetition.change"}
+"""What finds a jam."""
 HEADING = {f"climb.heading.{name}" for name in HeadingParams.model_fields}
 NO_EFFECT = {
     "climb": SWEEP,
@@ -76,6 +85,26 @@ def test_what_a_controller_is_said_not_to_read_is_that(
     read -= NO_EFFECT.get(name, set())
     unread = {f"control.{leaf}" for leaf in set(leaves(ControlParams)) - read}
     assert unread == set(unread_by_all([name], control, spec))
+
+
+@pytest.mark.parametrize(
+    ("name", "knows", "fewer", "more"),
+    [
+        ("closed", "jam", {"search.patience", *JAM}, set()),
+        ("geometric", "jam", {"search.patience", *JAM}, set()),
+        ("closed-1", "jam", {"escape.trigger", *JAM}, set()),
+        ("timed", "jam", {"timed.walk_time"}, set()),
+        ("timed", "map", set(), {"escape.return_time"}),
+        ("timed", "facing", set(), {"escape.return_time", "escape.lost_time"}),
+        ("paper", "jam", set(), set()),
+    ],
+)
+def test_who_is_told_reads_other_parameters(
+    name: str, knows: str, fewer: set[str], more: set[str]
+) -> None:
+    alone, told = (unread(name, ControlParams(), each) for each in ((), (knows,)))
+    assert told - alone == fewer
+    assert alone - told == more
 
 
 TURN = "expected a parameter that is read, such as {}control.escape.turn{}offset, found 0.2, but"

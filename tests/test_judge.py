@@ -150,3 +150,49 @@ def test_an_exit_that_is_no_line_is_said(line: Any) -> None:
 
     with pytest.raises(SceneError, match="exit"):
         judged(Lineless(np.array([[0.0, 0.0], [1.0, 0.0]])), [(0, 0), (1, 0)])
+
+
+class Robot:
+    """What a judge looks at: a robot that lies with its head and its lowest link so."""
+
+    def __init__(self, head: float, overturned: bool = False, lowest: float = 0.0) -> None:
+        self.head, self.overturned, self.lowest = np.array([head, 0.0]), overturned, lowest
+
+    def link_places(self) -> Floats:
+        return np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.lowest]])
+
+
+IN, OUT, BESIDE = 0.5, 1.1, -9.0
+"""Heads on a way of 1 m: on it, past its exit, and far from it."""
+
+
+@pytest.mark.parametrize(
+    ("robot", "t", "flat", "anywhere", "outcome"),
+    [
+        (Robot(OUT), 4.9, True, False, "success"),
+        (Robot(OUT), 5.0, True, False, "success"),
+        (Robot(OUT), 5.000001, True, False, "timeout"),
+        (Robot(IN), 4.9, True, False, None),
+        (Robot(IN), 5.0, True, False, "timeout"),
+        (Robot(BESIDE), 4.9, True, False, "left"),
+        (Robot(BESIDE), 5.1, True, False, "timeout"),
+        (Robot(OUT, overturned=True), 4.9, True, True, "success"),
+        (Robot(IN, overturned=True), 4.9, True, True, "overturned"),
+        (Robot(IN, overturned=True), 4.9, True, False, None),
+        (Robot(IN, overturned=True), 4.9, False, False, "overturned"),
+        (Robot(IN, overturned=True), 5.1, False, False, "timeout"),
+        (Robot(IN, overturned=True, lowest=-0.2), 4.9, False, False, "overturned"),
+        (Robot(IN, lowest=-0.2), 4.9, False, False, "fell"),
+        (Robot(IN, lowest=-0.17), 4.9, False, False, None),
+        (Robot(IN, lowest=-0.2), 4.9, True, False, None),
+    ],
+)
+def test_how_an_episode_with_a_limit_of_5_s_ends(
+    robot: Robot, t: float, flat: bool, anywhere: bool, outcome: str | None
+) -> None:
+    scene = Route(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    if not flat:
+        scene.ground = 0.0  # type: ignore[attr-defined]
+    judge = Judge(scene, 5.0, on_its_back=anywhere)
+    assert judge.watch(Robot(IN), 0.0) is None
+    assert judge.watch(robot, t) == outcome

@@ -14,9 +14,11 @@ import pytest
 from lockstep import BoardPort, LockstepClock
 from stated import stated
 
+import antennate
 from antennate.cli import main
 from antennate.control.controllers import RuleController, closed_loop, open_loop
-from antennate.control.registry import CONTROLLERS, looks, make_controller
+from antennate.control.kind import ControllerKind
+from antennate.control.registry import CONTROLLERS, KINDS, looks, make_controller
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.experiment import run
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -231,6 +233,36 @@ def test_a_file_with_a_kind_brings_sentence_and_colour(
     (first, _) = json.loads((tmp_path / "run/result.json").read_text())["controllers"].items()
     assert first[0] == name
     assert "walks on and on" in (tmp_path / "run/report.html").read_text()
+
+
+def test_a_kind_is_given_in_python_as_a_factory_is() -> None:
+    kind = ControllerKind("straight", "walks on and on", open_loop)
+    (row,) = antennate.run("tunnel", trials=1, time_limit=1.0, controllers=[kind]).rows
+    assert row.controller == "straight"
+    assert antennate.simulate(kind, time_limit=0.1).meta["controller"] == "straight"
+    (row,) = antennate.run("tunnel", trials=1, time_limit=1.0, controllers=[KINDS["open"]]).rows
+    assert row.controller == "open"
+    failing = ControllerKind("lifted", "needs pitch servos", KINDS["lifted"].make)
+    with pytest.raises(ConfigError, match=r"^<ControllerKind lifted>: expected "):
+        make_controller(failing)
+
+
+@pytest.mark.parametrize(
+    ("part", "found"),
+    [
+        ("colour", "rot"),
+        ("colour", "#12345"),
+        ("reads", "rule"),
+        ("make", None),
+        ("about", 1),
+    ],
+)
+def test_a_kind_with_a_part_that_cannot_be_is_refused_where_it_is_made(
+    part: str, found: Any
+) -> None:
+    parts = {"name": "mine", "about": "", "make": open_loop} | {part: found}
+    with pytest.raises(ConfigError, match=f"controller kind: {part}: expected .*, found "):
+        ControllerKind(**parts)
 
 
 def test_the_example_is_short() -> None:

@@ -261,7 +261,7 @@ def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path,
     [
         (["tune", "tunnel"], "the following arguments are required: files"),
         (["tune", "wall", "x"], "argument group: invalid choice: 'wall'"),
-        (["tune", "tunnel", "none.toml"], "none.toml: No such file"),
+        (["tune", "tunnel", "none.toml"], "none.toml: expected a readable file"),
         (["recover", "wall", "one"], "recover: expected a folder of hidden settings, then"),
         (["hidden", "tunnel", "--count", "0"], "argument --count: expected at least 1, found 0"),
         (["next", "wall", "--power", "-5"], "--power: expected a number above 0, at most 1000"),

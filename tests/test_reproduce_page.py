@@ -59,6 +59,9 @@ def pages(tmp_path: Path) -> Path:
     result = told | {"claims": rows}
     (tmp_path / "science").mkdir()
     (tmp_path / "science" / "reproduce.json").write_text(json.dumps(result))
+    crossed = "fitted,572001,0,open,success\nfitted,572001,1,open,left\nfitted,7,0,open,success\n"
+    text = f"setting,seed,trial,controller,outcome\n{crossed}"
+    (tmp_path / "science" / "published_judged.csv").write_text(text)
     return tmp_path
 
 
@@ -70,6 +73,7 @@ def test_both_pages_tell_what_the_run_found(pages: Path) -> None:
     page, index = ((pages / name).read_text() for name in ("reproduce.md", "index.md"))
     assert counts in page
     assert counts in index
+    assert "used to choose, `open` 1 of 2 cross." in page.replace("\n", " ")
     table = [line for line in page.splitlines() if line.endswith("reproduced** |")]
     assert len(table) == len(CLAIMS) - 1
     assert {line.count(" | ") for line in table} == {4}  # a bar in a cell ends no cell

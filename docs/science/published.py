@@ -32,7 +32,10 @@ from published_figures import marginals, screening, trade
 from scipy.stats import binom, norm
 
 from antennate.control.registry import unread
+from antennate.errors import ConfigError
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.figures import render
+from antennate.params.base import read_file
 from antennate.params.control import ControlParams
 
 Floats = NDArray[np.float64]
@@ -196,7 +199,10 @@ def _speed(name: str) -> Callable[[Mapping[str, Row]], float]:
         row = rows[name]
         if row["outcome"] != "success":
             return math.nan
-        return math.log(number_in(row, "progress_m") / number_in(row, "time_s"))
+        way, time = (number_in(row, name) for name in ("progress_m", "time_s"))
+        if min(way, time) <= 0:
+            refuse(f"{row['place']}: progress_m, time_s: expected above 0, found {way}, {time}")
+        return math.log(way / time)
 
     return logarithm
 
@@ -996,6 +1002,7 @@ SEARCHED = {
 
 def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
     """A search by `antennate study design` of one controller in a setting."""
+    read_file(file, TunnelConfig)
     left_out = {"trials", "seed", "controllers"}
     left_out |= {"control." + name for name in tomllib.loads(SEARCHED[controller])}
     left_out |= {"control." + name for name in unread(controller, ControlParams())}
@@ -1117,7 +1124,7 @@ def words() -> Words:
 
 def _from(least: int) -> Callable[[str], int]:
     def number(text: str) -> int:
-        if not text.isdigit() or int(text) < least:
+        if not text.isdecimal() or int(text) < least:
             raise argparse.ArgumentTypeError(f"expected at least {least}, found {text}")
         return int(text)
 
@@ -1125,7 +1132,10 @@ def _from(least: int) -> Callable[[str], int]:
 
 
 def _power(text: str) -> float:
-    number = float(text) if text.replace(".", "", 1).isdigit() else math.nan
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
     if not 0.0 < number <= 1000.0:
         raise argparse.ArgumentTypeError(f"expected a number above 0, at most 1000, found {text}")
     return number
@@ -1164,6 +1174,8 @@ def main() -> None:
         carry_out(told, files)
     except ModuleNotFoundError as error:
         refuse(f"expected the package scikit-learn ({error}); uv run --with scikit-learn has it")
+    except ConfigError as error:
+        refuse(str(error))
     except OSError as error:
         refuse(f"{error.filename or 'output'}: {error.strerror}")
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -238,7 +238,7 @@ def zigzag(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControll
 
 
 def _timed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
-    """Parameters that `timed` reads; told that it is stuck, it needs no clock."""
+    """Parameters that `timed` reads: no clock where it is told of a jam."""
     told = {"facing": _KNOWING_ESCAPE, "map": _KNOWING_ESCAPE[1:]}
     escape = (
         *_BLIND_ESCAPE,

@@ -372,7 +372,7 @@ def by_map(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControll
 
 
 def _closed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
-    """Parameters that `closed` reads; told that it is stuck, it is not patient and finds it out."""
+    """Parameters that `closed` reads: no detector and patience where it is told of a jam."""
     if "jam" in knows:
         search = all_but(SearchParams, "search", "patience")
         return *search, "repetition.pressure", "escape.turn_offset"

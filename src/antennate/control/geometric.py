@@ -163,7 +163,7 @@ def geometric(control: ControlParams, robot: RobotSpec, batch: int) -> RuleContr
 
 
 def _reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
-    """Parameters that it reads; told that it is stuck, it needs neither detector nor patience."""
+    """Parameters that `geometric` reads: no detector and patience where it is told of a jam."""
     search = all_but(SearchParams, "search", *_SIZES, *(["patience"] if "jam" in knows else []))
     detector = "repetition.pressure" if "jam" in knows else "repetition"
     return *search, "geometric", detector, "escape.turn_offset"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
 from antennate.control.knowledge import Kind
+from antennate.errors import ConfigError
+from antennate.messages import shown
 from antennate.params.base import Params, paths_of
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
@@ -19,6 +22,7 @@ Reads = tuple[str, ...] | Callable[[ControlParams, Collection[str]], tuple[str, 
 """Parameters of the control, dotted, or groups of them; a function where they depend on others, and
 on what a simulation tells the controller."""
 
+_COLOUR = re.compile("(#[0-9A-Fa-f]{6})?").fullmatch
 _SWEEP = tuple(f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency"))
 """How the gait moves the bases; controllers that climb move them themselves."""
 _SHARED = tuple(
@@ -29,23 +33,27 @@ _SHARED = tuple(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ControllerKind:
     """Controller with a name. The module of a controller lists its kinds as `KINDS`.
 
-    One may be named wherever a controller is, as any factory, in a file of one's own too.
+    One may be named wherever a controller is, as any factory, in a file of one's own too. There
+    sentence, colour and line are used: what such a controller needs it says itself, and it may read
+    all parameters.
 
     Attributes:
-        name: Its name.
-        about: What it does, for somebody who meets it for the first time.
+        name: Name, as commands take it.
+        about: Sentence on what it does, for somebody who meets it for the first time.
         make: Makes it of (control, robot, batch).
-        reads: Parameters of the control that it reads: of ours, others are refused. All read the
-            rate, the conditioning, the rule's threshold and hysteresis, and the gait but for
-            `turn_offset`. One of a user's own may read all, whatever stands here.
-        colour: Its colour in figures, #RRGGBB; empty takes one that no other has.
-        line: Its line in figures, as matplotlib takes it: a second mark, for print in grey.
-        needs: What it cannot do without, and only a simulation knows.
+        reads: Parameters of the control that it reads; others are refused. All read the rate, the
+            conditioning, the rule's threshold and hysteresis, and the gait but for `turn_offset`.
+        colour: Colour in figures, #RRGGBB; empty takes one that no other has.
+        line: Line in figures, as matplotlib takes it: a second mark, for print in grey.
+        needs: Knowledge that it cannot do without, and only a simulation has.
         climbs: Whether it raises links and antennae of the robot.
+
+    Raises:
+        ConfigError: A part is not of its kind.
     """
 
     name: str
@@ -56,6 +64,29 @@ class ControllerKind:
     line: Any = "solid"
     needs: tuple[Kind, ...] = ()
     climbs: bool = False
+
+    def __post_init__(self) -> None:
+        parts: dict[str, tuple[Any, bool]] = {
+            "name: expected a text": (self.name, isinstance(self.name, str)),
+            "about: expected a text": (self.about, isinstance(self.about, str)),
+            "make: expected a function": (self.make, callable(self.make)),
+            "colour: expected #RRGGBB or nothing": (self.colour, bool(_COLOUR(str(self.colour)))),
+            "reads: expected a tuple or a function": (
+                self.reads,
+                isinstance(self.reads, tuple) or callable(self.reads),
+            ),
+        }
+        for expected, (found, fits) in parts.items():
+            if not fits:
+                raise ConfigError(f"controller kind: {expected}, found {shown(found)}")
+
+    @property
+    def __name__(self) -> str:
+        """Name, as a factory has one."""
+        return self.name
+
+    def __repr__(self) -> str:
+        return f"<ControllerKind {self.name}>"
 
     def __call__(self, control: ControlParams, robot: RobotSpec, batch: int) -> Controller:
         """The controller of `batch` robots."""

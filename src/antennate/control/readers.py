@@ -54,7 +54,7 @@ _OF_FOLLOWING = {
     for name in ("p_gain", "gain_divisor", "no_load_speed")
 }
 UNDRIVEN = tuple(path for path in SIMULATION_ALONE if path not in _OF_FOLLOWING)
-"""The same of a drive, which judges by the models of its servos whether joints follow."""
+"""Parameters that a drive does not read; by models of its servos it judges if joints follow."""
 
 
 def unused(robot: RobotSpec) -> dict[str, str]:

@@ -25,8 +25,8 @@ ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
 """Makes the controller of a name for B robots, as `make_controller` does."""
 
 USUAL = ("open", "timed", "paper", "closed")
-"""Those of ours that are run if none is named; the others are further controls without touch."""
-_MODULES = (controllers, blind, geometric, steering, climbing)
+"""Controllers that are run if none is named; the others are further controls without touch."""
+_MODULES = (controllers, geometric, steering, blind, climbing)
 _ALL = {kind.name: kind for module in _MODULES for kind in module.KINDS}
 BUILT_IN = (*dict.fromkeys([*USUAL, *(name for name, kind in _ALL.items() if not kind.needs)]),)
 """Names of ours that a robot may have."""
@@ -82,7 +82,8 @@ def looks(names: Iterable[str]) -> dict[str, tuple[str, Any]]:
     Whoever has no colour of its own takes one in turn that no other of these controllers has.
     """
     kinds = {name: kind_of(name) for name in names}
-    own = {name: kind.colour for name, kind in kinds.items() if kind is not None and kind.colour}
+    coloured = {kind.colour: name for name, kind in [*kinds.items()][::-1] if kind is not None}
+    own = {name: colour for colour, name in coloured.items() if colour}
     ours = (kind.colour for kind in KINDS.values() if kind.colour)
     palette = [*dict.fromkeys([*SERIES, *ours])]
     free = [colour for colour in palette if colour not in own.values()] or palette

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate import checks, experiments
-from antennate.control.registry import CONTROLLERS, ControllerFactory
+from antennate.control.registry import CONTROLLERS, KINDS, ControllerFactory
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
 from antennate.notebook import from_rows, html
@@ -346,6 +346,7 @@ def _names(controllers: Iterable[str | ControllerFactory]) -> tuple[str, ...]:
             continue
         checks.function("controllers", controller)
         name = controller.__name__
-        CONTROLLERS.add(name, controller)
+        if KINDS.get(name) is not controller:
+            CONTROLLERS.add(name, controller)
         names.append(name)
     return tuple(names)

@@ -54,12 +54,15 @@ class Judge:
         scene: The scene of the episode.
         limit: Time after which it has failed [s].
         on_its_back: Whether a robot on its back ends it on flat ground, too.
+
+    Attributes:
+        limit: As given.
     """
 
     def __init__(
         self, scene: SceneInstance, limit: float = math.inf, on_its_back: bool = False
     ) -> None:
-        self._scene, self._limit, self._on_its_back = scene, limit, on_its_back
+        self._scene, self.limit, self._on_its_back = scene, limit, on_its_back
         self._head: Floats = np.array(scene.start[:2], float)
         self._crossings = 0
 
@@ -70,7 +73,7 @@ class Judge:
             SceneError: The scene raises an exception, or does not say True or False.
         """
         seen = self.look(world.head[:2]) or self._mishap(world)
-        return in_time(seen, t, self._limit)
+        return in_time(seen, t, self.limit)
 
     def look(self, head: Floats) -> Literal["success", "left"] | None:
         """How the episode has ended with the head at this position, shape (2,); None if it goes on.
@@ -94,7 +97,8 @@ class Judge:
         ground = getattr(self._scene, "ground", None)
         if world.overturned and (self._on_its_back or ground is not None):
             return "overturned"
-        return "fell" if ground is not None and has_fallen(world.link_places(), ground) else None
+        fell = ground is not None and has_fallen(world.link_places(), float(ground))
+        return "fell" if fell else None
 
 
 def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:

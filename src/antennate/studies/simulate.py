@@ -144,7 +144,7 @@ class _Walk:
         start: Trial,
         time_limit: float,
     ) -> None:
-        self._robot, self._start, self._time_limit = robot, start, time_limit
+        self._robot, self._start = robot, start
         self.checked = CheckedController(controller, spec, 1)
         self.recorder = TimeSeriesRecorder(self.checked, lambda: start.world.head[:2])
         self.decisions = Decisions(spec, self.checked)
@@ -163,8 +163,8 @@ class _Walk:
         if self._robot.failures:
             self.outcome = "invalid"
             return False
-        world, limit, ended = self._start.world, self._time_limit, None
-        if world.t >= limit or self._ticks % LOOK_EVERY == 0:
+        world, ended = self._start.world, None
+        if world.t >= self._judge.limit or self._ticks % LOOK_EVERY == 0:
             ended = self._judge.watch(world, world.t)
         self.outcome = ended or "timeout"
         return ended is None

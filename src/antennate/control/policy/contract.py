@@ -201,8 +201,8 @@ def _plain(value: Any) -> Any:
 
 
 def _completed(table: Mapping[str, Any], default: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested parameters, and the default of each one that they lack."""
-    full = {**default, **table}
+    """Nested parameters, and the default of each one that their groups lack."""
+    full = {**{key: v for key, v in default.items() if not isinstance(v, dict)}, **table}
     for key, value in full.items():
         if isinstance(value, dict) and isinstance(default.get(key), dict):
             full[key] = _completed(value, default[key])
