@@ -239,11 +239,11 @@ def zigzag(control: ControlParams, robot: RobotSpec, batch: int) -> RuleControll
 
 def _timed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, ...]:
     """Parameters that `timed` reads: no clock where it is told of a jam."""
-    told = {"facing": _KNOWING_ESCAPE, "map": _KNOWING_ESCAPE[1:]}
+    names = {"facing": _KNOWING_ESCAPE, "map": _KNOWING_ESCAPE[1:]}
     escape = (
         *_BLIND_ESCAPE,
         "turn_offset",
-        *(name for kind in knows for name in told.get(kind, ())),
+        *(name for kind in knows for name in names.get(kind, ())),
     )
     clock = () if "jam" in knows else ("timed",)
     return *clock, *(f"escape.{name}" for name in escape)
