@@ -28,6 +28,12 @@ _STARTING = 120.0
 _ANSWERING = 300.0
 """Longest that a page may take to answer [s]: it is drawn without a graphics card."""
 
+_GIVES_WAY = "Inspected target navigated or closed"
+
+
+class GivesWay(Exception):
+    """A page was left while it was asked."""
+
 
 class Tab:
     """One page.
@@ -54,7 +60,10 @@ class Tab:
         while True:
             answer = json.loads(self._connection.recv(max(0.0, end - time.monotonic())))
             if answer.get("id") == number:
-                assert "error" not in answer, (method, answer)
+                error = answer.get("error", {})
+                if _GIVES_WAY in error.get("message", ""):
+                    raise GivesWay(method)
+                assert not error, (method, answer)
                 return answer["result"]
             self._note(answer.get("method", ""), answer.get("params", {}))
 
@@ -88,8 +97,11 @@ class Tab:
         self.call("Page.navigate", url=address)
 
     def run(self, script: str) -> Any:
-        """The value of an expression of JavaScript."""
-        found = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        """The value of an expression of JavaScript; None while a page gives way to the next."""
+        try:
+            found = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        except GivesWay:
+            return None
         return found["result"].get("value")
 
     def until(self, script: str, patience: float = _STARTING) -> Any:
