@@ -143,8 +143,8 @@ def measure_trials(quick: bool) -> dict[str, Any]:
             return lambda: wall_seconds(run)
 
         cases = {
-            "one": checked(lambda: experiment.run(config, 1).rows),
-            "two workers": checked(lambda: experiment.run(config, CORES).rows),
+            "one": checked(lambda: experiment.EXPERIMENT.run(config, 1).rows),
+            "two workers": checked(lambda: experiment.EXPERIMENT.run(config, CORES).rows),
             "two started": checked(lambda: shared(config, trials, started)),
             "threads, rows": checked(lambda: on_threads(config, trials, threads)),
             "threads, batches": checked(lambda: shared(config, trials, threads)),

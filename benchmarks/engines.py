@@ -178,7 +178,7 @@ def differing(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> dict[st
     return {
         "same_rows": sum(a == b for a, b in zip(one, other, strict=True)),
         "other_end": int((first[0] != second[0]).sum()),
-        "difference_s": round(paired.time_difference_s, 2),
+        "difference_s": round(paired.time_difference_s or 0.0, 2),
         "difference_95": [round(end, 2) for end in paired.time_difference_95 or ()],
     }
 

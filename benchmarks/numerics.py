@@ -131,7 +131,7 @@ def walk(engine: Engine) -> dict[str, float]:
     pace = measure(walked, config.settling_cycles, config.cycles)
     settled = np.array(sunk)[len(sunk) // 3 :]
     return {
-        "speed_m_s": pace.speed,
+        "speed_m_s": pace.speed_m_s,
         "sunk_mean_mm": 1e3 * float(settled.mean()),
         "sunk_max_mm": 1e3 * float(settled.max()),
         "walk_realtime": float(walked.t[-1]) / cpu,
@@ -209,7 +209,7 @@ def _statistics(found: list[tuple[TrialResult, float]], limit: float) -> dict[st
         "invalid": sum(row.outcome == "invalid" for row, _ in found),
         "mean_time_s": float(times.mean()),
         "mean_time_se": error,
-        "mean_force_n": float(np.mean([row.force_mean_n for row, _ in found])),
+        "mean_force_n": float(np.mean(np.array([row.force_mean_n for row, _ in found], float))),
         "realtime": sum(ended) / sum(cpu for _, cpu in found),
     }
 

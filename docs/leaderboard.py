@@ -11,16 +11,16 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from generated import finish
 
 from antennate.errors import ConfigError
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.config import CompeteConfig
-from antennate.experiments.compete.episodes import Episode, all_drawn
+from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.compete.page import apart, markdown, sentence
-from antennate.experiments.compete.standings import standings
+from antennate.experiments.compete.result import Standing
+from antennate.experiments.compete.standings import standing
 from antennate.studies.formats import to_csv
 
 HERE = Path(__file__).parent
@@ -30,21 +30,9 @@ WHOLE = 100
 """Draws of each scene that a board needs; with fewer it is preliminary."""
 
 
-def result_of(rows: Sequence[Episode]) -> dict[str, Any]:
-    """The standing of these rows, with what a page says of the run."""
-    config = CompeteConfig()
-    seeds = list(dict.fromkeys(row.seed for row in rows))
-    return {
-        **standings(rows, config.tie),
-        "seeds": seeds,
-        "hidden": all_drawn(rows),
-        "check": None,
-    }
-
-
-def board(rows: Sequence[Episode], result: dict[str, Any]) -> str:
+def board(rows: Sequence[Episode], result: Standing) -> str:
     """What stands between the marks."""
-    counts = [c["episodes"] for cells in result["scenes"].values() for c in cells.values()]
+    counts = [cell.episodes for cells in result.scenes.values() for cell in cells.values()]
     kinds = {
         name: ", ".join(sorted({getattr(row, name) for row in rows}))
         for name in ("version", "engine", "processor")
@@ -103,7 +91,7 @@ def main() -> None:
             sys.exit(str(error))
         ROWS.write_text(table, encoding="utf-8")
     rows = read_rows(ROWS)
-    result = result_of(rows)
+    result = standing(rows, CompeteConfig().tie)
     text = f"{before}{BEGIN}\n{board(rows, result)}\n{END}{after}"
     if "--check" not in sys.argv[1:]:
         from antennate.experiments.compete.figure import drawn

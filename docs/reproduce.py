@@ -31,6 +31,7 @@ from antennate.experiments.reproduce.experiment import (
 from antennate.experiments.reproduce.experiment import judge as found_of
 from antennate.experiments.reproduce.verdict import MEANINGS, VERDICTS
 from antennate.messages import command_words
+from antennate.studies.columns import content
 from antennate.studies.formats import to_json
 from antennate.studies.run_directory import RunDirectory
 
@@ -156,7 +157,7 @@ def judge(folders: Sequence[str]) -> None:
         judged = tuple((c, found[c]) for c in claims(config) if c in found)
         outcome = ReproduceOutcome(config, judged, interrupted=False)
         if of:
-            FILES[config.setting].write_text(to_json(outcome.result()), encoding="utf-8")
+            FILES[config.setting].write_text(to_json(content(outcome.result())), encoding="utf-8")
 
 
 def parts(config: ReproduceConfig) -> list[str]:

@@ -1,4 +1,4 @@
-"""Recordings of servos: of the twin, and made by hand."""
+"""Recordings of servos: of the twin, and made by hand; and what `servo` finds in them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+import antennate
 from antennate.dxl.model import POSITION_UNIT
 from antennate.dxl.models import MODELS_BY_NUMBER
 from antennate.dxl.servo import Servo
+from antennate.experiments.servo.result import ServoResult
 
 RATE = 250.0
 """Samples a second."""
@@ -50,3 +52,9 @@ def written(path: Path, entries: list[dict[str, Any]], p_gain: float, **more: fl
     table = {"kp": p_gain, "mass": 0.0, "length": 0.0, **more, "entries": entries}
     path.write_text(json.dumps(table))
     return path
+
+
+def found_of(*recordings: Path, **settings: Any) -> ServoResult:
+    """The result of `servo` on recordings."""
+    run = antennate.run("servo", recording=list(map(str, recordings)), **settings)
+    return run.outcome.result()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -200,8 +201,8 @@ def test_hysteresis_that_every_push_has_is_a_misfit(tmp_path: Path) -> None:
     counts = 1400 + 400 * (bend + 0.025 * way * np.sin(np.pi * bend)) + noise
     rows = [f"{i / 100},{c:.3f},{b:.6f}" for i, (c, b) in enumerate(zip(counts, bend, strict=True))]
     (tmp_path / "a.csv").write_text("\n".join(["time,counts,bend", *rows, ""]))
-    found = antennate.run("calibrate", recording=str(tmp_path / "a.csv"), curve="line").summary
-    assert found["calibration"]["misfit"] == pytest.approx(0.025 / math.sqrt(2), rel=0.15)
+    found = antennate.run("calibrate", recording=str(tmp_path / "a.csv"), curve="line").found
+    assert found.calibration.misfit == pytest.approx(0.025 / math.sqrt(2), rel=0.15)
 
 
 def test_a_file_of_an_older_version_is_a_sigmoid(line: Path, tmp_path: Path) -> None:
@@ -214,6 +215,24 @@ def test_a_file_of_an_older_version_is_a_sigmoid(line: Path, tmp_path: Path) -> 
     x = (1600 - found.counts_low) / (found.counts_high - found.counts_low)
     b = 1 / (1 + math.exp(found.slope * (x - found.midpoint)))
     assert found.level(np.array([1600.0]))[0] == pytest.approx(b)
+
+
+def test_a_result_of_an_older_version_is_reported(line: Path, tmp_path: Path) -> None:
+    """Without what they did not know yet."""
+    shutil.copytree(line.parent / "sigmoid", tmp_path / "run")
+    file = tmp_path / "run" / "result.json"
+    content = json.loads(file.read_text())
+    for part, keys in (
+        (content, ("hysteretic", "plateau")),
+        (content["recording"], ("units",)),
+        (content["calibration"], ("kind", "knots", "knot_levels", "misfit", "noise_counts")),
+        (content["assessment"], ("relaxation",)),
+    ):
+        for key in keys:
+            del part[key]
+    file.write_text(json.dumps(content))
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert "One sigmoid explains" in (tmp_path / "run" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

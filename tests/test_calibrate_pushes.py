@@ -41,8 +41,8 @@ def test_one_long_recording_is_as_many_pushes_everywhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(tmp_path / "long.csv", *loops(4, 0.05))
-    found = antennate.run("calibrate", recording=file).summary
-    assert found["calibration"]["trials"] == found["assessment"]["pushes"] == 4
+    found = antennate.run("calibrate", recording=file).found
+    assert found.calibration.trials == found.assessment.pushes == 4
     assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
     told = capsys.readouterr().out
     assert "pushes: 4" in told
@@ -58,8 +58,7 @@ def test_a_long_recording_has_the_intervals_of_its_pushes(tmp_path: Path) -> Non
         written(tmp_path / "long.csv", counts, bend, t),
         written(tmp_path / "trials.csv", counts, bend, t, trial),
     ]
-    long, split = (antennate.run("calibrate", recording=f).summary for f in files)
-    ends = [found["calibration"]["midpoint_95"] for found in (long, split)]
+    ends = [antennate.run("calibrate", recording=f).found.calibration.midpoint_95 for f in files]
     assert ends[0] == pytest.approx(ends[1], rel=0.002)  # one reading lies between two pushes
 
 
@@ -98,6 +97,7 @@ def test_the_text_says_what_the_intervals_are_over(
         held = [json.loads((out / f"{n}.json").read_text()) for n in ("calibration", "result")]
         for ends in (held[0]["slope_95"], held[1]["calibration"]["midpoint_95"]):
             assert (ends is None) == (pushes < 3)
+        assert held[0] == held[1]["calibration"]
         assert main(["report", str(out)]) == 0
         capsys.readouterr()
 
@@ -126,6 +126,18 @@ def test_hysteresis_is_told_from_data_that_do_not_match(
     file = written(tmp_path / "loop.csv", *loops(4, gap, noise))
     assert main(["calibrate", "--recording", file, "--no-figures"]) == 0
     assert told in " ".join(capsys.readouterr().out.split())
+
+
+def test_hysteresis_is_a_share_of_the_span_in_the_table(tmp_path: Path) -> None:
+    """By hand: ways 0.5 * 400 sin(pi b) counts apart, so 200 where b is 0.5."""
+    result = antennate.run("calibrate", recording=written(tmp_path / "loop.csv", *loops(4, 0.5)))
+    curve = result.found.calibration
+    cells = dict(result.experiment.tables(result.found)[-1].rows)
+    share = 100 * 200 / (curve.counts_high - curve.counts_low)
+    (largest,), (bend,) = cells["  largest gap [% of the span]"], cells["  at a bend of"]
+    assert float(largest) == pytest.approx(share, rel=0.02)
+    assert float(bend) == pytest.approx(0.5, abs=0.05)
+    assert cells["relaxation in a hold [% of the span]"] == ["-"]
 
 
 @pytest.mark.parametrize(

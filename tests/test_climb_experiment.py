@@ -17,13 +17,15 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.climb import measures
 from antennate.experiments.climb.config import ClimbConfig, cells, config_of
 from antennate.experiments.climb.criterion import is_over
-from antennate.experiments.climb.experiment import EXPERIMENT, ClimbOutcome, every, run
-from antennate.experiments.climb.physics import ClimbRow, carry_out
+from antennate.experiments.climb.experiment import EXPERIMENT, every
+from antennate.experiments.climb.physics import carry_out
+from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.sensing import Verdict
 from antennate.params.base import from_values, read_file
 from antennate.robots.imu import ImuParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import draw_trial, scene_of
+from antennate.studies.columns import frame
 
 TINY = {
     "trials": 1,
@@ -38,9 +40,9 @@ TINY = {
 
 def row(condition: str, outcome: str, trial: int = 0, **more) -> ClimbRow:
     """A climb of a step of 5 cm by hand."""
-    columns = {"part": "climbing", "ground": "5 cm", "height_m": 0.05, "divisor": 256.0, **more}
-    time = {"time_s": 20.0, **columns}
-    return ClimbRow(0, f"{condition}", trial, condition=condition, outcome=outcome, **time)
+    place = {"part": "climbing", "ground": "5 cm", "height_m": 0.05, "divisor": 256.0}
+    place |= {"seed": 0, "cell": condition, "trial": trial, "condition": condition}
+    return ClimbRow(**{**place, "outcome": outcome, "time_s": 20.0, **more})
 
 
 def test_it_is_registered_with_all_its_cells():
@@ -123,26 +125,28 @@ def test_measures_of_rows_by_hand():
         row("level", "success", 1),
         row("level", "left", 2),
         row("level", "invalid", 3, reason="why"),
-        row("climb", "success", 0, plan_error_m="0:-0.05 1:0.01", climbs=1),
-        row("climb", "success", 1, plan_error_m="0:-0.07", climbs=3),
+        row("climb", "success", 0, plan_error_m="0:-0.05 1:0.01", climbs=1, torque_rms_n_m=0.25),
+        row("climb", "success", 1, plan_error_m="0:-0.07", climbs=3, torque_rms_n_m=0.75),
         row("climb", "success", 2),
         row("climb", "overturned", 3),
     ]
-    (entry,) = measures.climbing(config, rows)
-    level, climb = entry["conditions"]["level"], entry["conditions"]["climb"]
-    assert (level["trials"], level["invalid"], level["successes"]) == (4, 1, 1)
-    assert level["success_share"] == pytest.approx(1 / 3)
-    assert level["first_reason"] == "why"
-    assert (climb["successes"], climb["overturned"], climb["climbs"]) == (3, 1, 1.0)
+    (entry,) = measures.climbing(config, frame(rows))
+    level, climb = entry.conditions["level"], entry.conditions["climb"]
+    assert (level.trials, level.invalid, level.successes) == (4, 1, 1)
+    assert level.success_share == pytest.approx(1 / 3)
+    assert (level.success_time_s, level.first_reason) == (20.0, "why")
+    assert (climb.successes, climb.overturned, climb.climbs) == (3, 1, 1.0)
+    assert (climb.torque_rms_n_m, level.torque_rms_n_m) == (0.5, None)
     known = stats.binomtest(3, 4).proportion_ci(method="wilson")
-    assert climb["wilson95"] == pytest.approx((known.low, known.high))
-    pair = entry["pairs"]["level"]
-    assert (pair["trials"], pair["only_climb"], pair["only_other"]) == (3, 2, 0)
-    assert pair["mcnemar_p"] == pytest.approx(0.5)  # two coins that fall alike
-    head, link1, together = entry["plan"]
-    assert (head["crossings"], link1["crossings"], together["crossings"]) == (2, 1, 3)
-    assert head["middle_cm"] == pytest.approx(-6.0)
-    assert together["within"] == pytest.approx(2 / 3)
+    assert climb.wilson95 == pytest.approx((known.low, known.high))
+    pair = entry.pairs["level"]
+    assert (pair.trials, pair.only_climb, pair.only_other) == (3, 2, 0)
+    assert pair.mcnemar_p == pytest.approx(0.5)  # two coins that fall alike
+    assert entry.plan
+    head, link1, together = entry.plan
+    assert (head.crossings, link1.crossings, together.crossings) == (2, 1, 3)
+    assert head.middle_cm == pytest.approx(-6.0)
+    assert together.within == pytest.approx(2 / 3)
 
 
 def test_what_is_felt_is_counted_by_hand():
@@ -159,26 +163,28 @@ def test_what_is_felt_is_counted_by_hand():
         felt("drop of 35 cm", "FLOOR", "fell", height_m=0.35),
         felt("flat", "STEP_UP", height_m=None, climbs=2, time_s=500.0, walked_m=20.0),
     ]
-    (entry,) = measures.sensing(ClimbConfig(divisors=(256.0,)), rows)
-    assert entry["confusion"]["step of 8 cm"] == {
+    (entry,) = measures.sensing(ClimbConfig(divisors=(256.0,)), frame(rows))
+    assert entry.confusion["step of 8 cm"] == {
         **dict.fromkeys(measures.VERDICTS, 0),
         "STEP_UP": 1,
         "FLOOR": 1,
     }
-    heights = entry["heights"]
-    assert (heights["steps"], heights["told"]) == (3, 2)
-    assert heights["rmse_m"] == pytest.approx(0.02 / math.sqrt(2))
-    assert (entry["cliff"]["stopped"], entry["cliff"]["trials"]) == (1, 2)
-    flat = entry["false_climbs"]["flat"]
-    assert (flat["per_1000_s"], flat["per_m"]) == pytest.approx((4.0, 0.1))
-    low, high = flat["per_1000_s_95"]
+    assert entry.felt["step of 8 cm"].felt_height_m == 0.08
+    heights = entry.heights
+    assert (heights.steps, heights.told) == (3, 2)
+    assert heights.rmse_m == pytest.approx(0.02 / math.sqrt(2))
+    assert (entry.cliff.stopped, entry.cliff.trials) == (1, 2)
+    flat = entry.false_climbs["flat"]
+    assert (flat.per_1000_s, flat.per_m) == pytest.approx((4.0, 0.1))
+    assert flat.per_1000_s_95
+    low, high = flat.per_1000_s_95
     assert stats.poisson.sf(1, 0.5 * low) == pytest.approx(0.025)  # two or more, as seldom
     assert stats.poisson.cdf(2, 0.5 * high) == pytest.approx(0.025)
 
 
 def test_rows_are_the_same_on_two_workers():
     config = ClimbConfig(**TINY)
-    one, two = run(config, 1), run(config, 2)
+    one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)
     assert one.rows == two.rows
     assert [r.outcome for r in one.rows] == ["timeout"] * 6
     assert one.result() == two.result()
@@ -309,16 +315,16 @@ def test_shards_are_merged(tmp_path):
 
 def test_a_run_that_was_stopped_tells_of_the_divisors_that_it_came_to():
     config = ClimbConfig(heights=(0.05,), conditions=("climb",))
-    one = ClimbOutcome(config, [row("climb", "success")], {}, interrupted=True)
-    told = measures.sentence(one.result())
+    one = measures.summarise(config, frame([row("climb", "success")]))
+    told = EXPERIMENT.sentence(one)
     assert told.endswith("with gain divisor 256 climb 1 of 1 (0.21 to 1.00).")
-    none = ClimbOutcome(config, [], {}, interrupted=True)
-    assert measures.sentence(none.result()).endswith(": none.")
+    none = measures.summarise(config, frame([], ClimbRow))
+    assert EXPERIMENT.sentence(none).endswith(": none.")
 
 
 @pytest.mark.slow
 def test_a_step_of_5_cm_is_climbed_by_who_knows_where_it_is():
-    config = ClimbConfig(heights=(0.05,), conditions=("edges",), trials=2, sensing=0)
+    config = ClimbConfig(heights=(0.05,), conditions=("edges",), trials=2, grounds=(), sensing=0)
     for name in cells(config):
         ended = []
         carry_out(config, name, [0, 1], ended.append)

@@ -9,7 +9,6 @@ import pytest
 
 from antennate.cli import BAD_INPUT, main
 from antennate.control.climbing.rule import Ground, Stage
-from antennate.experiments.climb import crossing
 from antennate.experiments.climb.config import (
     Cell,
     ClimbConfig,
@@ -19,9 +18,13 @@ from antennate.experiments.climb.config import (
     seed_of,
 )
 from antennate.experiments.climb.criterion import AFTER, Criterion
-from antennate.experiments.climb.physics import ClimbRow, carry_out
+from antennate.experiments.climb.measures import ratio95, summarise, walks
+from antennate.experiments.climb.physics import carry_out
+from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.sensing import Verdict
+from antennate.experiments.climb.tables import ground_tables
 from antennate.sim.trial import draw_trial, scene_of
+from antennate.studies.columns import frame
 
 WORDS = (
     "flat",
@@ -117,10 +120,9 @@ def test_one_link_deep_in_a_gap_is_a_fall() -> None:
 
 def row(condition: str, ground: str, outcome: str, trial: int = 0, **more: Any) -> ClimbRow:
     """A crossing by hand."""
-    columns = {"part": "ground", "ground": ground, "height_m": None, "divisor": 256.0, **more}
-    return ClimbRow(
-        0, condition, trial, condition=condition, outcome=outcome, time_s=9.0, **columns
-    )
+    place: dict[str, Any] = {"part": "ground", "ground": ground, "height_m": None, "divisor": 256.0}
+    place |= {"seed": 0, "cell": condition, "trial": trial, "condition": condition}
+    return ClimbRow(**place, outcome=outcome, time_s=9.0, **more)
 
 
 def test_crossings_of_rows_by_hand() -> None:
@@ -135,15 +137,16 @@ def test_crossings_of_rows_by_hand() -> None:
         row("climb", "gap:0.3", "stopped", 0),
         row("climb", "gap:0.3", "stopped", 1),
     ]
-    (entry,) = crossing.crossing(config, rows)
-    near, far = entry["grounds"]["level"]
-    assert (near["successes"], near["fell"], near["success_share"]) == (1, 1, 0.5)
-    assert (far["fell"], far["invalid"], far["first_reason"]) == (1, 1, "why")
-    assert [s["stopped"] for s in entry["grounds"]["climb"]] == [0, 2]
-    pair = entry["pairs"]["gap"]["level"]
-    assert (pair["trials"], pair["only_climb"], pair["only_other"]) == (3, 1, 0)
-    assert entry["flat"] is None
-    crossed, ended, *_ = crossing.ground_tables({"grounds": [entry], "time_limit_s": 60.0})
+    result = summarise(config, frame(rows))
+    (entry,) = result.grounds
+    near, far = entry.grounds["level"]
+    assert (near.successes, near.fell, near.success_share) == (1, 1, 0.5)
+    assert (far.fell, far.invalid, far.first_reason) == (1, 1, "why")
+    assert [each.stopped for each in entry.grounds["climb"]] == [0, 2]
+    pair = entry.pairs["gap"]["level"]
+    assert (pair.trials, pair.only_climb, pair.only_other) == (3, 1, 0)
+    assert entry.flat is None
+    crossed, ended, *_ = ground_tables(result)
     assert [name for name, _ in crossed.rows] == ["gap of 10 cm", "gap of 30 cm"]
     assert ended.rows[1][1] == ["1 fell, 1 invalid", "2 stopped"]
 
@@ -154,19 +157,20 @@ def test_a_ratio_of_speeds_is_that_of_paired_trials_and_has_its_interval() -> No
     base = 0.2 + 0.02 * rng.standard_normal(12)
     speeds = {"level": base, "climb": 0.99 * base + 0.001 * rng.standard_normal(12)}
     rows = {
-        name: [row(name, "flat", "walked", k, speed_m_s=v) for k, v in enumerate(values.tolist())]
+        name: frame(row(name, "flat", "walked", k, speed_m_s=v) for k, v in enumerate(values))
         for name, values in speeds.items()
     }
-    flat = crossing.walks(rows)
-    assert flat["level"]["ratio"] == 1.0
-    assert flat["climb"]["ratio"] == pytest.approx(speeds["climb"].mean() / base.mean())
-    low, high = flat["climb"]["ratio_95"]
-    assert 0.98 < low < flat["climb"]["ratio"] < high < 1.0
-    turned = crossing.ratio95(np.column_stack([base, speeds["climb"]]))
-    assert turned["ratio_95"] == pytest.approx((1 / high, 1 / low))
-    assert (
-        crossing.walks({name: some[:4] for name, some in rows.items()})["climb"]["ratio_95"] is None
-    )
+    flat = walks(rows)
+    assert flat["level"].ratio == 1.0
+    climb = flat["climb"]
+    assert climb.ratio == pytest.approx(speeds["climb"].mean() / base.mean())
+    assert climb.ratio is not None
+    assert climb.ratio_95 is not None
+    low, high = climb.ratio_95
+    assert 0.98 < low < climb.ratio < high < 1.0
+    _, turned = ratio95(np.column_stack([base, speeds["climb"]]))
+    assert turned == pytest.approx((1 / high, 1 / low))
+    assert walks({name: some[:4] for name, some in rows.items()})["climb"].ratio_95 is None
 
 
 @pytest.mark.slow

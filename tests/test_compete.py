@@ -22,7 +22,8 @@ import antennate
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.compete import apart, experiment
-from antennate.experiments.compete.checking import compared, read_rows, refusal
+from antennate.experiments.compete.checking import read_rows
+from antennate.experiments.compete.comparison import compared, refusal
 from antennate.experiments.compete.config import (
     DEVELOPMENT,
     RESERVED,
@@ -34,7 +35,7 @@ from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
 from antennate.experiments.compete.experiment import run
 from antennate.experiments.compete.page import sentence
 from antennate.experiments.compete.scenes import label, tunnel_config
-from antennate.experiments.compete.standings import standings
+from antennate.experiments.compete.standings import standing
 from antennate.studies.formats import to_csv
 from antennate.studies.pool import Workers
 from antennate.studies.run_directory import RunDirectory
@@ -203,7 +204,7 @@ def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
 ) -> None:
     rows = episodes(entries("shifty"), 2)
     assert {row.given for row in rows} == {"jam map"}
-    assert standings(rows, 0.01)["controllers"][rows[0].controller]["rank"] is None
+    assert standing(rows, 0.01).controllers[rows[0].controller].rank is None
 
 
 ESCAPES = """
@@ -908,7 +909,17 @@ def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: P
         read_rows(tmp_path)
 
 
-HERE = Episode("open", "flat", 1, 0, "success", 20.0, progress_m=2.0, engine="e", processor="p")
+HERE = Episode(
+    controller="open",
+    scene="flat",
+    seed=1,
+    trial=0,
+    outcome="success",
+    time_s=20.0,
+    progress_m=2.0,
+    engine="e",
+    processor="p",
+)
 
 
 @pytest.mark.parametrize(
@@ -926,7 +937,7 @@ def test_on_the_same_processor_a_single_row_that_differs_is_refused(change: dict
     ours = [replace(HERE, trial=trial) for trial in range(200)]
     theirs = [replace(ours[0], **change), *ours[1:]]
     check = compared(theirs, ours)
-    assert (check["same"], check["broken"]) == (199, 1)
+    assert (check.same, check.broken) == (199, 1)
     assert "Expected no difference in 1 of them" in refusal(check)
     assert not refusal(compared(ours, ours))
     elsewhere = compared([replace(row, processor="q") for row in theirs], ours)
@@ -942,8 +953,9 @@ def test_processors_of_one_name_differ_by_their_numbers(theirs: str, same: bool)
     ours = [replace(HERE, trial=trial, processor="Xeon 6 (model 7)") for trial in range(200)]
     rows = [replace(row, processor=theirs) for row in ours]
     check = compared([replace(rows[0], time_s=19.99), *rows[1:]], ours)
-    assert check["broken"] == same
-    assert ("200 are of another version, engine or" in sentence({"check": check})) == (not same)
+    assert check.broken == same
+    said = sentence(standing(ours, 0.01, check))
+    assert ("200 are of another version, engine or" in said) == (not same)
 
 
 def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean() -> None:
@@ -957,8 +969,8 @@ def test_on_another_processor_times_may_differ_by_chance_but_not_in_their_mean()
             for row, apart in zip(ours, noise, strict=True)
         ]
         check = compared(theirs, ours)
-        assert check["broken"] == 0
-        assert check["mean_share_difference"] == pytest.approx(forged / 100.0)
+        assert check.broken == 0
+        assert check.mean_share_difference == pytest.approx(forged / 100.0)
         assert ("mean times" in refusal(check)) == wrong
 
 
@@ -976,13 +988,13 @@ def test_on_another_processor_rows_may_end_otherwise_but_not_to_one_side(
     theirs[:won] = [replace(row, outcome="success", time_s=99.9) for row in theirs[:won]]
     theirs[-lost:] = [replace(row, outcome="timeout", time_s=100.0) for row in theirs[-lost:]]
     check = compared(theirs, ours)
-    assert (check["more_successes"], check["other_outcome"]) == (won - lost, won + lost)
+    assert (check.more_successes, check.other_outcome) == (won - lost, won + lost)
     assert ("as many successes" in refusal(check)) == wrong
     both = [
         [replace(row, scene=f"uturn+readings=delayed:{t:g}") for row in rows[:9] for t in (0.01, 0)]
         for rows in (theirs, ours)
     ]
-    assert compared(*both)["successes_p"] == pytest.approx(2.0 * 0.5 ** min(won, 9))
+    assert compared(*both).successes_p == pytest.approx(2.0 * 0.5 ** min(won, 9))
 
 
 ELSEWHERE = "controller,scene,seed,trial,outcome,time_s,limit_s,processor"
@@ -1036,7 +1048,7 @@ def test_far_times_of_few_draws_have_the_chance_of_four_tosses() -> None:
         theirs = [replace(r, processor="q", time_s=10.0 + 80.0 * (r.trial >= far)) for r in ours]
         check = compared(theirs, ours)
         test = binomtest(far, count, 0.25, alternative="greater")
-        assert check["far_p"] == pytest.approx(2.0 * test.pvalue)
+        assert check.far_p == pytest.approx(2.0 * test.pvalue)
 
 
 def test_the_check_refuses_few_of_the_tables_that_chance_makes() -> None:
@@ -1051,8 +1063,12 @@ def test_the_check_refuses_few_of_the_tables_that_chance_makes() -> None:
             times = np.where(won, rng.uniform(5.0, 99.0, 12), 100.0)
             tables.append(
                 [
-                    Episode(
-                        *("open", "flat", 1, k, "success" if w else "timeout", t), processor=place
+                    replace(
+                        HERE,
+                        trial=k,
+                        outcome="success" if w else "timeout",
+                        time_s=t,
+                        processor=place,
                     )
                     for k, (w, t) in enumerate(zip(won.tolist(), times.tolist(), strict=True))
                 ]
@@ -1062,9 +1078,8 @@ def test_the_check_refuses_few_of_the_tables_that_chance_makes() -> None:
 
 
 def test_rows_that_were_not_run_are_not_compared() -> None:
-    row = Episode("open", "flat", 1, 0, "success", 10.0)
-    check = compared([row, replace(row, trial=1)], [row])
-    assert (check["rows"], check["same"], check["differ"]) == (1, 1, [])
+    check = compared([HERE, replace(HERE, trial=1)], [HERE])
+    assert (check.rows, check.same, check.differ) == (1, 1, [])
 
 
 # scenes with other parameters

@@ -259,11 +259,12 @@ def test_what_is_seen_after_the_limit_is_a_timeout(
 
 @pytest.mark.parametrize("time", [43.0, -0.1, np.nan, np.inf])
 def test_there_is_no_row_of_a_time_beyond_its_limit(time: float) -> None:
-    TrialResult(0, 0, "open", "success", 8.0, limit_s=8.0)
+    key: Any = {"seed": 0, "trial": 0, "controller": "open", "outcome": "success", "limit_s": 8.0}
+    TrialResult(**key, time_s=8.0)
     with pytest.raises(
         ValueError, match="time_s: expected a finite number of 0 to limit_s, 8, found"
     ):
-        TrialResult(0, 0, "open", "success", time, limit_s=8.0)
+        TrialResult(**key, time_s=time)
 
 
 def test_a_robot_that_climbs_is_not_watched_beyond_its_limit() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import subprocess
@@ -16,21 +17,24 @@ import antennate
 from antennate.antenna.sensor import counts
 from antennate.cli import main
 from antennate.control.gait import targets
+from antennate.errors import SimulationError
+from antennate.experiments.dataset import experiment
 from antennate.experiments.dataset import features as looks
 from antennate.experiments.dataset.card import card
 from antennate.experiments.dataset.closed_form import closed_form, contact_places
-from antennate.experiments.dataset.columns import TASKS, columns_of
+from antennate.experiments.dataset.columns import TASKS, Windows, columns_of
 from antennate.experiments.dataset.config import HISTORY, KINDS, SPLITS, DatasetConfig, split_of
-from antennate.experiments.dataset.episodes import HeadTurn, drawn, gap_windows, setting
+from antennate.experiments.dataset.episodes import Draw, HeadTurn, drawn, gap_windows, setting
 from antennate.experiments.dataset.estimates import (
     BASELINES,
+    LengthErrors,
     by_episode,
     estimates,
     neighbours,
     polynomial,
     score,
 )
-from antennate.experiments.dataset.experiment import EXPERIMENT, run
+from antennate.experiments.dataset.experiment import EXPERIMENT, KindSummary, run
 from antennate.experiments.dataset.walk import axis_of, walk_windows
 from antennate.params.gaits import GaitParams
 from antennate.robots.antenna import AntennaSpec
@@ -260,13 +264,13 @@ def test_errors_are_means_over_episodes_with_their_interval() -> None:
     told = {"mean": truth + 4.0, "x": guess}
     entry = score(task, windows, told, np.ones(8, bool))["x"]
     half = 2.7764 * math.sqrt(2.5 / 5)
-    assert (entry["episodes"], entry["windows"], entry["untold"]) == (5, 7, 1)
-    assert entry["mae_m"] == pytest.approx(3.0)
-    assert entry["mae_m_95"] == pytest.approx((3.0 - half, 3.0 + half), abs=1e-3)
-    assert entry["gain_m"] == pytest.approx(1.0)
-    assert entry["mape_percent"] == pytest.approx(30.0)
-    low, high = entry["gain_m_95"]
-    assert (low, high) == pytest.approx((1.0 - half, 1.0 + half), abs=1e-3)
+    assert isinstance(entry, LengthErrors)
+    assert (entry.episodes, entry.windows, entry.untold) == (5, 7, 1)
+    assert entry.mae_m == pytest.approx(3.0)
+    assert entry.mae_m_95 == pytest.approx((3.0 - half, 3.0 + half), abs=1e-3)
+    assert entry.gain_m == pytest.approx(1.0)
+    assert entry.gain_m_95 == pytest.approx((1.0 - half, 1.0 + half), abs=1e-3)
+    assert entry.mape_percent == pytest.approx(30.0)
     assert by_episode(np.array([1.0, 3.0, 5.0]), np.array([7, 7, 9])).tolist() == [2.0, 5.0]
 
 
@@ -306,12 +310,34 @@ def test_out_of_reach_of_all_walls_there_is_a_card_and_nothing_is_learned() -> N
     far = SMALL["walk"] | {"distance": [0.5, 0.6], "angle": [-0.1, 0.1]}
     outcome = run(DatasetConfig.model_validate(SMALL | {"kinds": ["walk"], "walk": far}))
     result = outcome.result()
-    assert result["kinds"]["walk"]["windows"] == 0
-    assert result["kinds"]["walk"]["untouched"] == 20
+    walks = KindSummary(trials=10, invalid=0, windows=0, untouched=20, splits={})
+    assert result.kinds == {"walk": walks}
     assert EXPERIMENT.sentence(result) == "Too few windows to learn from."
     assert [table.title[:5] for table in EXPERIMENT.tables(result)] == ["Windo", "dista", "angle"]
     assert set(EXPERIMENT.figures(outcome)) == {"dataset"}
     assert "0 windows" in card(outcome.config, outcome.by_kind)
+
+
+def test_an_episode_whose_physics_fails_is_counted_and_gives_no_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Every third of ten pushes fails: 0, 3, 6 and 9."""
+    sound = experiment.push_windows
+
+    def burst(config: DatasetConfig, draw: Draw) -> Windows:
+        if next(count) % 3 == 0:
+            raise SimulationError(0, "burst")
+        return sound(config, draw)
+
+    count = itertools.count()
+    monkeypatch.setitem(experiment._MAKE, "push", burst)
+    outcome = run(DatasetConfig.model_validate(SMALL | {"kinds": ["push"]}))
+    pushes = outcome.result().kinds["push"]
+    assert (pushes.trials, pushes.invalid) == (10, 4)
+    assert pushes.windows + pushes.untouched == 6
+    assert sum(pushes.splits.values()) == pushes.windows == len(outcome.by_kind["push"]["episode"])
+    assert ["burst" in row.reason for row in outcome.rows[:4]] == [True, False, False, True]
+    assert not EXPERIMENT.failed(outcome.result())
 
 
 def test_without_pyarrow_it_ends_before_it_begins(

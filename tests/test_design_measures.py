@@ -15,7 +15,7 @@ import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.experiments.design.config import Evaluation
-from antennate.experiments.design.designs import front_of, worth_of
+from antennate.experiments.design.designs import Value, front_of, worth_of
 
 HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
@@ -41,11 +41,11 @@ def test_a_measure_of_successes_leaves_jams_out() -> None:
     rows = walls("success", "jam", "success", "jam", flex=(18.0, 87.0, 21.0, 90.0))
     found = worth_of(rows, OBJECTIVES, 0.5)
     assert found is not None
-    assert found["wall.success_share"]["value"] == 0.5
-    assert found["wall.flex_max_deg@success"]["value"] == pytest.approx(19.5)
-    assert found["wall.flex_max_deg@success"]["trials"] == 2
-    assert found["wall.flex_max_deg"]["value"] == pytest.approx(54.0)
-    assert found["wall.flex_max_deg@success"]["value95"] is None  # of two trials
+    assert found["wall.success_share"].value == 0.5
+    assert found["wall.flex_max_deg@success"].value == pytest.approx(19.5)
+    assert found["wall.flex_max_deg@success"].trials == 2
+    assert found["wall.flex_max_deg"].value == pytest.approx(54.0)
+    assert found["wall.flex_max_deg@success"].value95 is None  # of two trials
 
 
 def test_the_interval_of_an_objective_is_that_of_student_within_its_bounds() -> None:
@@ -53,16 +53,16 @@ def test_the_interval_of_an_objective_is_that_of_student_within_its_bounds() -> 
     name, half = "wall.flex_max_deg", 2.776 * math.sqrt(62.5 / 5)  # the printed quantile
     found = worth_of(rows, OBJECTIVES, 0.5)
     assert found is not None
-    assert found[name]["value95"] == pytest.approx((6.0 - half, 6.0 + half), abs=0.01)
+    assert found[name].value95 == pytest.approx((6.0 - half, 6.0 + half), abs=0.01)
     found = worth_of(rows, OBJECTIVES, 0.5, {name: (0.0, 10.0)})
     assert found is not None
-    assert found[name]["value95"] == (0.0, 10.0)
+    assert found[name].value95 == (0.0, 10.0)
 
 
 def test_without_success_there_is_no_value_and_the_design_stands() -> None:
     found = worth_of(walls("jam", "jam", flex=(87.0, 90.0)), OBJECTIVES, 0.5)
     assert found is not None
-    assert found["wall.flex_max_deg@success"] == {"value": None, "value95": None, "trials": 0}
+    assert found["wall.flex_max_deg@success"] == Value(value=None, value95=None, trials=0)
 
 
 def test_what_failures_lack_does_not_fail_a_design() -> None:
@@ -70,7 +70,7 @@ def test_what_failures_lack_does_not_fail_a_design() -> None:
     rows = walls("success", "jam", "jam", "jam", flex=(18.0, None, None, None))
     found = worth_of(rows, OBJECTIVES[:2], 0.5)
     assert found is not None
-    assert found["wall.flex_max_deg@success"] == {"value": 18.0, "value95": None, "trials": 1}
+    assert found["wall.flex_max_deg@success"] == Value(value=18.0, value95=None, trials=1)
     for row in rows[1:]:
         row["status"] = "failed"
     assert worth_of(rows, OBJECTIVES[:2], 0.5) is None
@@ -83,8 +83,9 @@ def test_a_design_without_a_value_is_the_worst(goal: str) -> None:
     asked = {g: tuple(m for m, its in measures.items() if its == g) for g in measures.values()}
     objectives = Evaluation.model_validate(asked).objectives("bowls")
 
-    def each(near: float, far: float | None) -> dict[str, Any]:
-        return {"bowls.near": {"value": near}, "bowls.far@success": {"value": far}}
+    def each(near: float, far: float | None) -> dict[str, Value]:
+        worth = {"bowls.near": near, "bowls.far@success": far}
+        return {name: Value(value=of, value95=None, trials=3) for name, of in worth.items()}
 
     assert front_of([each(1.0, None), each(2.0, 5.0), each(2.0, None)], objectives) == [
         True,
@@ -187,7 +188,7 @@ def test_objectives_have_names_and_units() -> None:
         },
     )
     result = experiments.load("design").run(config, 1, lambda *_: None, lambda _: None).result()
-    assert [each["title"] for each in result["objectives"]] == [
+    assert [each.title for each in result.objectives] == [
         "wall: share of successes [%]",
         "wall: flex, largest (successes only) [deg]",
         "wall: contact force, mean [N]",

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -22,6 +23,8 @@ from antennate.control.registry import BUILT_IN, USUAL, looks
 from antennate.experiments.compete import figure as compete
 from antennate.experiments.compete.episodes import Episode
 from antennate.experiments.gait import figure as gait
+from antennate.experiments.gait.physics import Pace
+from antennate.experiments.gait.result import CostOfPhase, GaitResult, PhasePoint, WaveOff
 from antennate.experiments.taper import experiment as taper
 from antennate.experiments.taper.experiment import TaperConfig
 from antennate.experiments.taper.experiment import run as run_taper
@@ -83,7 +86,7 @@ def rows() -> list[Row]:
     return [Row(name, k, *end) for name in BUILT_IN for k, end in enumerate(outcomes)]
 
 
-def summaries() -> dict[str, dict]:
+def summaries(**changes) -> dict[str, SimpleNamespace]:
     one = {
         "trials": 4,
         "invalid": 0,
@@ -92,7 +95,7 @@ def summaries() -> dict[str, dict]:
         "restricted_mean_time_s": 32.5,
         "restricted_mean_time_95": (12.5, 50.0),
     }
-    return dict.fromkeys(BUILT_IN, one)
+    return dict.fromkeys(BUILT_IN, SimpleNamespace(**{**one, **changes}))
 
 
 def trajectories(names=USUAL, trials=range(4)):
@@ -106,17 +109,29 @@ def one_trajectory():
     return trajectories(("open",), range(2, 3))
 
 
-def walk_result() -> dict:
-    row = {"speed_m_s": 0.2, "yaw_deg_per_cycle": 0.0}
-    return {
-        "frequency_hz": 0.5,
-        "maneuvers": {m.name.lower(): row for m in list(Maneuver)[:4]},
-        "wave_off": {"speed_m_s": 0.12},
-        "phase_sweep": [
-            {"body_phase_rad": a, "speed_m_s": 0.1 - 0.1 * np.cos(a)} for a in range(6)
+def walk_result() -> GaitResult:
+    fast = {"speed_m_s": 0.2, "body_lengths_per_cycle": 0.5}
+    pace = Pace(**fast, yaw_deg_per_cycle=0.0, cost_of_transport=0.4)
+    return GaitResult(
+        body_length_m=0.8,
+        frequency_hz=0.5,
+        maneuvers={m.name.lower(): pace for m in list(Maneuver)[:4]},
+        wave_off=WaveOff(speed_m_s=0.12, expected_m_s=0.12, ratio=1.0),
+        phase_sweep=[
+            PhasePoint(
+                body_phase_rad=float(a),
+                speed_m_s=0.1 - 0.1 * np.cos(a),
+                body_lengths_per_cycle=0.25 - 0.25 * np.cos(a),
+            )
+            for a in range(6)
         ],
-        "chosen_body_phase_rad": -2.5,
-    }
+        chosen_body_phase_rad=-2.5,
+        best_body_phase_rad=3.0,
+        cost_of_phase=CostOfPhase(chosen_over_best=0.9, worst_over_best=0.0),
+        measured_body_lengths_per_cycle=None,
+        unknown=None,
+        optimised=None,
+    )
 
 
 @dataclass
@@ -206,7 +221,8 @@ def test_a_command_draws_though_its_terminal_belongs_to_a_notebook(tmp_path):
 def test_names_are_written_as_they_are():
     """Matplotlib reads a formula between dollar signs, and leaves `_name` out of a legend."""
     names = ["_mine.onnx", "a$x$.onnx", "$\\frac{$.onnx"]
-    rows = [Episode(name, "flat", 1, 0, "success", 2.0, engine="e") for name in names]
+    ended = {"scene": "flat", "seed": 1, "trial": 0, "outcome": "success", "time_s": 2.0}
+    rows = [Episode(controller=name, **ended) for name in names]
     figure = compete.profile(rows, names)
     style.render(figure)
     (legend,) = figure.legends
@@ -344,7 +360,7 @@ def test_curve_drops_at_exits_and_failures_stay():
 
 
 def test_a_controller_without_a_valid_trial_is_left_blank():
-    empty = {**summaries()["open"], "invalid": 4, "successes": 0, "restricted_mean_time_s": None}
+    empty = summaries(invalid=4, successes=0, restricted_mean_time_s=None)["open"]
     figure = tunnel.summary({"open": empty}, [Row("open", 0, "invalid", LIMIT)], LIMIT)
     style.render(figure)
     assert figure.axes[0].get_yticklabels()[0].get_text() == "open\nn = 0"
@@ -380,7 +396,7 @@ def test_the_legend_names_only_what_the_scene_has():
 @pytest.mark.parametrize(("trials", "ends"), [(4, [0.5, 0.5]), (5, [0.15, 0.85])])
 def test_an_interval_of_a_mean_is_drawn_where_there_are_enough_trials(trials, ends):
     """That of a share holds for any count."""
-    one = {**summaries()["open"], "trials": trials, "successes": trials / 2}
+    one = summaries(trials=trials, successes=trials / 2)["open"]
     figure = tunnel.summary({"open": one}, rows(), LIMIT)
     share, _, time = figure.axes
     drawn = np.concatenate([line.get_xdata() for line in share.lines])
@@ -416,7 +432,7 @@ def test_each_profile_has_its_colour_and_its_boulders_along_the_wall():
     boulders = np.array([[0.003, y, 0.003] for y in np.arange(-0.2, 0.3, 0.006)])
     zero = np.zeros(5)
     seen = Traverse(zero, zero, zero, zero, zero, zero, np.tile(straight, (11, 1, 1)), boulders)
-    figure = wall.passages(dict.fromkeys(("ascending", "stiff"), seen))
+    figure = wall.passages({(profile, 0): seen for profile in ("ascending", "stiff")})
     for profile, panel in zip(("ascending", "stiff"), figure.axes[1::2], strict=True):
         assert {line.get_color() for line in panel.lines} == {style.PROFILE_LOOKS[profile][0]}
         circles = [patch.get_center() for patch in panel.patches]

@@ -165,7 +165,14 @@ def test_a_film_of_the_tunnel_ends_with_a_word_on_the_outcome(
 ) -> None:
     shares = dict.fromkeys(("forward", "turn_l", "turn_r", "reverse", "hold"), 0.2)
     row = TrialResult(
-        *(0, 0, "open", outcome, 31.92, 1.0, stuck, recovered),
+        seed=0,
+        trial=0,
+        controller="open",
+        outcome=outcome,
+        time_s=31.92,
+        progress_m=1.0,
+        stuck=stuck,
+        recovered=recovered,
         **{f"share_{name}": share for name, share in shares.items()},
         force_mean_n=1.0,
         force_max_n=2.0,

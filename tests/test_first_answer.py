@@ -11,11 +11,13 @@ from scipy.stats import binomtest
 from antennate.cli import main
 from antennate.cli.results import drawn_table
 from antennate.cli.terminal import progress
-from antennate.experiments.tunnel.experiment import TunnelOutcome, run
-from antennate.experiments.tunnel.measures import sentence
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
-from antennate.studies.measures import Interim
+from antennate.experiments.tunnel.result import summarise
+from antennate.experiments.tunnel.tables import sentence
+from antennate.studies.columns import frame
 from antennate.studies.pool import Workers
+from antennate.studies.tables import Interim
 from antennate.studies.work import Here
 
 
@@ -44,7 +46,7 @@ def test_a_long_run_says_after_each_quarter_how_it_stands(
 def test_controllers_take_turns_so_that_half_of_a_run_tells_of_each() -> None:
     config = TunnelConfig(trials=6, time_limit=0.05)
     order: list[str] = []
-    run(config, Workers(2, Here()), on_row=lambda row: order.append(row.controller))
+    EXPERIMENT.run(config, Workers(2, Here()), on_row=lambda row: order.append(row.controller))
     assert sorted(order[: len(order) // 2]) == sorted([*config.controllers] * 3)
 
 
@@ -54,12 +56,12 @@ def test_few_trials_say_how_little_they_decide(trials: int, says: bool) -> None:
     assert binomtest(5, 5).pvalue > 0.05 > binomtest(6, 6).pvalue
     names = TunnelConfig().controllers
     rows = [
-        TrialResult(0, k, name, "success", 10.0 + k, limit_s=100.0)
+        TrialResult(seed=0, trial=k, controller=name, outcome="success", time_s=10.0 + k)
         for name in names
         for k in range(trials)
     ]
     config = TunnelConfig(trials=trials)
-    said = sentence(TunnelOutcome(config, rows, {}, False).result())
+    said = sentence(summarise(config, frame(rows)))
     assert said.endswith("one alone crosses at least 6.") is says
 
 

@@ -13,12 +13,16 @@ import pytest
 from antennate import experiments
 from antennate.cli import main
 from antennate.control.registry import BUILT_IN, RIVAL, compared
-from antennate.experiments.study import measures as study_measures
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.tunnel.experiment import TunnelOutcome
+from antennate.experiments.study.effects import Elementary
+from antennate.experiments.study.result import Cell, StudyResult
+from antennate.experiments.study.result import summarise as studied
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
-from antennate.experiments.wall.experiment import WallOutcome
-from antennate.experiments.wall.physics import WallConfig, WallTrial
+from antennate.experiments.tunnel.result import TunnelResult
+from antennate.experiments.tunnel.result import summarise as crossed
+from antennate.experiments.wall.experiment import summarise
+from antennate.experiments.wall.physics import WallConfig, invalid
+from antennate.studies.columns import frame
 
 TUNNEL, WALL = experiments.load("tunnel"), experiments.load("wall")
 FEW = "Fewer than 5 trials decide nothing; their means have no interval."
@@ -28,18 +32,19 @@ UNMET_5 = 0.4345  # Wilson's largest share of failures where none of five failed
 
 def row(controller: str, trial: int, time: float | None, outcome: str = "success") -> TrialResult:
     ended = outcome if time is not None else "timeout"
-    return TrialResult(0, trial, controller, ended, time or 100.0, 1.0, *[0] * 9)  # pyright: ignore[reportArgumentType]
+    how: Any = {"outcome": ended, "time_s": time or 100.0, "progress_m": 1.0}
+    return TrialResult(seed=0, trial=trial, controller=controller, **how)
 
 
-def result(**times: list[float | None]) -> dict[str, Any]:
+def result(**times: list[float | None]) -> TunnelResult:
     """The result of a run in which controllers took so long; None is out of time at 100 s."""
     rows = [row(name, k, t) for name, every in times.items() for k, t in enumerate(every)]
     most = max(map(len, times.values()))
     config = TunnelConfig(controllers=tuple(times), trials=max(1, most))
-    return TunnelOutcome(config, rows, {}, interrupted=False).result()
+    return crossed(config, frame(rows))
 
 
-def headline(found: dict[str, Any]) -> str:
+def headline(found: TunnelResult) -> str:
     """The sentence of five trials, without its last: how little they decide."""
     told, mark, _ = TUNNEL.sentence(found).partition(" 5 trials decide little")
     assert mark
@@ -129,8 +134,8 @@ def test_few_trials_have_no_interval_of_a_mean_and_one_sentence(trials: int) -> 
     """Student's of two trials of 28 and 60 s would reach from -159 to 247 s."""
     times: list[float | None] = [28.0, 60.0, 35.0, None]
     found = result(open=times[:trials], closed=times[:trials][::-1])
-    assert found["controllers"]["open"]["restricted_mean_time_95"] is None
-    assert found["paired"]["open-closed"]["time_difference_95"] is None
+    assert found.controllers["open"].restricted_mean_time_95 is None
+    assert found.paired["open-closed"].time_difference_95 is None
     text = TUNNEL.sentence(found)
     assert text.endswith(f". {FEW}")
     assert text.count("decide nothing") == 1
@@ -143,11 +148,11 @@ def test_few_trials_have_no_interval_of_a_mean_and_one_sentence(trials: int) -> 
 
 def test_intervals_keep_to_the_time_that_there_is() -> None:
     found = result(open=[None, None, None, None, 5.0], closed=[1.0, 1.0, 1.0, 1.0, 90.0])
-    low, high = found["controllers"]["open"]["restricted_mean_time_95"]
+    low, high = found.controllers["open"].restricted_mean_time_95
     assert 0.0 < low < 81.0 < high < 100.0
-    low, high = found["controllers"]["closed"]["restricted_mean_time_95"]
+    low, high = found.controllers["closed"].restricted_mean_time_95
     assert (low, 18.8 < high <= 100.0) == (0.0, True)
-    low, high = found["paired"]["open-closed"]["time_difference_95"]
+    low, high = found.paired["open-closed"].time_difference_95
     assert -100.0 <= low < 62.2 < high <= 100.0
 
 
@@ -162,23 +167,23 @@ def test_a_study_knows_the_bounds_of_what_it_compares() -> None:
             {"point": 0, "controller": "open", "trial": k, "status": "ok", "time_s": time}
             for k, time in enumerate([100.0, 100.0, 100.0, 100.0, 5.0])
         ]
-        found = study_measures.summary(config, [point], {}, "controller", rows)
-        low, high = found["points"][0]["response95"]
+        found = studied(config, [point], {}, "controller", rows, 5, 5)
+        low, high = found.points[0].response95 or (0.0, 0.0)
         assert pytest.approx((low, high), abs=0.02) == (5.0 + 95.0 * 0.3755, 5.0 + 95.0 * 0.9638)
-        few = study_measures.summary(config, [point], {}, "controller", rows[:4])
-        assert few["points"][0]["response95"] is None
+        few = studied(config, [point], {}, "controller", rows[:4], 4, 4)
+        assert few.points[0].response95 is None
 
 
 def test_nothing_of_nothing_is_never_said() -> None:
     rows = [row("closed", 0, 20.0)]
     config = TunnelConfig(controllers=("open", "closed"), trials=3)
-    found = TunnelOutcome(config, rows, {}, interrupted=True).result()
+    found = crossed(config, frame(rows))
     texts = [TUNNEL.sentence(found), repr(TUNNEL.tables(found))]
     lost = [row("open", k, 1.0, "invalid") for k in range(3)]
-    found = TunnelOutcome(config, [*lost, *rows], {}, interrupted=False).result()
+    found = crossed(config, frame([*lost, *rows]))
     texts += [TUNNEL.sentence(found), repr(TUNNEL.tables(found))]
-    wall = WallTrial(0, 0, "stiff", "invalid", "invalid", *[0.0] * 8, reason="time stood still")
-    walls = WallOutcome(WallConfig(profiles=("stiff",), trials=1), [wall], {}).result()
+    one = WallConfig(profiles=("stiff",), trials=1)
+    walls = summarise(one, frame([invalid(one, "stiff", 0, "time stood still")]))
     texts += [WALL.sentence(walls), repr(WALL.tables(walls))]
     for text in texts:
         assert "0 of 0" not in text
@@ -241,35 +246,43 @@ def test_a_study_of_controllers_tells_what_moves_the_last_against_the_rival() ->
     study = experiments.load("study")
     names = ["open", "paper", "closed", "paper minus open", "closed minus open"]
     effects = [
-        {
-            "of": of,
-            "parameter": name,
-            "mu_star": size,
-            "mu_star95": None,
-            "noise": 0.1,
-            "above_noise": size > 0.1,
-            "mu": size,
-            "sigma": None,
-        }
+        Elementary(
+            of=of,
+            parameter=name,
+            mu_star=size,
+            mu_star95=None,
+            noise=0.1,
+            above_noise=size > 0.1,
+            mu=size,
+            sigma=None,
+        )
         for of in [*names, "closed minus paper"]
         for name, size in (
             ("width", 0.9 if of == "closed minus open" else 0.0),
             ("length", 0.5 if of == "closed minus paper" else 0.0),
         )
     ]
-    point = {"point": 0, "condition": "open", "trials": 9, "invalid": 0, "response": 0.5}
-    found = {
-        "experiment": "tunnel",
-        "plan": "morris",
-        "response": "success_share",
-        "axes": ["width", "length"],
-        "points": [point],
-        "trials": 9,
-        "ended": 9,
-        "interrupted": False,
-        "statuses": {"ok": 9},
-        "conditions": {},
-        "effects": effects,
-    }
+    point = Cell(
+        point=0,
+        values={},
+        condition="open",
+        trials=9,
+        invalid=0,
+        response=0.5,
+        response95=None,
+    )
+    found = StudyResult(
+        experiment="tunnel",
+        plan="morris",
+        response="success_share",
+        axes=["width", "length"],
+        points=[point],
+        trials=9,
+        ended=9,
+        interrupted=False,
+        statuses={"ok": 9},
+        conditions={},
+        effects=[*effects],
+    )
     assert "closed minus open depends on width" in study.sentence(found)
     assert [line for line, _ in study.tables(found)[0].rows][1:] == ["width", "length"]

@@ -18,10 +18,12 @@ from antennate.experiments import bench
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
 from antennate.experiments.force import physics as post_traverse
+from antennate.experiments.force.result import ForceResult
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Bench
+from antennate.studies.columns import content, typed
 from antennate.studies.formats import to_csv, to_json, to_toml
 
 BARE = AntennaSpec(sensor_stiffness_n_mm_per_deg=0.0)
@@ -75,19 +77,38 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
         chain = Chain.of(with_profile(BARE, profile))
         largest = loads.largest_force(chain, math.radians(30))
         found.append(force.score(points, "flex", 0.5, None, largest))
-    assert found[0]["r2"] == pytest.approx(found[1]["r2"], abs=1e-6)
-    assert found[0]["rmse_percent"] == pytest.approx(found[1]["rmse_percent"], rel=1e-5)
-    assert 0.3 < found[0]["r2"] < 0.95
+    assert found[0].r2 == pytest.approx(found[1].r2, abs=1e-6)
+    assert found[0].rmse_percent == pytest.approx(found[1].rmse_percent, rel=1e-5)
+    assert 0.3 < found[0].r2 < 0.95
 
 
 def test_a_known_place_tells_the_force_and_friction_blurs_it():
     config = loads.ForceConfig(loads=60)
     plain, rubbed = (_loads(config, "descending", mu)[0] for mu in (0.0, 1.0))
-    sure = force.score(plain, "flex", 0.5, config.place_step, 1.0)["r2"]
-    blurred = force.score(rubbed, "flex", 0.5, config.place_step, 1.0)["r2"]
-    blind = force.score(plain, "flex", 0.5, None, 1.0)["r2"]
+    sure = force.score(plain, "flex", 0.5, config.place_step, 1.0).r2
+    blurred = force.score(rubbed, "flex", 0.5, config.place_step, 1.0).r2
+    blind = force.score(plain, "flex", 0.5, None, 1.0).r2
     assert sure > 0.999
     assert sure > blurred > blind
+
+
+def test_a_profile_comes_to_what_its_loads_and_traverses_tell():
+    """Flex tells most where the place is known and nothing rubs; the closed form, fitted to
+    nothing, tells more of what has settled."""
+    config = SMALL.model_copy(update={"profiles": ("descending",), "loads": 60})
+    found = force.run(config).result().profiles["descending"]
+    plain, rubbed = found.statics.frictionless, found.statics.friction
+    assert plain.known.flex.r2 > 0.95
+    assert plain.known.flex.r2 > rubbed.known.flex.r2 > rubbed.unknown.flex.r2
+    assert plain.known.flex.r2 > plain.known.reading.r2
+    assert (plain.loads + plain.left_out, found.traverses.trials) == (4 * 2 * 60, 4)
+    assert [each.from_place for each in found.by_range] == [0.25, 0.5, 0.75, 1.0]
+    assert found.by_range[1].r2 == plain.unknown.flex.r2
+    assert found.by_range[3].r2 > 0.95  # one place alone is a place that is known
+    whole, settled = found.traverses.closed_form.all, found.traverses.closed_form.settled
+    assert whole.n > settled.n > 0
+    assert settled.r2 > whole.r2
+    assert plain.known.flex.rmse_percent == 100 * plain.known.flex.rmse / found.force_max_n
 
 
 def test_the_reading_falls_and_b_rises_with_the_force():
@@ -142,9 +163,14 @@ def test_a_traverse_that_blows_up_is_invalid_and_enters_nothing(monkeypatch):
     outcome = force.run(SMALL.model_copy(update={"profiles": ("stiff",), "loads": 4}))
     assert [row.status for row in outcome.rows] == ["invalid"] * 4
     assert "step 7: engine warning" in outcome.rows[0].reason
-    found = outcome.result()["profiles"]["stiff"]["traverses"]
-    assert found["invalid"] == 4
-    assert found["unknown"]["flex"]["n"] == 0
+    found = outcome.result().profiles["stiff"].traverses
+    assert found.invalid == 4
+    assert found.unknown.flex.n == 0
+    read = typed(ForceResult, json.loads(to_json(content(outcome.result()))))
+    assert math.isnan(read.profiles["stiff"].traverses.known.flex.r2)
+    shown = dict(force.tables(read)[0].rows)
+    assert shown["R2 (place unknown) dragged"] == shown["R2 (place known) dragged"] == ["-"]
+    assert shown["R2 (place known) at rest"] != ["-"]
 
 
 @pytest.mark.parametrize(
@@ -163,7 +189,7 @@ def test_traverses_that_fit_and_that_test_meet_every_speed_in_any_order(
     small = {"profiles": ("descending",), "loads": 2, "place_step": 0.5, "traverses": 8}
     orders = (speeds, speeds[::-1])
     one, other = (force.run(loads.ForceConfig(speeds=s, **small)) for s in orders)
-    assert to_json(one.result()) == to_json(other.result())
+    assert to_json(content(one.result())) == to_json(content(other.result()))
     points, met = one.profiles[0].traverses, np.array([row.speed_m_s for row in one.rows])
     for half in (points.fit, ~points.fit):
         assert set(met[np.unique(points.trial[half])]) == set(speeds)
@@ -180,7 +206,7 @@ def test_command_on_two_workers_writes_the_run_of_one(capsys, tmp_path, monkeypa
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert (result["schema"], result["command"], result["seed"]) == (1, "force", 0)
     alone = force.run(small, workers=1)
-    assert result == json.loads(to_json(alone.result()))
+    assert result == json.loads(to_json(content(alone.result())))
     table = Path("run/trials.csv").read_text()
     assert table == to_csv([dataclasses.asdict(row) for row in alone.rows])
     assert [row.trial for row in alone.rows] == [0, 1, 2, 3] * 2

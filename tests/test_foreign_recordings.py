@@ -77,10 +77,11 @@ def test_ohms_volts_and_counts_of_one_divider_give_one_curve(tmp_path: Path) -> 
             recording=file,
             columns={"counts_column": "r_ohm" if unit == "ohm" else "r", "reading_unit": unit},
             antenna={"sensor": sensor},
-        ).summary["calibration"]
+        ).found.calibration
     for unit in ("ohm", "kohm", "V", "mV"):
         for key in ("midpoint", "slope", "counts_low", "counts_high"):
-            assert found[unit][key] == pytest.approx(found["counts"][key], rel=2e-3), unit
+            wanted = pytest.approx(getattr(found["counts"], key), rel=2e-3)
+            assert getattr(found[unit], key) == wanted, unit
 
 
 def test_the_divider_is_said_with_its_source_unless_it_is_given(
@@ -266,8 +267,7 @@ def test_damaged_rows_are_left_out_and_counted_up_to_their_share(
     rows = json.loads((out / "result.json").read_text())["recording"]
     assert [row for row, _ in rows["damages"]] == [100, 151, 201, 251, 301, 302]
     assert rows["rows"] == 480
-    found = antennate.run("calibrate", recording=str(file)).summary["calibration"]
-    assert found["samples"] == 474
+    assert antennate.run("calibrate", recording=str(file)).found.calibration.samples == 474
     error = refused(capsys, "--recording", str(file), "--columns.most-lost", "0.01")
     assert f"{file}: row 100: expected 3 cells, found 5" in error
     assert "(5 of 480 rows are like it)" in error
@@ -371,15 +371,13 @@ def test_relaxation_in_holds_comes_back(share: float, tmp_path: Path) -> None:
     noisy = np.round(values[1] + rng.normal(0, 2, len(values[1])))
     file = written(tmp_path / "a.csv", time=values[0], counts=noisy, bend=values[2])
     result = antennate.run("calibrate", recording=file)
-    found = result.summary["assessment"]["relaxation"]
-    span = (
-        result.summary["calibration"]["counts_high"] - result.summary["calibration"]["counts_low"]
-    )
+    found, curve = result.found.assessment.relaxation, result.found.calibration
+    span = curve.counts_high - curve.counts_low
     wanted = share * 0.5 * (1 - np.exp(-2)) * 400 / span
-    assert found["mean"] == pytest.approx(wanted, abs=0.003)
-    assert found["holds"] == 25 - 3  # of each push the first one follows no change
-    assert result.summary["poor"]
+    assert found.mean == pytest.approx(wanted, abs=0.003)
+    assert found.holds == 25 - 3  # of each push the first one follows no change
+    assert result.found.poor
     way = "on" if share > 0 else "back"
-    assert f"held for 2 s its readings move {way} by {100 * abs(found['mean']):.0f} %" in (
+    assert f"held for 2 s its readings move {way} by {100 * abs(found.mean):.0f} %" in (
         result.sentence
     )

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,12 +19,14 @@ from antennate.experiments.geometry.physics import (
     random_waves,
     walk,
 )
+from antennate.experiments.geometry.result import BestLead, Walked
 from antennate.experiments.geometry.torus import Torus
 from antennate.mechanics.twist import Wave
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.robots.mechanics import cycles, peaks, wave_of
 from antennate.robots.spec import RobotSpec
 
+LEADS = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 TINY = [
     *("--gaits", "4", "--wave-numbers", "1", "--leads", "5", "--front-waves", "1"),
     *("--turns", "2", "--cells", "8", "--repeats", "2", "--cycles", "2", "--settling-cycles", "1"),
@@ -116,10 +119,67 @@ def test_lifting_legs_have_no_map():
     )
     outcome = experiment.run(config)
     result = outcome.result()
-    assert (result["torus"], result["turns"]) == (None, None)
-    assert "law_deg" not in result["leads"][0]
-    assert result["agreement"]["speed_rmse_m_s"]["value"] < 0.03
-    assert {"gait", "gait at 1.15 f"} == {row["name"] for row in result["named"]}
+    assert (result.torus, result.turns, result.leads[0].law_deg) == (None, None, None)
+    assert result.agreement.speed_rmse_m_s.value < 0.03
+    assert {"gait", "gait at 1.15 f"} == {gait.name for gait in result.named}
+
+
+def walked(part, trial, speed, cost, name="", lead=0.0):
+    return Walked(
+        part=part,
+        trial=trial,
+        name=name,
+        amplitude_rad=0.3,
+        wave_number=1.0,
+        lead_rad=lead,
+        offset_rad=0.0,
+        frequency_hz=0.5,
+        speed_m_s=speed,
+        model_speed_m_s=speed + 0.01,
+        yaw_deg_per_cycle=10.0 * trial,
+        model_yaw_deg_per_cycle=10.0 * trial + 2.0,
+        cost_of_transport=cost,
+        model_cost=0.1 * trial,
+        model_torque_n_m=0.2,
+    )
+
+
+def test_rows_become_the_result_that_the_tables_show():
+    """Speeds are drawn: the model is 0.01 m/s too fast, and the best lead is 0.1 rad."""
+    config = GeometryConfig(wave_numbers=(1.0,), body_length=0.8, gait=GaitParams(frequency=0.5))
+    speeds = (0.18, 0.19, 0.20, 0.21, 0.22)
+    rows = [
+        *(walked("random", i, 0.1 * i, None if i == 2 else 0.5 - 0.1 * i) for i in range(3)),
+        *(walked("lead", i, 0.2 - (x - 0.1) ** 2, 0.4, lead=x) for i, x in enumerate(LEADS)),
+        *(walked("front", 2, speed, cost) for speed, cost in ((0.3, 0.39), (0.4, 0.41))),
+        *(walked("named", i, speed, 0.4, "gait") for i, speed in enumerate(speeds)),
+        *(walked("named", 5 + i, 0.25, 0.3, "swift") for i in range(5)),
+        *(walked("named", 10 + i, 0.5, 0.3, "gait at 1.15 f") for i in range(5)),
+    ]
+    result = experiment.summarise(config, rows, None)
+    found = result.agreement
+    assert (found.speed_rmse_m_s.value, found.yaw_rmse_deg.value) == pytest.approx((0.01, 2.0))
+    assert found.rival_less_model_m_s.value == pytest.approx(
+        math.sqrt(np.mean([(s - math.pi * 0.033) ** 2 for s in (0.0, 0.1, 0.2)])) - 0.01
+    )
+    assert found.cost_rank_r.value == pytest.approx(0.5)  # ranks 0, 1, 2 against 1, 0, 2
+    (lead,) = result.leads
+    assert lead.engine_deg == pytest.approx(math.degrees(0.1))
+    assert lead.model_less_engine_deg == pytest.approx(0.0)
+    assert lead.law_less_engine_deg == pytest.approx(lead.law_deg - lead.engine_deg - 360.0)
+    gait = result.named[0]
+    assert (gait.speed_m_s, gait.body_lengths_per_cycle, gait.trial) == pytest.approx((0.2, 0.5, 2))
+    # Student's t, 4 degrees of freedom: 2.776 x 0.01581 / sqrt(5)
+    assert gait.speed_m_s_95 == pytest.approx((0.2 - 0.01963, 0.2 + 0.01963), abs=1e-5)
+    best = result.fastest_at_no_more_cost
+    assert (best.gait, best.speed_over_default) == (result.front[0], pytest.approx(1.5))
+    assert (result.torus, result.turns) == (None, None)
+    _, _, gaits = experiment.tables(result)
+    assert gaits.columns == ["gait", "swift", "gait at 1.15 f", "of the front"]
+    cells = dict(gaits.rows)
+    assert cells["speed [m/s]"] == ["0.200", "0.250", "0.500", "0.300"]
+    assert cells["  95 % [m/s]"][::3] == ["0.180 to 0.220", "-"]
+    assert cells["body lengths a cycle"] == ["0.50", "0.62", "1.25", "0.75"]
 
 
 def test_a_row_keeps_what_was_planned():
@@ -156,8 +216,9 @@ def test_gaits_by_name_stay_within_the_joints():
 
 @pytest.mark.parametrize("numbers", [(1.0,), (1.0, 1.5)])
 def test_each_name_in_the_legend_of_the_leads_has_something_drawn(numbers):
-    lead = {"law_deg": 80.0, "model_deg": 82.0, "engine_deg": 85.0}
-    drawn = leads([{"wave_number": number, **lead} for number in numbers])
+    angles = {"law_deg": 80.0, "model_deg": 82.0, "engine_deg": 85.0, "model_less_engine_deg": -3.0}
+    lead = BestLead(**angles, wave_number=1.0, engine_speed_m_s=0.2, reached=True)
+    drawn = leads([replace(lead, wave_number=number) for number in numbers])
     (panel,) = drawn.axes
     assert [text.get_text() for text in panel.get_legend().get_texts()] == [
         "law of stiff servos",

@@ -12,8 +12,7 @@ import pytest
 
 from antennate.cli import BAD_INPUT, main
 from antennate.errors import SimulationError
-from antennate.experiments.tunnel.experiment import run
-from antennate.experiments.tunnel.measures import tables
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
@@ -259,11 +258,11 @@ def test_who_walks_into_a_wide_gap_falls_and_that_is_a_failure_of_the_table() ->
         time_limit=30.0,
         ground=GroundParams(width=0.5),
     )
-    result = run(config).result()
-    row = result["controllers"]["open"]
-    assert (row["fell"], row["successes"], row["success_share"]) == (2, 0, 0.0)
-    assert row["restricted_mean_time_s"] == 30.0
-    assert ("fell", ["2"]) in tables(result)[0].rows
+    result = EXPERIMENT.run(config).result()
+    row = result.controllers["open"]
+    assert (row.fell, row.successes, row.success_share) == (2, 0, 0.0)
+    assert row.restricted_mean_time_s == 30.0
+    assert ("fell", ["2"]) in EXPERIMENT.tables(result)[0].rows
 
 
 def test_who_is_out_has_succeeded_on_its_back_too() -> None:

@@ -22,6 +22,7 @@ from antennate.experiments.gait import experiment as study
 from antennate.experiments.gait import figure
 from antennate.experiments.gait.config import Unknown, drawn
 from antennate.experiments.gait.physics import measure
+from antennate.experiments.gait.result import UnknownNumber, UnknownNumbers
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.parts import bill
@@ -101,7 +102,7 @@ def walked(maneuver: Maneuver, **gait: float) -> float:
         | {"settling_cycles": 1}
     )
     walk = study.walk_flat(config, "walk", config.gait, maneuver)
-    return measure(walk, config.settling_cycles, config.cycles).body_lengths
+    return measure(walk, config.settling_cycles, config.cycles).body_lengths_per_cycle
 
 
 def test_it_walks_as_far_as_an_independent_model_and_not_without_its_wave() -> None:
@@ -129,14 +130,16 @@ def test_draws_fill_every_part_of_their_ranges() -> None:
 
 def test_lines_pass_behind_the_names_of_the_unknown_numbers() -> None:
     names = ("robot.servos.xl430_w250.gain_divisor", "robot.mass")
-    row = {"body_lengths_per_cycle": [0.4, 0.6], "range": [1.0, 2.0], "change": 0.2}
-    unknowns = {"draws": 3, "body_lengths_per_cycle": [0.4, 0.5, 0.6], "interval95": [0.4, 0.6]}
-    result = {
-        "unknown": {**unknowns, "parameters": dict.fromkeys(names, row)},
-        "maneuvers": {"forward": {"body_lengths_per_cycle": 0.55}},
-        "measured_body_lengths_per_cycle": 0.48,
-    }
-    _, alone = figure.unknown(result).axes
+    ends = UnknownNumber(range=(1.0, 2.0), body_lengths_per_cycle=(0.4, 0.6), change=0.2)
+    numbers = UnknownNumbers(
+        draws=3,
+        median=0.5,
+        interval95=(0.4, 0.6),
+        range=(0.4, 0.6),
+        body_lengths_per_cycle=[0.4, 0.5, 0.6],
+        parameters=dict.fromkeys(names, ends),
+    )
+    _, alone = figure.unknown(numbers, configured=0.55, measured=0.48).axes
     upright = [line for line in alone.lines if len(set(line.get_xdata())) == 1]
     for text in alone.texts:
         box = text.get_bbox_patch()
@@ -163,13 +166,13 @@ def test_an_unknown_radius_changes_the_step_of_rolling_legs_by_its_circumference
         body_length=0.5,
     )
     result = study.run(config).result()
-    found = result["unknown"]
-    ends = found["parameters"]["robot.leg_radius"]["body_lengths_per_cycle"]
+    found = result.unknown
+    ends = found.parameters["robot.leg_radius"].body_lengths_per_cycle
     expected = [2 * math.pi * radius / 0.5 for radius in (0.022, 0.03)]
     assert ends == pytest.approx(expected, rel=0.01)
-    assert len(found["body_lengths_per_cycle"]) == found["draws"] == 2
-    assert ends[0] <= found["range"][0] <= found["median"] <= found["range"][1] <= ends[1]
-    assert result["measured_body_lengths_per_cycle"] == 0.4
+    assert len(found.body_lengths_per_cycle) == found.draws == 2
+    assert ends[0] <= found.range[0] <= found.median <= found.range[1] <= ends[1]
+    assert result.measured_body_lengths_per_cycle == 0.4
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from antennate.control.loop import Retunable
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
-from antennate.experiments.tunnel.experiment import check, run
+from antennate.experiments.tunnel.experiment import EXPERIMENT, check
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
@@ -271,14 +271,14 @@ def test_rows_do_not_depend_on_batch_and_workers(knows: tuple[Any, ...]) -> None
     config = TunnelConfig(**SHORT, controllers=("closed-1",), knows=knows)
     alone: list[Any] = []
     run_trials(config, "closed-1", [0, 1, 2], lambda found: alone.append(found[0]), batch=1)
-    assert run(config).rows == alone
-    assert run(config, workers=2).rows == alone
+    assert EXPERIMENT.run(config).rows == alone
+    assert EXPERIMENT.run(config, workers=2).rows == alone
 
 
 @pytest.mark.slow
 def test_map_crosses_tunnels_in_which_open_is_stuck() -> None:
     config = TunnelConfig(trials=6, seed=11, controllers=("open", "map"), time_limit=60.0)
-    rows = run(config).rows
+    rows = EXPERIMENT.run(config).rows
     won = [row.controller for row in rows if row.outcome == "success"]
     assert won.count("map") == 6
     assert won.count("open") < 6
@@ -334,7 +334,7 @@ def test_a_log_says_what_was_known_and_is_not_replayed(tmp_path: Path) -> None:
     config = TunnelConfig(
         trials=1, time_limit=0.3, controllers=("closed-1",), knows=("jam", "side")
     )
-    run(config, logs=tmp_path)
+    EXPERIMENT.run(config, logs=tmp_path)
     with LogReader(next(tmp_path.glob("*.mcap"))) as log:
         header = log.header
     assert header.knows == ("side", "jam")

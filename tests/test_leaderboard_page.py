@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -28,9 +29,19 @@ def page(tmp_path: Path) -> Path:
     for name in ("leaderboard.py", "leaderboard.md", "generated.py"):
         shutil.copy(DOCS / name, tmp_path / name)
     (tmp_path / "images").mkdir()
+    ended: Any = {"closed": ("success", 20.0), "open": ("timeout", 100.0)}
     rows = [
-        Episode("closed", SCENES_OF_BOARD[0], 5, 0, "success", 20.0, progress_m=2.0, drawn=True),
-        Episode("open", SCENES_OF_BOARD[0], 5, 0, "timeout", 100.0, drawn=True),
+        Episode(
+            controller=name,
+            scene=SCENES_OF_BOARD[0],
+            seed=5,
+            trial=0,
+            outcome=outcome,
+            time_s=time,
+            progress_m=2.0,
+            drawn=True,
+        )
+        for name, (outcome, time) in ended.items()
     ]
     (tmp_path / "leaderboard.csv").write_text(to_csv(asdict(row) for row in rows))
     return tmp_path / "leaderboard.md"

@@ -10,9 +10,9 @@ import pytest
 
 from antennate.antenna import fitting
 from antennate.antenna.curves import Samples, with_divider
-from antennate.antenna.next_push import Assessment, Pushes, assess
 from antennate.cli import main
 from antennate.errors import CalibrationError
+from antennate.experiments.calibrate.next_push import Assessment, Pushes, assess
 from antennate.experiments.calibrate.recording import RecordingParams, read
 from antennate.types import Floats, Ints
 

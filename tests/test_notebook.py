@@ -10,7 +10,6 @@ import math
 import pickle
 import re
 import struct
-import sys
 import tomllib
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -257,15 +256,8 @@ def test_an_answer_that_is_no_decision_is_one_line(
         )
 
 
-def test_without_pandas_the_cure_is_told(
-    tunnel: antennate.Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(antennate.AntennateError, match="install it with `pip install pandas`"):
-        tunnel.to_dataframe()
-
-
 def test_the_summary_holds_no_surprise(tunnel: antennate.Result) -> None:
     """Numbers of rows and summary agree: the mean force over both trials."""
     mean = math.fsum(r.force_mean_n for r in tunnel.rows[:2]) / 2
     assert tunnel.summary["controllers"]["open"]["force_mean_n"] == pytest.approx(mean, rel=1e-12)
+    assert tunnel.found.controllers["open"].force_mean_n == pytest.approx(mean, rel=1e-12)

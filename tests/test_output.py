@@ -18,9 +18,9 @@ from antennate.cli import main
 from antennate.cli.results import print_table
 from antennate.cli.terminal import Output
 from antennate.control.readings import short_names
-from antennate.experiments.tunnel.measures import tables
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.messages import extra
-from antennate.studies.measures import Table
+from antennate.studies.tables import Table
 
 ROOT = Path(__file__).parents[1]
 RUN = [sys.executable, "-m", "antennate", "antenna", "springs", "--out", "run"]
@@ -258,7 +258,7 @@ def test_every_row_of_three_controllers_is_one_line_of_a_terminal_of_80_columns(
     monkeypatch.setenv("COLUMNS", "80")
     result = json.loads((ROOT / "docs" / "science" / "evaluation.json").read_text())
     result["controllers"].pop("timed")
-    for table in tables(result):
+    for table in EXPERIMENT.tables(EXPERIMENT.read(result)):
         print_table(table)
         shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
         at = next(i for i, line in enumerate(shown) if line.startswith("─"))

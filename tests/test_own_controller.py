@@ -20,7 +20,7 @@ from antennate.control.controllers import RuleController, closed_loop, open_loop
 from antennate.control.kind import ControllerKind
 from antennate.control.registry import CONTROLLERS, KINDS, looks, make_controller
 from antennate.errors import ConfigError, WorkerError
-from antennate.experiments.tunnel.experiment import run
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
@@ -47,7 +47,9 @@ def _nothing_added() -> Iterator[None]:
 
 def rows_of(name: str, **changes: Any) -> list[Any]:
     """The table of short trials."""
-    return run(TunnelConfig.model_validate({**SHORT, "controllers": [name], **changes})).rows
+    return EXPERIMENT.run(
+        TunnelConfig.model_validate({**SHORT, "controllers": [name], **changes})
+    ).rows
 
 
 def phase_of(trial: int) -> float:
@@ -196,7 +198,7 @@ def test_what_is_added_in_python_is_known_in_worker_processes() -> None:
     CONTROLLERS.add("mine", closed_loop)
     SCENES.add("my_floor", FlatScene)
     changes = {"controllers": ["mine"], "scene": "my_floor", "trials": 2, "time_limit": 0.3}
-    found = run(TunnelConfig.model_validate(changes), workers=2).rows
+    found = EXPERIMENT.run(TunnelConfig.model_validate(changes), workers=2).rows
     assert [(row.controller, row.outcome) for row in found] == [("mine", "timeout")] * 2
 
 
@@ -204,7 +206,7 @@ def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
     CONTROLLERS.add("mine", lambda *words: closed_loop(*words))
     changes = {"controllers": ["mine"], "trials": 2, "time_limit": 0.3}
     with pytest.raises(WorkerError, match=r"sent to workers, found .*at the top of a module") as e:
-        run(TunnelConfig.model_validate(changes), workers=2)
+        EXPERIMENT.run(TunnelConfig.model_validate(changes), workers=2)
     assert "\n" not in str(e.value)
 
 

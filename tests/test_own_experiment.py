@@ -53,9 +53,7 @@ def test_it_runs_and_leaves_a_directory_like_ours(
 def test_it_is_told_how_many_workers_are_asked_for(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (dice / "site" / "dice_study.py").write_text(
-        DICE.replace("int(rng.integers(1, 7))", "workers.count")
-    )
+    (dice / "site" / "dice_study.py").write_text(DICE.replace("eyes=int(n)", "eyes=workers.count"))
     assert main(["dice", "--trials", "2", "--workers", "5", "--out", "run"]) == 0
     assert [row["eyes"] for row in RunDirectory.open(dice / "run").rows()] == [5, 5]
 
@@ -82,9 +80,9 @@ def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('[Table.of("Dice", {"throws": result}, MEASURES)]', "1 / 0", "ZeroDivisionError"),
-        ('[Table.of("Dice", {"throws": result}, MEASURES)]', '["dice"]', "found list and str"),
-        ("f\"Dice show {result['eyes']:.1f} eyes.\"", "6", "found list and int"),
+        ('[Table.of("Dice", {"throws": result})]', "1 / 0", "ZeroDivisionError"),
+        ('[Table.of("Dice", {"throws": result})]', '["dice"]', "found list and str"),
+        ('f"Dice show {result.eyes:.1f} eyes."', "6", "found list and int"),
     ],
 )
 def test_tables_and_a_sentence_of_another_form_are_one_line(
@@ -104,14 +102,17 @@ def test_tables_and_a_sentence_of_another_form_are_one_line(
 def test_numbers_of_numpy_are_kept_and_other_objects_refused(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = DICE.replace("int(rng.integers(1, 7))", "rng.integers(1, 7)")
-    (dice / "site" / "dice_study.py").write_text(text.replace('"schema": 1', '"a": np.eye(1)'))
+    text = DICE.replace("eyes=int(n)", "eyes=n").replace("schema: int = 1", "a: Any = 1")
+    text = text.replace("frame(rows))", "frame(rows), a=np.eye(1))")
+    (dice / "site" / "dice_study.py").write_text(
+        f"{text}\n".replace("import numpy", "from typing import Any\nimport numpy", 1)
+    )
     assert main(["dice", "--trials", "2", "--out", "run"]) == 0
     run = RunDirectory.open(dice / "run")
     assert {row["eyes"] for row in run.rows()} <= set(range(1, 7))
     assert run.result()["a"] == [[1.0]]
     sys.modules.pop("dice_study")
-    (dice / "site" / "dice_study.py").write_text(DICE.replace("int(rng.integers(1, 7))", "{i}"))
+    (dice / "site" / "dice_study.py").write_text(DICE.replace("eyes=int(n)", "eyes={i}"))
     assert main(["dice", "--trials", "2", "--out", "other"]) == 2
     err = capsys.readouterr().err
     assert "in a result or row, found set" in err

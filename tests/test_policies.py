@@ -31,7 +31,7 @@ from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.compete.episodes import Draw, run_episodes
 from antennate.experiments.compete.page import sentence
-from antennate.experiments.compete.standings import standings
+from antennate.experiments.compete.standings import standing
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.hardware.config import DriveConfig
@@ -193,7 +193,7 @@ def test_compete_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: P
     rows: list[Any] = []
     run_episodes([(Draw(path, "flat", 5, 0, 1.0),)], lambda place, row: rows.append(row))
     assert [(row.outcome, row.void_decisions) for row in rows] == [("timeout", 998)]
-    said = sentence({"check": None, "seeds": [5], "hidden": False, **standings(rows, 0.0)})
+    said = sentence(standing(rows, 0.0))
     assert said.endswith(
         "Decisions whose answer was no number, so that the robot held: p.onnx 998."
     )

@@ -15,7 +15,7 @@ import pytest
 import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.studies.measures import shown
+from antennate.studies.columns import shown
 
 
 class Page(HTMLParser):
@@ -187,6 +187,8 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
     claims = [
         {
             "claim": "A stiff antenna jams at a wall of boulders",
+            "criterion": "over half",
+            "rival": "a soft one",
             "paper": "<b>",
             "ours": "2 < 3",
             "verdict": "conditional",
@@ -195,7 +197,8 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
         }
     ]
     counts = {"reproduced": 0, "conditional": 1, "not_reproduced": 0}
-    result = {"command": "reproduce", "quick": True, "seed": 7, "verdicts": counts}
+    result = {"command": "reproduce", "quick": True, "setting": "default", "seed": 7}
+    result |= {"interrupted": False, "verdicts": counts}
     Path("run").mkdir()
     Path("run/result.json").write_text(json.dumps(result | {"claims": claims}))
     assert main(["report", "run"]) == 0
@@ -236,7 +239,7 @@ def test_points_of_two_studies_stand_together_by_what_varies() -> None:
         antennate.run("study", out=name, **settings)
     assert main(["report", "--compare", "coarse", "fine"]) == 0
     rows = Rows(Path("comparison.html")).found
-    assert ["", "run", "coil [mm]", "springs.0.stiffness [N·mm/deg]"] in rows
+    assert ["", "run", "coil [mm]", "stiffness (springs.0) [N·mm/deg]"] in rows
     lines = [row for row in rows if len(row) == 4 and row[1:2] in (["coarse"], ["fine"])]
     assert [line[:3] for line in lines] == [
         ["3.5", "coarse", "3.5"],
@@ -276,9 +279,10 @@ def test_invalid_trials_and_their_reasons_are_shown() -> None:
     words += ["--trials", "1", "--profiles", "stiff", "--workers", "1", "--no-figures"]
     assert main(["bench", "wall", *words, "--out", "run"]) == 0
     table = Path("run/trials.csv")
-    head, row = table.read_text().splitlines()
-    bad = row.replace(row.split(",")[3], "invalid") + "time stood <still>"
-    table.write_text(f"{head}\n{bad}\n")
+    head, cells = (line.split(",") for line in table.read_text().splitlines())
+    row = dict(zip(head, cells, strict=True))
+    row |= {"outcome": "invalid", "reason": "time stood <still>"}
+    table.write_text(f"{','.join(head)}\n{','.join(row.values())}\n")
     assert main(["report", "run"]) == 0
     page = Page(Path("run/report.html"))
     assert "time stood <still>" in page.text

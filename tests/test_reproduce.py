@@ -22,7 +22,14 @@ from antennate.cli.experiment import parsed
 from antennate.control.registry import RIVAL
 from antennate.experiments import fitted
 from antennate.experiments.reproduce import experiment as reproduce
-from antennate.experiments.reproduce.experiment import CLAIMS, EXPERIMENT, ReproduceConfig, draw
+from antennate.experiments.reproduce.experiment import (
+    CLAIMS,
+    EXPERIMENT,
+    ReproduceConfig,
+    ReproduceOutcome,
+    ReproduceResult,
+)
+from antennate.experiments.reproduce.figure import draw
 from antennate.experiments.reproduce.verdict import VERDICTS, Row, all_of, difference
 from antennate.messages import command_words
 
@@ -278,8 +285,10 @@ def test_the_criterion_stands_before_the_result() -> None:
     assert all(claim.criterion and claim.rival for claim in CLAIMS)
     names = list(Row.__dataclass_fields__)
     assert names.index("criterion") < names.index("ours") < names.index("verdict")
-    made = {"claim": "C", "criterion": "K", "paper": "P", "ours": "O", "verdict": "fitted"}
-    (table,) = EXPERIMENT.tables({"claims": [made], "seed": 7})
+    texts = dict.fromkeys(names, "") | {"claim": "C", "criterion": "K", "paper": "P", "ours": "O"}
+    made = Row(**{**texts, "verdict": "fitted"})
+    found = ReproduceOutcome(ReproduceConfig(), (), interrupted=False).result()
+    (table,) = EXPERIMENT.tables(dataclasses.replace(found, claims=[made]))
     assert table.rows == [("C", ["K", "P", "O", "fitted"])]
 
 
@@ -345,25 +354,25 @@ def test_where_numbers_were_fitted_a_claim_is_fitted_at_best_and_says_so(
     monkeypatch.setattr(reproduce, "FULL", {"taper": {}, "wall": {}})
     monkeypatch.setattr(reproduce, "QUICK", {"taper": {}, "wall": {}})
 
-    def rows(**told: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    def rows(**told: Any) -> tuple[ReproduceResult, list[Row]]:
         outcome = EXPERIMENT.run(ReproduceConfig(**told), 1, lambda *_: None, lambda row: None)
-        return outcome.result(), outcome.result()["claims"]
+        return outcome.result(), outcome.result().claims
 
     _, usual = rows()
     whole, ours = rows(setting="fitted")
-    assert [row["verdict"] for row in usual[1:]] == [
+    assert [row.verdict for row in usual[1:]] == [
         *["fitted", "conditional"],
         *["fitted"] * 2,
         "conditional",
     ]
-    assert [row["verdict"] for row in ours[1:]] == ["fitted"] * 5
+    assert [row.verdict for row in ours[1:]] == ["fitted"] * 5
     assert ours[0] == usual[0]  # has no fitted numbers
-    assert [row["criterion"] for row in ours] == [row["criterion"] for row in usual]
-    assert all("chosen" in row["reason"] for row in usual[1:5])
+    assert [row.criterion for row in ours] == [row.criterion for row in usual]
+    assert all("chosen" in row.reason for row in usual[1:5])
     for row in ours[1:]:
-        assert not {"chosen", "assumed", "53°"} & set(re.findall(r"[\w°]+", row["reason"]))
-        assert row["command"] == "antennate bench wall --config fitted --trials 200 --seed 7"
-    assert whole["setting"] == "fitted"
+        assert not {"chosen", "assumed", "53°"} & set(re.findall(r"[\w°]+", row.reason))
+        assert row.command == "antennate bench wall --config fitted --trials 200 --seed 7"
+    assert whole.setting == "fitted"
     assert "fitted to the paper" in EXPERIMENT.sentence(whole)
     assert EXPERIMENT.body is not None
     page = EXPERIMENT.body(whole, {})
@@ -449,7 +458,7 @@ def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(reproduce, "QUICK", {"springs": {}, "taper": {}})
     whole = EXPERIMENT.run(ReproduceConfig(quick=True), 1, lambda *_: None, lambda row: None)
     assert [row.verdict for row in whole.rows] == ["fitted", "not_reproduced"]
-    assert sum(whole.result()["verdicts"].values()) == 2
+    assert sum(whole.result().verdicts.values()) == 2
     said = EXPERIMENT.sentence(whole.result())
     assert (
         f"Of {len(CLAIMS)} claims: 0 reproduced, 0 conditional, 1 fitted, 1 not reproduced" in said

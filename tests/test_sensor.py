@@ -14,6 +14,7 @@ from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
 from antennate.experiments.bench import flex_of
+from antennate.experiments.sensor.experiment import SensorConfig, run, tables
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.params.base import read_file
@@ -133,6 +134,39 @@ def test_each_antenna_needs_a_curve_of_its_own_kind() -> None:
     two = rising.model_copy(update={"conditioning_right": CurveParams()})
     with pytest.raises(ValidationError, match=r"control\.conditioning_right\.polarity must be 1"):
         TunnelConfig.model_validate({**one, "control": two})
+
+
+def test_the_bench_tells_what_the_datasheet_says() -> None:
+    """Flat 10 kOhm on 10 kOhm at 3.3 V: half of it. E24 nearest to the geometric mean of ends."""
+    plain = SensorParams(hysteresis=0, creep=(0, 0))
+    result = run(SensorConfig(sensor=plain, largest_flex=math.pi)).result()
+    first, last = result.curve[0], result.curve[-1]
+    assert (first.flex_deg, last.flex_deg) == pytest.approx((0.0, 180.0))
+    assert (first.resistance_ohm, last.resistance_ohm) == pytest.approx((10e3, 22e3))
+    assert first.voltage_v == pytest.approx(1.65)
+    assert result.counts_span == first.counts - last.counts > 0
+    assert result.polarity == -1
+    assert not result.clipped
+    assert result.loop_width_share == pytest.approx(0.0, abs=0.01)
+    assert result.creep_counts == 0
+    assert result.noise_sd_counts == pytest.approx(2.5, rel=0.1)
+    assert result.best_divider_ohm == pytest.approx(math.sqrt(10e3 * 22e3), rel=0.1)
+    (table,) = tables(result)
+    assert table.columns == ["R [kOhm]", "V", "counts"]
+    assert table.rows[0][0] == "0 deg"
+    assert table.rows[0][1][:2] == ["10.00", "1.650"]
+
+
+def test_a_bend_that_creeps_and_a_wide_loop_are_told() -> None:
+    """As declared: a loop of a tenth of the flex, over readings that are nearly straight in it.
+
+    By hand: of 90 deg a tenth creeps, from 3.3 V / 2.54 to 3.3 V / 2.6, 37 counts.
+    """
+    params = SensorParams(hysteresis=0.1, creep=(0, 0))
+    result = run(SensorConfig(sensor=params)).result()
+    assert result.loop_width_share == pytest.approx(0.1, rel=0.2)
+    creeping = SensorParams(hysteresis=0, creep=(0.05, 0.05))
+    assert run(SensorConfig(sensor=creeping)).result().creep_counts == pytest.approx(37, rel=0.1)
 
 
 def test_without_memory_the_chain_is_the_static_curve() -> None:

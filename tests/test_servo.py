@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from servo_recordings import RATE, of_twin, written
+from servo_recordings import RATE, found_of, of_twin, written
 
-import antennate
-from antennate import experiments
+from antennate.experiments.servo.experiment import sentence
 from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, ServosParams, XL330Params, replay
 from antennate.types import Floats
 
@@ -105,42 +105,41 @@ def test_the_twins_servo_is_identified_from_its_recording(
     number: int, name: str, tmp_path: Path
 ) -> None:
     """The twin's motor is another implementation, with the 128 of the manual."""
-    files = [str(of_twin(tmp_path / f"{a}.json", number, 400, a, 4.0)) for a in (0.6, 1.5)]
-    found = antennate.run("servo", recording=files, servo=name, fit=True).summary
-    line = next(m for m in found["models"] if m["name"] == "line fitted")
+    files = [of_twin(tmp_path / f"{a}.json", number, 400, a, 4.0) for a in (0.6, 1.5)]
+    found = found_of(*files, servo=name, fit=True)
+    line = next(m for m in found.models if m.name == "line fitted")
     true = XL330Params() if number == 1200 else type(XL330Params()).__bases__[0]()
-    assert line["gain_divisor"] == pytest.approx(128.0, rel=0.02)
-    assert line["no_load_speed"] == pytest.approx(true.no_load_speed, rel=0.02)
-    assert line["armature"] == pytest.approx(true.armature, rel=0.02)
-    whole = found["models"][-1]
-    assert found["interval_over"] == "8 stretches of the recordings"  # 2 of 4 s, pieces of 1 s
-    for name in ("no_load_speed", "armature"):
-        low, high = whole["interval_95"][name]
-        assert low < whole[name] < high
-    assert whole["friction"] < 0.02 * true.stall_torque
-    assert whole["load_friction"] < 0.02
-    assert whole["error_deg"] < 0.1
+    assert line.gain_divisor == pytest.approx(128.0, rel=0.02)
+    assert line.no_load_speed == pytest.approx(true.no_load_speed, rel=0.02)
+    assert line.armature == pytest.approx(true.armature, rel=0.02)
+    whole = found.models[-1]
+    assert found.interval_over == "8 stretches of the recordings"  # 2 of 4 s, pieces of 1 s
+    for name, fitted in (("no_load_speed", whole.no_load_speed), ("armature", whole.armature)):
+        low, high = whole.interval_95[name]
+        assert low < fitted < high
+    assert whole.friction < 0.02 * true.stall_torque
+    assert whole.load_friction < 0.02
+    assert (whole.error_deg or 1.0) < 0.1
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not here")
 @pytest.mark.slow
 def test_a_real_servo_is_tracked_at_a_gain_that_was_not_fitted() -> None:
-    files = sorted(map(str, REAL.glob("*.json")))
-    found = antennate.run("servo", recording=files, fit=True).summary
-    models = {m["name"]: m for m in found["models"]}
-    assert models["data sheet, /128"]["error_deg"] > 10.0
-    assert models["data sheet, /256"]["error_deg"] == pytest.approx(5.2, abs=0.5)
-    assert all(abs(r["gain_divisor"] - 256) < 2 for r in found["recordings"] if r["gain_divisor"])
+    found = found_of(*sorted(REAL.glob("*.json")), fit=True)
+    models = {each.name: each for each in found.models}
+    assert (models["data sheet, /128"].error_deg or 0.0) > 10.0
+    assert models["data sheet, /256"].error_deg == pytest.approx(5.2, abs=0.5)
+    assert all(abs(r.gain_divisor - 256) < 2 for r in found.recordings if r.gain_divisor)
     for name in ("whole model", "data sheet + friction"):
-        assert max(models[name]["held_out_deg"].values()) < 3.5
-    assert len(models["whole model"]["held_out_deg"]) == 2
+        held = models[name].held_out_deg.values()
+        assert [error for error in held if error is None or error > 3.5] == []
+        assert len(held) == 2
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not here")
 def test_a_replay_of_the_real_servo_shows_that_its_divisor_is_256() -> None:
-    files = sorted(map(str, REAL.glob("*.json")))
-    found = antennate.run("servo", recording=files).summary
-    manual, sheet = (m["error_deg"] for m in found["models"][:2])
+    found = found_of(*sorted(REAL.glob("*.json")))
+    manual, sheet = (each.error_deg for each in found.models[:2])
     assert manual == pytest.approx(13.3, abs=0.5)
     assert sheet == pytest.approx(5.2, abs=0.5)
 
@@ -148,18 +147,16 @@ def test_a_replay_of_the_real_servo_shows_that_its_divisor_is_256() -> None:
 @pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not here")
 def test_the_one_real_recording_that_stalls_is_named_with_its_error() -> None:
     """Its drive is 885 counts, all of it, while its position stays within a tick."""
-    files = sorted(map(str, REAL.glob("*.json")))
-    found = antennate.run("servo", recording=files)
-    rows = {row["name"]: row for row in found.summary["recordings"]}
-    stalls = [name for name, row in rows.items() if row["stalled"] > 0.0]
-    assert stalls == ["2026-01-15_10h29m21.json"]
-    row = rows[stalls[0]]
-    assert row["error_deg"] == max(each["error_deg"] for each in rows.values())
-    assert row["error_stalled_deg"] > 3 * row["error_else_deg"]
-    assert row["lifted_n_m"] > row["weight_stalled_n_m"]
-    said = experiments.load("servo").sentence(found.summary)
+    found = found_of(*sorted(REAL.glob("*.json")))
+    stalls = [row for row in found.recordings if row.stalled]
+    assert [row.name for row in stalls] == ["2026-01-15_10h29m21.json"]
+    (row,) = stalls
+    assert row.error_deg == max(each.error_deg or 0.0 for each in found.recordings)
+    assert (row.error_stalled_deg or 0.0) > 3 * (row.error_else_deg or math.inf)
+    assert row.lifted_n_m > (row.weight_stalled_n_m or math.inf)
+    said = sentence(found)
     assert said.count("stalls: ") == 1
-    assert f"{stalls[0]} stalls: " in said
+    assert f"{row.name} stalls: " in said
 
 
 def test_stalls_are_times_at_rest_at_full_drive(tmp_path: Path) -> None:
@@ -182,12 +179,16 @@ def test_stalls_are_times_at_rest_at_full_drive(tmp_path: Path) -> None:
     still = written(tmp_path / "a.json", made, 400, mass=0.5, length=0.1)
     free = [entry | {"load": 100} for entry in made]
     other = written(tmp_path / "b.json", free, 400, mass=0.5, length=0.1)
-    stall, rest = antennate.run("servo", recording=[str(still), str(other)]).summary["recordings"]
-    assert stall["full_drive"] == pytest.approx(0.75, abs=0.01)
-    assert stall["stalled"] == pytest.approx(0.25, abs=0.02)
-    assert stall["supply_stalled_v"] == pytest.approx(5.0)
-    assert stall["weight_stalled_n_m"] == pytest.approx(0.5 * 9.80665 * 0.1 * math.sin(0.3))
-    assert (rest["full_drive"], rest["stalled"]) == (0.0, 0.0)
+    found = found_of(still, other)
+    stall, rest = found.recordings
+    assert stall.full_drive == pytest.approx(0.75, abs=0.01)
+    assert stall.stalled == pytest.approx(0.25, abs=0.02)
+    assert stall.supply_stalled_v == pytest.approx(5.0)
+    assert stall.weight_stalled_n_m == pytest.approx(0.5 * 9.80665 * 0.1 * math.sin(0.3))
+    assert (rest.full_drive, rest.stalled) == (0.0, 0.0)
+    assert (rest.error_stalled_deg, rest.supply_stalled_v) == (None, None)
+    always = replace(stall, stalled=1.0, error_else_deg=None)
+    assert "° off then and -° else" in sentence(replace(found, recordings=[always]))
 
 
 def entries(count: int = 300) -> list[dict[str, Any]]:
@@ -280,24 +281,25 @@ def test_positions_that_are_finer_than_ticks_are_taken(tmp_path: Path) -> None:
     for i, entry in enumerate(made):
         entry.update(position=0.3 * math.sin(i / 30), goal_position=0.3 * math.sin((i + 3) / 30))
     path = written(tmp_path / "log.json", made, 400)
-    assert antennate.run("servo", recording=[str(path)]).summary["models"][-1]["error_deg"] < 10.0
+    assert (found_of(path).models[-1].error_deg or 90.0) < 10.0
 
 
 @pytest.mark.slow
 def test_a_fit_does_not_depend_on_the_parameters_that_it_replaces(tmp_path: Path) -> None:
     """Nor does it leave them out: the model as given stands beside it."""
-    file = str(of_twin(tmp_path / "a.json", 1200, 400, 1.0, 2.0))
+    file = of_twin(tmp_path / "a.json", 1200, 400, 1.0, 2.0)
     runs = [
-        antennate.run("servo", recording=[file], servos=servos, fit=True).summary
+        found_of(file, servos=servos, fit=True)
         for servos in (ServosParams(), ServosParams(xl330_m288=XL330Params(armature=0.02)))
     ]
-    found = [{model["name"]: model for model in run["models"]} for run in runs]
+    found = [{each.name: each for each in run.models} for run in runs]
     assert found[0]["whole model"] == found[1]["whole model"]
-    assert found[0]["as given"]["error_deg"] != found[1]["as given"]["error_deg"]
+    assert found[0]["as given"].error_deg != found[1]["as given"].error_deg
 
-    for model in runs[0]["models"]:  # halves that tell nothing, as where one has no motion
-        model["held_out_deg"] = dict.fromkeys(model["held_out_deg"])
-    said = experiments.load("servo").sentence(runs[0])
+    # halves that tell nothing, as where one has no motion
+    whole = found[0]["whole model"]
+    none = replace(whole, held_out_deg=dict.fromkeys(whole.held_out_deg))
+    said = sentence(replace(runs[0], models=[none]))
     assert "where it was fitted; of no part of the recordings" in said
 
 

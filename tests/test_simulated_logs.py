@@ -25,7 +25,7 @@ from antennate.cli import main
 from antennate.dxl import packets
 from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.experiment import GaitStudyConfig, run
-from antennate.experiments.tunnel.experiment import run as cross
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
@@ -139,7 +139,7 @@ def test_a_trial_that_was_killed_is_logged_anew(tmp_path: Path) -> None:
     """Half a log of it is in the folder of a run that goes on."""
     (tmp_path / "open-0.mcap").write_bytes(b"half")
     config = TunnelConfig(scene="flat", trials=1, controllers=("open",), time_limit=0.5)
-    cross(config, logs=tmp_path)
+    EXPERIMENT.run(config, logs=tmp_path)
     with LogReader(tmp_path / "open-0.mcap") as log:
         assert sum(1 for _ in log) == log.end == pytest.approx(50, abs=1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,19 +10,22 @@ import pytest
 
 from antennate.antenna import springs
 from antennate.errors import ConfigError
-from antennate.experiments.springs.experiment import run
+from antennate.experiments.springs.experiment import SpringsResult, run, tables
 from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
+from antennate.studies.columns import content, typed
+from antennate.studies.formats import to_json
 
 E = 193e9
 
 
 @pytest.mark.parametrize(("coils", "printed"), [(3, 0.274), (6, 0.137), (9, 0.091)])
 def test_the_papers_table_within_its_rounding(coils: int, printed: float) -> None:
-    rows = run(SpringParams()).result()["springs"]
-    row = next(row for row in rows if row["active_coils"] == coils)
-    assert row["stiffness_n_mm_per_deg"] == pytest.approx(printed, abs=6e-4)
-    assert row["stiffness_n_m_per_rad"] == pytest.approx(printed * 0.0573, rel=5e-3)
+    found = run(SpringParams()).result().springs
+    spring = next(spring for spring in found if spring.active_coils == coils)
+    assert spring.stiffness_n_mm_per_deg == pytest.approx(printed, abs=6e-4)
+    assert spring.stiffness_n_m_per_rad == pytest.approx(printed * 0.0573, rel=5e-3)
+    assert spring.paper_n_mm_per_deg == printed
 
 
 @pytest.mark.parametrize(
@@ -73,22 +77,35 @@ def test_a_straight_wire_yields_at_its_surface() -> None:
 
 
 def test_wound_sets_keep_all_limits_and_their_own_law() -> None:
-    outcome = run(SpringParams())
-    assert outcome.windings
-    for row in outcome.result()["windings"]:
-        assert 4 - 1e-9 <= row["spring_index"] <= 12 + 1e-9
-        assert row["yield_angle_deg"] >= 30
-        assert all(2 <= n <= 12 and n * 4 == int(n * 4) for n in row["active_coils"])
-        for n, k in zip(row["active_coils"], row["stiffness_n_mm_per_deg"], strict=True):
-            d, coil = row["wire_mm"], row["coil_mm"]
+    found = run(SpringParams()).result().windings
+    assert found
+    for wound in found:
+        assert 4 - 1e-9 <= wound.spring_index <= 12 + 1e-9
+        assert wound.yield_angle_deg >= 30
+        assert all(2 <= n <= 12 and n * 4 == int(n * 4) for n in wound.active_coils)
+        for n, k in zip(wound.active_coils, wound.stiffness_n_mm_per_deg, strict=True):
+            d, coil = wound.wire_mm, wound.coil_mm
             assert k == pytest.approx(193e3 * d**4 / (3888 * coil * n), rel=1e-3)
-    errors = [row["largest_error"] for row in outcome.result()["windings"]]
+    errors = [wound.largest_error for wound in found]
     assert errors == sorted(errors)
 
 
 def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
-    row = run(SpringParams()).result()["windings"][0]
-    assert row["coil_mm"] - row["mandrel_mm"] == pytest.approx(row["wire_mm"])
+    wound = run(SpringParams()).result().windings[0]
+    assert wound.coil_mm - wound.mandrel_mm == pytest.approx(wound.wire_mm)
+
+
+def test_the_tables_of_a_result_that_was_read_are_those_of_the_run() -> None:
+    """Also of a count that the paper lacks, and of wire that no stock comes near."""
+    for config in (SpringParams(active_coils=(3, 5)), SpringParams(wanted_n_mm_per_deg=(90.0,))):
+        result = run(config).result()
+        assert typed(SpringsResult, json.loads(to_json(content(result)))) == result
+        asked, wound = (dict(table.rows) for table in tables(result))
+        assert len(asked["stiffness [N·mm/deg]"]) == len(config.active_coils)
+        assert bool(wound) == bool(result.windings)
+    asked, wound = tables(run(SpringParams(active_coils=(3, 5))).result())
+    assert dict(asked.rows)["  the paper prints"] == ["0.274", "-"]
+    assert dict(wound.rows)["active coils"][0] == "4 8 12"
 
 
 def test_the_fatigue_of_shigleys_stock_spring() -> None:

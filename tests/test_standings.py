@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from math import lcm
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binomtest, wilcoxon
 
 from antennate.experiments.compete.checking import read_rows
+from antennate.experiments.compete.comparison import compared
+from antennate.experiments.compete.config import CompeteConfig
 from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.experiment import summarise
 from antennate.experiments.compete.figure import drawn
 from antennate.experiments.compete.page import apart, markdown, ordered, readme, sentence, tables
-from antennate.experiments.compete.standings import profiles, standings
+from antennate.experiments.compete.result import CompeteResult, Standing
+from antennate.experiments.compete.standings import profiles, standing
+from antennate.studies.columns import content, typed
+from antennate.studies.formats import to_json
 from antennate.studies.statistics import (
     holm,
     mean95_by_draw,
@@ -33,20 +39,22 @@ def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episo
     """Rows of one controller in draws of their own, in two scenes by turns; None is a failure."""
     return [
         Episode(
-            *(name, ("uturn", "corner")[k % 2], 1, k),
+            controller=name,
+            scene=("uturn", "corner")[k % 2],
+            seed=1,
+            trial=k,
             outcome="timeout" if time is None else "success",
             time_s=LIMIT if time is None else time,
             progress_m=2.0,
             given=given,
+            drawn=True,
         )
         for k, time in enumerate(times)
     ]
 
 
-def judged(*groups: list[Episode], **more: Any) -> dict[str, Any]:
-    rows = [row for group in groups for row in group]
-    more = {"seeds": [1], "hidden": True, "decision_limit_s": 0.05, "check": None, **more}
-    return {**standings(rows, 0.01), **more}
+def judged(*groups: list[Episode]) -> CompeteResult:
+    return summarise(CompeteConfig(tie=0.01), [row for group in groups for row in group])
 
 
 @pytest.mark.parametrize(
@@ -68,9 +76,11 @@ def test_each_way_to_end_is_counted_and_together_they_are_all_episodes() -> None
         replace(row, outcome=end, overturned=end == "overturned")
         for row, end in zip(rows_of("open", [LIMIT] * 7), ends, strict=True)
     ]
-    result = standings(rows, 0.01)
+    result = standing(rows, 0.01)
     names = ("successes", "timeouts", "left", "overturned", "fell", "invalid")
-    assert [result["controllers"]["open"][name] for name in names] == [1, 1, 1, 1, 2, 1]
+    assert [getattr(result.controllers["open"], name) for name in names] == [1, 1, 1, 1, 2, 1]
+    shares = (result.controllers["open"], result.scenes["uturn"]["open"])
+    assert [each.success_share for each in shares] == [1 / 7, 1 / 4]
     assert "| fell | on its back | INVALID |" in markdown(result)
     assert markdown(result).splitlines()[2].endswith("| 2 | 1 | 1 |")
 
@@ -80,11 +90,11 @@ def test_a_difference_that_two_processors_make_is_a_tie() -> None:
     first = rows_of("a", [10.0] * 200)
     near, far = (rows_of("b", [10.0] * n + [None] * (200 - n)) for n in (198, 197))
     tied, apart = judged(first, near), judged(first, far)
-    assert tied["paired"]["a-b"]["tie"]
-    assert [tied["controllers"][n]["rank"] for n in "ab"] == [1, 1]
-    assert not apart["paired"]["a-b"]["tie"]
-    assert [apart["controllers"][n]["rank"] for n in "ab"] == [1, 2]
-    assert [apart["controllers"][n]["rank_95"] for n in "ab"] == [[1, 2], [1, 2]]
+    assert tied.paired["a-b"].tie
+    assert [tied.controllers[n].rank for n in "ab"] == [1, 1]
+    assert not apart.paired["a-b"].tie
+    assert [apart.controllers[n].rank for n in "ab"] == [1, 2]
+    assert [apart.controllers[n].rank_95 for n in "ab"] == [(1, 2), (1, 2)]
 
 
 def test_ranks_and_their_intervals_follow_from_the_tests_of_every_two() -> None:
@@ -94,15 +104,15 @@ def test_ranks_and_their_intervals_follow_from_the_tests_of_every_two() -> None:
         rows_of("b", [20.0] * 20 + [None] * 20),
         rows_of("c", [None] * 2 + [20.0] * 19 + [None] * 19),
     )
-    cells, pair = result["controllers"], result["paired"]["a-b"]
-    assert (pair["only_first"], pair["only_second"]) == (20, 0)
-    assert pair["mcnemar_p"] == pytest.approx(2 * 0.5**20)
-    assert pair["mcnemar_holm_p"] == pytest.approx(2 * 2 * 0.5**20)  # c has 21: it is first
-    assert [cells[n]["rank"] for n in "abc"] == [1, 2, 3]
-    assert [cells[n]["rank_95"] for n in "abc"] == [[1, 1], [2, 3], [2, 3]]
-    assert cells["b"]["wilson95"] == wilson95(20, 40)
-    assert cells["b"]["restricted_mean_share"] == pytest.approx((20 * 0.2 + 20) / 40)
-    assert result["scenes"]["uturn"]["a"]["episodes"] == 20
+    cells, pair = result.controllers, result.paired["a-b"]
+    assert (pair.only_first, pair.only_second) == (20, 0)
+    assert pair.mcnemar_p == pytest.approx(2 * 0.5**20)
+    assert pair.mcnemar_holm_p == pytest.approx(2 * 2 * 0.5**20)  # c has 21: it is first
+    assert [cells[n].rank for n in "abc"] == [1, 2, 3]
+    assert [cells[n].rank_95 for n in "abc"] == [(1, 1), (2, 3), (2, 3)]
+    assert cells["b"].wilson95 == wilson95(20, 40)
+    assert cells["b"].restricted_mean_share == pytest.approx((20 * 0.2 + 20) / 40)
+    assert result.scenes["uturn"]["a"].episodes == 20
 
 
 def test_scenes_of_one_draw_count_once_in_tests_and_intervals() -> None:
@@ -113,17 +123,17 @@ def test_scenes_of_one_draw_count_once_in_tests_and_intervals() -> None:
     thrice = judged(
         *([replace(r, scene=s) for s in scenes for r in rows_of(n, times[n])] for n in "ab")
     )
-    one, pair = alone["paired"]["a-b"], thrice["paired"]["a-b"]
-    assert (pair["only_first"], pair["only_second"]) == (27, 6)
-    assert (pair["episodes"], pair["draws"], one["draws"]) == (60, 20, 20)
-    assert pair["mcnemar_p"] == pytest.approx(binomtest(9, 11).pvalue)
+    one, pair = alone.paired["a-b"], thrice.paired["a-b"]
+    assert (pair.only_first, pair.only_second) == (27, 6)
+    assert (pair.episodes, pair.draws, one.draws) == (60, 20, 20)
+    assert pair.mcnemar_p == pytest.approx(binomtest(9, 11).pvalue)
     for key in ("mcnemar_p", "wilcoxon_p", "share_difference", "share_difference_95"):
-        assert pair[key] == pytest.approx(one[key]), key
-    cell = thrice["controllers"]["a"]
-    assert cell["wilson95"] == pytest.approx(wilson95(15, 20))
-    assert thrice["scenes"]["uturn"]["a"]["wilson95"] == wilson95(15, 20)
-    for key in ("restricted_mean_share", "restricted_mean_share_95"):
-        assert cell[key] == pytest.approx(alone["controllers"]["a"][key])
+        assert getattr(pair, key) == pytest.approx(getattr(one, key)), key
+    cell, same = thrice.controllers["a"], alone.controllers["a"]
+    assert cell.wilson95 == pytest.approx(wilson95(15, 20))
+    assert thrice.scenes["uturn"]["a"].wilson95 == wilson95(15, 20)
+    assert cell.restricted_mean_share == pytest.approx(same.restricted_mean_share)
+    assert cell.restricted_mean_share_95 == pytest.approx(same.restricted_mean_share_95)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -187,8 +197,8 @@ def test_times_of_the_board_are_ranked_as_fractions_have_them() -> None:
     whole = lcm(*(mean.denominator for mean in means))
     ticks = np.array([int(mean * whole) for mean in means])
     test = wilcoxon(ticks, zero_method="pratt", method="asymptotic", correction=False)
-    pair = standings([row for row in rows if row.controller in names], 0.015)["paired"]
-    p = pair["follow-centre"]["wilcoxon_p"]
+    pairs = standing([row for row in rows if row.controller in names], 0.015).paired
+    p = pairs["follow-centre"].wilcoxon_p
     assert p == pytest.approx(np.asarray(test)[1], rel=1e-9) == pytest.approx(0.036265, abs=1e-6)
 
 
@@ -203,11 +213,20 @@ def test_who_is_told_apart_is_said() -> None:
     assert same.count("nobody from nobody.") == 2
 
 
+def test_a_result_is_read_back_as_it_was_written() -> None:
+    """With a table of which one row differs, too."""
+    rows = [*rows_of("a", [10.0, None] * 4), *rows_of("map", [5.0] * 8, given="jam map")]
+    check = compared([replace(rows[0], time_s=9.0), *rows[1:]], rows)
+    result = standing(rows, 0.01, check)
+    assert [row.differences for row in check.differ] == [[("time_s", 9.0, 10.0)]]
+    assert typed(Standing, json.loads(to_json(content(result)))) == result
+
+
 def test_who_is_given_more_stands_outside_the_ranking() -> None:
     result = judged(rows_of("a", [10.0] * 6), rows_of("map", [5.0] * 6, given="jam map"))
-    assert result["controllers"]["map"]["rank"] is None
-    assert result["controllers"]["a"]["rank_95"] == [1, 1]
-    assert result["paired"] == {}
+    assert result.controllers["map"].rank is None
+    assert result.controllers["a"].rank_95 == (1, 1)
+    assert result.paired == {}
     assert ordered(result) == ["a", "map"]
     assert "| `map` | not ranked |" in markdown(result)
     assert "map" not in sentence(result)
@@ -232,7 +251,8 @@ def test_random_rows_rank_alike_in_any_order() -> None:
     one = judged(*(rows_of(n, times[n]) for n in "abcd"))
     other = judged(*(rows_of(n, times[n]) for n in "dbca"))
     for name, key in product("abcd", ("rank", "rank_95", "successes", "restricted_mean_share")):
-        assert one["controllers"][name][key] == other["controllers"][name][key]
+        first, second = (getattr(each.controllers[name], key) for each in (one, other))
+        assert first == second
 
 
 def test_tables_page_and_figures_show_every_controller_and_scene() -> None:
@@ -243,6 +263,16 @@ def test_tables_page_and_figures_show_every_controller_and_scene() -> None:
     for shown in (*(table.columns for table in tables(result)[:2]),):
         assert list(shown) == ["closed", "open"]
     assert [name for name, _ in tables(result)[1].rows] == ["uturn", "corner"]
+    pairs = tables(result)[2]
+    assert [*pairs.columns[:4]] == [
+        "only first",
+        "only second",
+        "McNemar p",
+        "time apart [% of limit]",
+    ]
+    assert [*pairs.columns[4:]] == ["95 %", "Wilcoxon p"]
+    ((names, cells),) = pairs.rows  # p is 2 / 2^4, and time (4 * 0.8 - 4 * 0.1) / 8 apart
+    assert (names, cells[:4]) == ("open and closed", ["0", "4", "0.12", "+35.0"])
     figures = drawn(result, rows)
     assert list(figures) == ["ranks", "scenes", "profiles"]
     ticks = {t.get_text() for panel in figures["scenes"].axes for t in panel.get_yticklabels()}

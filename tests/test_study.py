@@ -27,7 +27,9 @@ from antennate import experiments
 from antennate.cli import main
 from antennate.errors import BadInputError, OutputError, WorkerError
 from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.run import StudyOutcome
+from antennate.experiments.study.effects import Slope
+from antennate.experiments.study.result import StudyResult, summarise
+from antennate.studies.experiment import Done
 from antennate.studies.identity import identity
 from antennate.studies.plan import Range
 from antennate.studies.pool import Workers, gather
@@ -466,7 +468,7 @@ def test_W5_a_study_that_is_told_to_end_keeps_what_is_done(tmp_path: Path) -> No
     assert values == pytest.approx(expected, rel=1e-12)
 
 
-def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) -> StudyOutcome:
+def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) -> StudyResult:
     """A Morris study of eight parameters whose trials succeed by chance; some seeds are easy."""
     names = "abcdefgh"
     config = StudyConfig(
@@ -486,15 +488,14 @@ def study_of(shares: Callable[[dict[str, Any]], dict[str, float]], seed: int) ->
         for name, share in shares(point).items()
         for trial in range(10)
     ]
-    return StudyOutcome(config, points, "controller", config.vary, rows, len(rows), len(rows))
+    return summarise(config, points, config.vary, "controller", rows, len(rows), len(rows))
 
 
 def test_where_nothing_has_an_effect_none_is_found() -> None:
     """Over its three targets one study in twenty may err, so of the difference one in sixty."""
     say = experiments.load("study").sentence
     sentences = [
-        say(study_of(lambda point: {"open": 0.25, "closed": 0.6}, seed).result())
-        for seed in range(20)
+        say(study_of(lambda point: {"open": 0.25, "closed": 0.6}, seed)) for seed in range(20)
     ]
     nothing = (
         "Of 8 parameters nothing moves the share of successes of closed minus open above the "
@@ -504,9 +505,8 @@ def test_where_nothing_has_an_effect_none_is_found() -> None:
 
 
 def test_a_cause_that_is_there_is_found_alone() -> None:
-    outcome = study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1)
-    result = outcome.result()
-    found = [(e["of"], e["parameter"]) for e in result["effects"] if e["above_noise"]]
+    result = study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1)
+    found = [(each.of, each.parameter) for each in result.effects if each.above_noise]
     assert found == [("closed", "d"), ("closed minus open", "d")]
     study = experiments.load("study")
     said = study.sentence(result)
@@ -576,18 +576,19 @@ def test_slopes_and_intervals_are_those_of_least_squares_and_hc3() -> None:
         {"point": n, "trial": 0, "status": "ok", "length_mm": value}
         for n, value in enumerate(response.tolist())
     ]
-    outcome = StudyOutcome(config, points, "", axes, rows, 30, 30)
-    first, second = outcome.result()["effects"]
+    first, second = summarise(config, points, axes, "", rows, 30, 30).effects
+    assert isinstance(first, Slope)
+    assert isinstance(second, Slope)
 
     def solved(keep: Any) -> Any:
         return np.linalg.lstsq(design[keep], response[keep], rcond=None)[0]
 
     whole = solved(slice(None))
-    assert (first["slope"], second["slope"]) == pytest.approx(tuple(whole[1:]), rel=1e-9)
+    assert (first.slope, second.slope) == pytest.approx(tuple(whole[1:]), rel=1e-9)
     without = np.array([solved(np.arange(30) != left_out) for left_out in range(30)])
     half = 2.0518 * np.sqrt(((without - whole) ** 2).sum(axis=0))  # Student's t of 27, 97.5 %
-    assert first["slope95"] == pytest.approx((whole[1] - half[1], whole[1] + half[1]), rel=1e-4)
-    assert second["slope95"] == pytest.approx((whole[2] - half[2], whole[2] + half[2]), rel=1e-4)
+    assert first.slope95 == pytest.approx((whole[1] - half[1], whole[1] + half[1]), rel=1e-4)
+    assert second.slope95 == pytest.approx((whole[2] - half[2], whole[2] + half[2]), rel=1e-4)
 
 
 def test_as_many_points_as_parameters_tell_nothing(tmp_path: Path) -> None:
@@ -596,13 +597,14 @@ def test_as_many_points_as_parameters_tell_nothing(tmp_path: Path) -> None:
         lambda config, seed: {"value": config["a"]}, vary, plan="random", points=11, trials=1
     )
     assert "Of 11 points no noise is known" in result.sentence
-    assert len(experiments.load("study").tables(result.summary)[0].columns) == 1
+    assert len(experiments.load("study").tables(result.outcome.result())[0].columns) == 1
 
 
 def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:
-    from antennate.experiments.study.experiment import figures
+    from antennate.experiments.study.figure import figures
 
-    drawn = figures(study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1))["effects"]
+    found = study_of(lambda point: {"open": 0.25, "closed": point["d"]}, 1)
+    drawn = figures(Done([], found))["effects"]
     assert drawn.get_figwidth() <= 5.0  # 8 points are then 8 pixels on a phone of 375
     assert [panel.get_title(loc="left") for panel in drawn.axes] == [
         "open",
@@ -619,10 +621,8 @@ def test_figures_stand_in_one_column_and_tell_counts_and_noise() -> None:
         for name in ("open", "closed")
         for trial, outcome in enumerate(["success", "timeout", "left", "timeout"])
     ]
-    outcome = StudyOutcome(
-        config, points, "controller", list(points[0]), rows, len(rows), len(rows)
-    )
-    drawn = figures(outcome)["map"]
+    found = summarise(config, points, config.vary, "controller", rows, len(rows), len(rows))
+    drawn = figures(Done([], found))["map"]
     assert drawn.get_figwidth() <= 5.0
     *maps, bar = drawn.axes
     assert [panel.get_title(loc="left") for panel in maps] == ["open", "closed"]

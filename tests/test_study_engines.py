@@ -35,7 +35,7 @@ from antennate.studies.identity import environment, identity, packages_used
 from antennate.studies.slurm import Resumable
 from antennate.studies.store import read_store
 from antennate.studies.submitted import Submitted
-from antennate.studies.work import Part, Work
+from antennate.studies.work import Call, Work
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -154,7 +154,7 @@ def test_jobs_of_slurm_leave_the_same_table(alone: bytes) -> None:
     assert table("jobs", workers=2, engine="slurm-local") == alone
 
 
-def job_of(file: Path, part: Part, theirs: Mapping[str, Any] | None = None) -> Resumable:
+def job_of(file: Path, part: Work, theirs: Mapping[str, Any] | None = None) -> Resumable:
     """What a job of SLURM calls, whose driver has made its file."""
     file.touch()
     return Resumable(str(file), theirs or environment(), part, {})
@@ -164,7 +164,7 @@ def test_a_job_whose_driver_needs_it_no_more_runs_no_further_trial(tmp_path: Pat
     """Its driver has removed its file: before it begins, or while it runs."""
     pytest.importorskip("cloudpickle")
     removes = {place: (str(tmp_path / "job.jsonl"),) for place in range(3)}
-    job = job_of(tmp_path / "job.jsonl", Part(os.unlink, removes, together=False, timeout=60.0))
+    job = job_of(tmp_path / "job.jsonl", Work(os.unlink, removes, together=False, timeout=60.0))
     with pytest.raises(WorkerError, match="expected a driver that reads what this job finishes"):
         job.carry_out()
     assert job.carry_out() == 0
@@ -178,7 +178,7 @@ def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
     os.environ["STUDY_NOTES"] = str(notes)
     try:
         tasks = {place: ({"x": 1.0}, place) for place in range(3)}
-        part = Part(trial, tasks, together=False, timeout=60.0)
+        part = Work(trial, tasks, together=False, timeout=60.0)
         job = job_of(tmp_path / "job.jsonl", part)
         assert job.carry_out() == 3
         assert job.carry_out() == 0
@@ -191,13 +191,13 @@ def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
 def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path) -> None:
     pytest.importorskip("cloudpickle")
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
-    part = Part(trial, tasks, together=False, timeout=1.0)
+    part = Work(trial, tasks, together=False, timeout=1.0)
     job_of(tmp_path / "hung.jsonl", part).carry_out()
     found = read_store(tmp_path / "hung.jsonl")[1]
     assert found["1"]["failure"] == ["hung", "no result within 1 s"]
     assert found["2"]["result"]
     signals = {0: (signal.SIGTERM,), 1: (signal.SIGUSR2,), 2: (signal.SIGKILL,)}
-    part = Part(signal.raise_signal, signals, together=False, timeout=60.0)
+    part = Work(signal.raise_signal, signals, together=False, timeout=60.0)
     job_of(tmp_path / "asked.jsonl", part).carry_out()
     found = read_store(tmp_path / "asked.jsonl")[1]
     assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
@@ -209,7 +209,7 @@ def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> 
     from antennate.studies.dask import carry_out_apart
 
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
-    part = Part(trial, tasks, together=False, timeout=1.0)
+    part = Work(trial, tasks, together=False, timeout=1.0)
     found = dict(carry_out_apart(part, environment(), {}, "one"))
     assert (found[1].status, found[2]["value"]) == ("hung", pytest.approx(1.1))
 
@@ -219,7 +219,7 @@ def test_a_process_beside_a_worker_of_dask_serves_one_run_alone() -> None:
     pytest.importorskip("distributed")
     from antennate.studies.dask import carry_out_apart
 
-    part = Part(os.getpid, {0: ()}, together=False, timeout=60.0)
+    part = Work(os.getpid, {0: ()}, together=False, timeout=60.0)
     runs = ("one", "one", "two")
     first, again, other = (dict(carry_out_apart(part, environment(), {}, run))[0] for run in runs)
     assert first == again != other
@@ -230,7 +230,7 @@ def test_an_engine_gives_work_to_workers_that_join_later() -> None:
     joined = [1, 1, 2]
     given: list[Future[Any]] = []
 
-    def submit(function: Any, part: Part, *told: Any) -> Future[Any]:
+    def submit(function: Any, part: Work, *told: Any) -> Future[Any]:
         given.append(Future())
         if len(given) == 2:
             for place, future in enumerate(given):
@@ -241,14 +241,15 @@ def test_an_engine_gives_work_to_workers_that_join_later() -> None:
         return joined.pop(0) if len(joined) > 1 else joined[0]
 
     found: list[int] = []
-    work = Work(trial, [({}, 0), ({}, 1)], together=False, timeout=60.0)
+    work = Work(trial, {0: ({}, 0), 1: ({}, 1)}, together=False, timeout=60.0)
     engine = Submitted("later", submit, ahead=1, workers=workers)
-    engine.run(work, [[0], [1]], 1, lambda place, result: found.append(place), pytest.fail)
+    call = Call(work, [[0], [1]], lambda place, result: found.append(place), pytest.fail)
+    engine.run(call, 1)
     assert sorted(found) == [0, 1]
 
 
 def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
-    part = Part(trial, {}, together=False, timeout=60.0)
+    part = Work(trial, {}, together=False, timeout=60.0)
     old = {**environment(), "versions": {"numpy": "1.0"}}
     with pytest.raises(WorkerError, match=r'numpy "1\.0", now'):
         job_of(tmp_path / "job.jsonl", part, old).carry_out()
@@ -264,7 +265,7 @@ def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Pat
     theirs = environment("design", config)
     theirs["versions"]["optuna"] = "0.1"
     with pytest.raises(WorkerError, match=r'optuna "0\.1", now'):
-        job_of(tmp_path / "job.jsonl", Part(trial, {}, False, 9.0), theirs).carry_out()
+        job_of(tmp_path / "job.jsonl", Work(trial, {}, False, 9.0), theirs).carry_out()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -461,7 +462,7 @@ def test_a_worker_with_another_copy_of_a_named_file_is_refused(tmp_path: Path) -
     file = tmp_path / "own.py"
     file.write_text("def trial(config, seed):\n    return {'value': 1}\n")
     theirs = environment("study", StudyConfig(experiment=f"{file}:trial"))
-    part = Part(trial, {}, together=False, timeout=60.0)
+    part = Work(trial, {}, together=False, timeout=60.0)
     assert job_of(tmp_path / "job.jsonl", part, theirs).carry_out() == 0
     for edit, told in ((lambda: file.write_text("x = 1\n"), "changed"), (file.unlink, "is gone")):
         edit()
@@ -477,7 +478,7 @@ def test_a_worker_in_another_folder_is_refused_or_has_the_same_file() -> None:
     file = Path("own.py")
     file.write_text("def trial(config, seed):\n    return {'value': 1.0}\n")
     theirs = environment("study", StudyConfig(experiment="own.py:trial"))
-    part = Part(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
+    part = Work(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
     unseen = {**theirs, "folder": "/nowhere"}
     assert dict(carry_out_apart(part, unseen, {}, "one"))[0]["outcome"] == "timeout"
     Path("away").mkdir()

@@ -19,6 +19,7 @@ from antennate.params.bench import EstimateParams, ShapeParams, SweepParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Bench
+from antennate.studies.columns import content
 from antennate.studies.formats import to_csv, to_json, to_toml
 
 ANTENNA, SENSOR, SHAPE = AntennaSpec(), SensorParams(), ShapeParams()
@@ -150,10 +151,12 @@ def test_a_cue_recovers_a_law_of_second_degree_exactly():
 
 def test_errors_are_in_percent_and_count_what_cannot_be_told():
     found = estimates.errors(np.array([1.1, 1.8, np.nan]), np.array([1.0, 2.0, 3.0]))
-    assert (found["n"], found["untold"]) == (2, 1)
-    assert found["mape_percent"] == pytest.approx(10.0)
-    assert found["rmse_percent"] == pytest.approx(10.0)
-    assert found["bias_percent"] == pytest.approx(0.0, abs=1e-9)
+    assert (found.n, found.untold) == (2, 1)
+    assert found.mape_percent == pytest.approx(10.0)
+    assert found.rmse_percent == pytest.approx(10.0)
+    assert found.bias_percent == pytest.approx(0.0, abs=1e-9)
+    none = estimates.errors(np.array([np.nan]), np.array([1.0]))
+    assert (none.n, none.untold, none.mape_percent, none.bias_percent) == (0, 1, None, None)
 
 
 def test_a_gap_is_both_distances_and_the_space_between_the_bases():
@@ -185,14 +188,14 @@ def test_flex_and_base_angle_tell_a_distance_and_flex_alone_needs_a_known_sweep(
         for number in range(10)
         for side in estimates.SIDES
     ]
-    summary = estimates.summarise(trials, 0.04)
-    found = {name: summary[name]["noisy"]["distance"] for name in ("same", "varied")}
-    blind = found["same"]["blind"]["mape_percent"]
+    summary = estimates.errors_by_condition(trials, 0.04)
+    found = {name: summary[name].noisy.distance for name in ("same", "varied")}
+    blind = found["same"]["blind"].mape_percent
     for cues in found.values():
-        assert cues["flex_and_base"]["mape_percent"] < 0.3 * blind
-        assert cues["first_contact"]["mape_percent"] < 0.3 * blind
-        assert cues["closed_form"]["mape_percent"] < 0.3 * blind
-    alone = {name: cues["flex"]["mape_percent"] for name, cues in found.items()}
+        assert cues["flex_and_base"].mape_percent < 0.3 * blind
+        assert cues["first_contact"].mape_percent < 0.3 * blind
+        assert cues["closed_form"].mape_percent < 0.3 * blind
+    alone = {name: cues["flex"].mape_percent for name, cues in found.items()}
     assert alone["same"] < 0.3 * alone["varied"]
 
 
@@ -231,10 +234,33 @@ def test_a_trial_that_blows_up_is_invalid_and_enters_no_estimate(burst):
     outcome = sweep.run(SMALL)
     assert {row.status for row in outcome.rows} == {"invalid"}
     result = outcome.result()
-    assert result["shapes"]["descending"]["fixed"]["invalid"] == 1
-    same = result["estimates"]["same"]["noisy"]
-    assert same["invalid"] == 24
-    assert same["distance"] == {}
+    cells = result.shapes["descending"]["fixed"]
+    assert (cells.cells, cells.invalid, cells.map) == (1, 1, [])
+    assert set(cells.share.values()) == {(None, None, None)}
+    same = result.estimates["same"].noisy
+    assert (same.sweeps, same.missed, same.invalid, same.distance) == (12, 0, 24, {})
+
+
+def test_cells_of_the_map_become_shares_of_time_and_invalid_ones_none():
+    cell = {"seed": 0, "kind": "map", "profile": "descending", "condition": "moving", "side": "l"}
+    cell |= {"distance_m": 0.06, "centre_rad": 1.2, "amplitude_rad": 0.5, "status": "valid"}
+    rest = {"backward": 0.0, "straight": 0.1, "transition": 0.0}
+    rows = [
+        sweep.SweepRow(trial=0, **cell, **rest, forward=0.2, free=0.7),
+        sweep.SweepRow(trial=1, **cell, **rest, forward=0.4, free=0.5),
+        sweep.SweepRow(trial=2, **{**cell, "status": "invalid"}),
+    ]
+    result = sweep.summarise(SMALL, rows, [])
+    found = result.shapes["descending"]["moving"]
+    assert (found.cells, found.invalid, len(found.map)) == (3, 1, 2)
+    assert found.share["forward"] == (pytest.approx(0.3), None, None)  # too few for a spread
+    first = found.map[0]
+    assert (first.distance, first.centre_rad, first.free) == (0.5, 1.2, 0.7)  # of 0.12 m
+    shapes, *_ = sweep.tables(result)
+    assert dict(shapes.rows)["free"] == ["-", "0.60"]
+    assert [name for name, _ in shapes.rows] == [shape.name.lower() for shape in sweeping.Shape] + [
+        "free"
+    ]
 
 
 @pytest.mark.slow
@@ -248,7 +274,7 @@ def test_command_writes_its_run_and_the_same_on_two_workers(capsys, tmp_path, mo
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert (result["schema"], result["command"], result["seed"]) == (1, "sweep", 0)
     alone = sweep.run(SMALL, workers=1)
-    assert json.loads(to_json(alone.result())) == result
+    assert json.loads(to_json(content(alone.result()))) == result
     assert (tmp_path / "run" / "trials.csv").read_text() == to_csv(
         [dataclasses.asdict(row) for row in alone.rows]
     )

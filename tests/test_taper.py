@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 from antennate.antenna import springs
 from antennate.errors import BadInputError
-from antennate.experiments.taper.experiment import TaperConfig, run
+from antennate.experiments.taper.experiment import TaperConfig, TaperResult, run, tables
 from antennate.params.spring import TaperParams
+from antennate.studies.columns import content, typed
+from antennate.studies.formats import to_json
 
 LINEAR = (
     *(1, 0.759, 0.564, 0.410, 0.289, 0.198, 0.130, 0.0809, 0.0474, 0.0256, 0.0123, 0.00506),
@@ -30,8 +33,8 @@ def test_proxies_of_fourteen_segments(law: str, expected: tuple[float, ...]) -> 
 
 def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
     result = run(TaperConfig()).result()
-    assert result["base_over_tip"] == pytest.approx(3164, abs=1)
-    assert result["ladder"]["base_over_tip"] == pytest.approx(3)
+    assert result.base_over_tip == pytest.approx(3164, abs=1)
+    assert result.ladder.base_over_tip == pytest.approx(3)
 
 
 def test_a_round_section_of_one_millimetre() -> None:
@@ -61,14 +64,24 @@ def test_a_steeper_taper_ends_at_the_limits() -> None:
 
 def test_the_suggested_ladder_is_nearer_than_the_papers() -> None:
     result = run(TaperConfig()).result()
-    assert result["suggested"]["distance_decades"] < result["ladder"]["distance_decades"]
+    assert result.suggested.distance_decades < result.ladder.distance_decades
+
+
+def test_a_long_antenna_is_tabled_in_steps_and_its_result_can_be_read() -> None:
+    result = run(TaperConfig(segments=41)).result()
+    assert typed(TaperResult, json.loads(to_json(content(result)))) == result
+    animal, ladders = tables(result)
+    assert [name for name, _ in animal.rows] == [f"segment {n}" for n in range(1, 42, 3)]
+    assert (animal.columns, animal.rows[0][1][2]) == (["d [mm]", "I [mm⁴]", "proxy"], "1")
+    assert len(ladders.rows) == 6
 
 
 def test_measured_diameters_replace_the_law(tmp_path: Path) -> None:
     file = tmp_path / "antenna.csv"
     file.write_text("segment,diameter_mm\n1,2.0\n2,1.0\n3,0.5\n")
     result = run(TaperConfig(diameters=str(file), ladder=(3, 6, 9))).result()
-    assert [row["proxy"] for row in result["segments"]] == [1, 1 / 16, 1 / 256]
+    assert [segment.proxy for segment in result.segments] == [1, 1 / 16, 1 / 256]
+    assert [segment.diameter_mm for segment in result.segments] == [2.0, 1.0, 0.5]
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from antennate.experiments.touch import experiment as touch
 from antennate.experiments.touch import figure as figures
 from antennate.experiments.touch import sensing
 from antennate.experiments.touch.physics import TouchConfig, plan, site
+from antennate.experiments.touch.result import TouchResult
 from antennate.experiments.touch.sensing import runs
 from antennate.params.bench import TouchWallsParams
 from antennate.params.control import ConditioningParams, RuleParams
@@ -25,6 +26,7 @@ from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim import touch_wall
 from antennate.sim.bench import Ball, Bar, Bench, compile_bench
+from antennate.studies.columns import content, typed
 from antennate.studies.formats import to_csv, to_json, to_toml
 
 SMALL = TouchConfig(
@@ -159,41 +161,42 @@ def test_free_before_and_after_and_pressed_between(outcome):
 
 def test_the_study_counts_what_it_ran(outcome):
     result, rows = outcome.result(), outcome.rows
-    assert json.loads(to_json(result))["command"] == "touch"
+    assert json.loads(to_json(content(result)))["command"] == "touch"
     assert len(rows) == len(outcome.traverses) == 8
-    for name, measured in result["profiles"].items():
+    for name, measured in result.profiles.items():
         mine = [row for row in rows if row.profile == name]
-        assert measured["traverses"] == len(mine)
+        assert measured.traverses == len(mine)
         for key in ("contacts", "missed", "alarms", "false"):
-            assert measured[key] == sum(getattr(row, key) for row in mine)
-        assert measured["f1_95"] is None  # two trials decide nothing
-        assert (
-            measured["onset"]["n"] + measured["carried"] + measured["missed"]
-            == (measured["contacts"])
-        )
+            assert getattr(measured, key) == sum(getattr(row, key) for row in mine)
+        assert measured.f1_95 is None  # two trials decide nothing
+        assert measured.onset.n + measured.carried + measured.missed == measured.contacts
+    assert typed(TouchResult, json.loads(to_json(content(result)))).cells == result.cells
+    table = dict(touch.tables(result)[0].rows)
+    assert table["contacts"] == [str(each.contacts) for each in result.profiles.values()]
+    assert len({*table} & {"F1", "median onset latency [ms]", "missed contacts per metre"}) == 3
     # a blunt wall bends the antenna far back: felt, and half an averaging time late at its end
-    whole = result["profiles"]["descending"]
-    assert whole["f1"] > 2 * whole["contact_share"] / (1 + whole["contact_share"])
-    short, long = result["averaging"]
-    added = long["release"]["median_ms"] - short["release"]["median_ms"]
+    whole = result.profiles["descending"]
+    assert whole.f1 > 2 * whole.contact_share / (1 + whole.contact_share)
+    short, long = result.averaging
+    added = long.release.median_ms - short.release.median_ms
     assert 0.0 < added < 1000 * (0.3 - 0.02)
-    assert result["truths"][0]["f1"] == pytest.approx(
+    assert result.truths[0].f1 == pytest.approx(
         sum(2 * (v.truth & v.alarm).sum() for v in outcome.comparisons)
         / sum(v.truth.sum() + v.alarm.sum() for v in outcome.comparisons)
     )
 
 
 def test_the_force_that_is_needed_bends_the_film_that_far(outcome):
-    needed = outcome.result()["needed"]
+    needed = outcome.result().needed
     # b is one half where the divider reads the midpoint: solve the divider for the flex
     volts = 0.142 + 0.8056e-3 * (1399.0 + 0.305 * 473.0)
     flex = ((3.3 * 1e4 / volts - 1e4) / 1e4 - 1.0) * math.pi / 1.2
-    assert needed["flex_rad"] == pytest.approx(flex, abs=0.01)  # one count is 4 mrad
+    assert needed.flex_rad == pytest.approx(flex, abs=0.01)  # one count is 4 mrad
     antenna = mechanics.with_profile(AntennaSpec(), "stiff")
     chain = mechanics.Chain.of(antenna)
-    load = np.array([[0.0, needed["tip_force_n"]["stiff"]]])
+    load = np.array([[0.0, needed.tip_force_n["stiff"]]])
     bent = mechanics.equilibrium(chain, np.array([0.12]), load, follower=True).angles[0, :5]
-    assert bent.sum() == pytest.approx(needed["flex_rad"], rel=1e-3)
+    assert bent.sum() == pytest.approx(needed.flex_rad, rel=1e-3)
 
 
 def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
@@ -203,8 +206,8 @@ def test_a_traverse_that_breaks_is_a_row_with_its_reason(monkeypatch):
     monkeypatch.setattr(Bench, "press", broken)
     config = SMALL.model_copy(update={"trials": 1, "speeds": (0.3,)})
     found = touch.run(config)
-    assert found.result()["invalid"] == 2
-    assert found.result()["profiles"]["stiff"]["f1"] is None
+    assert found.result().invalid == 2
+    assert found.result().profiles["stiff"].f1 is None
     assert found.example() is None
     assert [row.status for row in found.rows] == ["invalid"] * 2
     assert "engine warning" in found.rows[0].reason
@@ -234,11 +237,12 @@ def test_the_command_on_two_workers_writes_the_bytes_of_one(outcome, capsys, tmp
     assert main(["bench", "touch", "--config", "small.toml", "--workers", "2", "--out", "run"]) == 0
     out, err = capsys.readouterr()
     assert "onset latency [ms]" in out
-    assert max(map(len, out.splitlines()[:-1])) <= 100
+    assert max(map(len, out.splitlines()[1:])) <= 100  # the first is a sentence
     assert "written to run" in err
     names = {path.name for path in (tmp_path / "run" / "figures").iterdir()}
     assert {"touch.svg", "touch_roc.png", "touch_trace.svg"} <= names
-    assert json.loads(Path("run/result.json").read_text()) == json.loads(to_json(outcome.result()))
+    assert json.loads(Path("run/result.json").read_text()) == json.loads(
+        to_json(content(outcome.result()))
+    )
     table = Path("run/trials.csv").read_text()
-    assert table.startswith("seed,trial,wall,speed_m_s,profile")
     assert table == to_csv([dataclasses.asdict(row) for row in outcome.rows])

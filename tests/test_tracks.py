@@ -16,6 +16,7 @@ from tracked import DWELL, NAMES, POINTS, animal, bent, classified, dwelling, wr
 
 import antennate
 from antennate.antenna.shapes import Shape, held, outline, pointing
+from antennate.cli import main
 from antennate.experiments.sweep import experiment as sweep
 from antennate.experiments.sweep.experiment import EXPERIMENT
 from antennate.experiments.sweep.physics import SweepConfig
@@ -228,6 +229,21 @@ def test_only_contact_counts_and_a_line_is_found(tmp_path: Path) -> None:
     assert not given.summary["wall"][str(tmp_path / "a.csv")]["fitted"]
 
 
+def test_a_criterion_that_leaves_nothing_in_contact_moves_no_share(tmp_path: Path) -> None:
+    """Tips never come nearer than 0.14 lengths: they touch below 0.15 and 0.18, not below 0.12."""
+    points = animal(["forward"] * 300, heading=0.0)
+    y = float(points["l3"][:, 1].max()) + 14.0
+    line = (0.0, y, 9.0, y)
+    result, _ = classified(
+        write(tmp_path / "a.csv", points), wall={"kind": "line", "line": line}, out=tmp_path / "run"
+    )
+    less, more = result.outcome.result().sensitivity[:2]
+    assert (less.criterion, less.change, set(less.share.values())) == ("gap", None, {None})
+    assert more.change is not None
+    assert "nan" not in result.sentence
+    assert main(["report", str(tmp_path / "run")]) == 0
+
+
 def test_a_circle_is_found_from_the_tips_along_it(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     way = np.linspace(0.0, 2 * np.pi, 900)
@@ -258,7 +274,7 @@ def test_few_trials_have_no_interval_and_say_so(tmp_path: Path) -> None:
 def test_criteria_have_the_names_of_their_flags_and_angles_are_in_degrees() -> None:
     """The defaults of docs/tracks.md: 0.15 lengths, 90, 20 and 10 degrees, 0.05 s; 20 % less."""
     result = antennate.run("tracks", synthetic={"trials": 2, "frames": 300})
-    shapes, varied, _ = TRACKS.tables(result.summary)
+    shapes, varied, _ = TRACKS.tables(result.outcome.result())
     assert shapes.title == "Shapes in contact"
     assert shapes.note.startswith("Shares of the frames in contact, the mean over 2 trials.")
     assert [name for name, _ in varied.rows][::2] == [

@@ -13,7 +13,7 @@ import pytest
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments.wall import experiment as wall
-from antennate.experiments.wall.experiment import EXPERIMENT, run
+from antennate.experiments.wall.experiment import EXPERIMENT, Border, summarise
 from antennate.experiments.wall.physics import (
     Traverse,
     WallConfig,
@@ -26,6 +26,7 @@ from antennate.experiments.wall.physics import (
 )
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
+from antennate.studies.columns import frame
 
 PERIOD = 0.01
 SHORT = {"wall": {"travel": 0.03, "start": 0.005, "speed": 0.02}, "trials": 2}
@@ -150,7 +151,7 @@ def test_trials_share_their_chance_across_arms_and_differ_among_each_other() -> 
 
 def test_same_table_on_one_and_two_workers() -> None:
     config = WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]})
-    one, two = run(config, 1), run(config, 2)
+    one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)
     assert one.rows == two.rows
     assert one.result() == two.result()
     assert [(r.profile, r.trial) for r in one.rows] == [
@@ -170,12 +171,14 @@ def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPa
         return sound(config, arm, trial, *watch)
 
     monkeypatch.setattr(wall, "passage", burst)
-    outcome = run(WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]}))
-    summary = outcome.result()["profiles"]["stiff"]
-    assert (summary["trials"], summary["invalid"]) == (2, 1)
-    assert summary["successes"] + summary["jams"] + summary["slips"] == 1
+    outcome = EXPERIMENT.run(
+        WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]})
+    )
+    summary = outcome.result().profiles["stiff"]
+    assert (summary.trials, summary.invalid) == (2, 1)
+    assert summary.successes + summary.jams + summary.slips == 1
     assert "engine warning" in outcome.rows[1].reason
-    assert outcome.result()["paired"]["descending-stiff"]["trials"] == 1
+    assert outcome.result().paired["descending-stiff"].trials == 1
 
 
 def test_command_writes_its_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -233,17 +236,19 @@ def test_the_lightest_antenna_that_is_taken_is_one_for_the_engine() -> None:
         AntennaSpec(base_mass=0.99 * least)
 
 
+def made(trial: int, outcome: Any, stick: float) -> WallTrial:
+    """A trial with this outcome and a longest stick [mm]."""
+    how: Any = {"outcome": outcome, "outcome_after_start": outcome, "longest_stick_mm": stick}
+    return WallTrial(seed=1, trial=trial, profile="stiff", **how)
+
+
 def test_the_border_of_a_jam_lies_between_the_sticks_beside_it() -> None:
     """Made trials with sticks of 17, 18 and 24 mm; an invalid one of 20 mm does not count."""
     sticks = {17.0: "success", 24.0: "jam", 18.0: "slip", 20.0: "invalid"}
-    rows = [
-        WallTrial(1, k, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0, 0)
-        for k, (stick, outcome) in enumerate(sticks.items())
-    ]
-    outcome = wall.WallOutcome(WallConfig(), rows, {})
-    border = outcome.result()["border"]
-    assert border == pytest.approx({"at_mm": 19.0, "below_mm": 18.0, "above_mm": 24.0})
-    said = EXPERIMENT.sentence(outcome.result())
+    rows = [made(k, outcome, stick) for k, (stick, outcome) in enumerate(sticks.items())]
+    result = summarise(WallConfig(), frame(rows))
+    assert result.border == Border(at_mm=19.0, below_mm=18.0, above_mm=24.0)
+    said = EXPERIMENT.sentence(result)
     assert "a jam if the base moves 19 mm" in said
     assert "1.0 mm below and 5.0 mm above" in said
 
@@ -253,7 +258,6 @@ def test_sticks_all_on_one_side_of_the_border_are_said_to_be() -> None:
         ("In every trial the tip lagged more than 19 mm", "jam", 30.0, "below_mm"),
         ("In no trial did the tip lag more than 19 mm", "success", 10.0, "above_mm"),
     ):
-        rows = [WallTrial(1, 0, "stiff", outcome, outcome, 0, stick, 0, 0, 0, 0, 0, 0)]
-        result = wall.WallOutcome(WallConfig(profiles=("stiff",)), rows, {}).result()
-        assert result["border"][side] is None
+        result = summarise(WallConfig(profiles=("stiff",)), frame([made(0, outcome, stick)]))
+        assert getattr(result.border, side) is None
         assert said in EXPERIMENT.sentence(result)

@@ -9,27 +9,30 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig
-from antennate.experiments.climb.crossing import ground_tables
-from antennate.experiments.climb.experiment import ClimbOutcome, tables
 from antennate.experiments.climb.figure import success
-from antennate.experiments.climb.measures import PLAN_BAND, pairs, sentence, step_tables
-from antennate.experiments.climb.physics import ClimbRow
-from antennate.experiments.tunnel.measures import CONTROLLER, paired, summary
+from antennate.experiments.climb.measures import PLAN_BAND, pairs, summarise
+from antennate.experiments.climb.physics import ClimbPath
+from antennate.experiments.climb.result import ClimbResult
+from antennate.experiments.climb.rows import ClimbRow
+from antennate.experiments.climb.tables import ground_tables, sentence, step_tables, tables
 from antennate.experiments.tunnel.physics import TrialResult
+from antennate.experiments.tunnel.result import ControllerSummary, paired, summary
 from antennate.figures import render
 from antennate.sim.scenes.scene import TIME_LIMIT
+from antennate.studies.columns import columns, frame
+from antennate.studies.experiment import Found
 from antennate.studies.formats import from_csv
-from antennate.studies.measures import Table
 from antennate.studies.statistics import mean95
+from antennate.studies.tables import Table
 
+Outcome = Found[ClimbConfig, ClimbResult, ClimbPath]
 HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
 GROUND = HERE / "climb_ground.csv"
@@ -42,8 +45,9 @@ PLANE = HERE / "climb_plane.csv"
 """Two runs of `tunnel`, one after the other: `scuttle3d` and `scuttle`."""
 CROSSED = [
     measure
-    for measure in CONTROLLER
-    if measure.name.startswith(("success", "wilson", "timeouts", "left", "speed", "restricted"))
+    for measure in columns(ControllerSummary)
+    if measure.name.startswith(("success", "wilson", "timeouts", "left", "speed"))
+    or measure.name == "restricted_mean_time_s"
 ]
 """Measures of those that the page shows."""
 FELT = (0.045, 0.065, 0.08)
@@ -64,8 +68,8 @@ def main() -> None:
         text += "\n".join(map(markdown, tables(result)))
         text += f"\n{lead(outcome.rows)}\n"
         if "--check" not in sys.argv[1:]:
-            grounds = outcome_of(GROUND).result()["grounds"]
-            FIGURE.write_bytes(render(success(result["climbing"], grounds))["png"])
+            grounds = outcome_of(GROUND).result().grounds
+            FIGURE.write_bytes(render(success(result.climbing, grounds))["png"])
         ground = outcome_of(GROUND).result()
         text += "\n### On other grounds\n\n"
         text += "\n".join(markdown(t) for t in [*first_of(ground), *ground_tables(ground)])
@@ -81,28 +85,26 @@ def main() -> None:
     PAGE.write_text(new)
 
 
-def first_of(result: Mapping[str, Any]) -> list[Table]:
+def first_of(result: ClimbResult) -> list[Table]:
     """Tables of success over the height of steps, one each divisor that has trials."""
-    shown = [entry for entry in result["climbing"] if entry["conditions"]["climb"]["trials"]]
-    found = step_tables({**result, "climbing": shown})
+    shown = [entry for entry in result.climbing if entry.conditions["climb"].trials]
+    found = step_tables(replace(result, climbing=shown))
     return [table for table in found if table.title.startswith("Climbed")]
 
 
-def without(outcome: ClimbOutcome) -> Iterator[Table]:
+def without(outcome: Outcome) -> Iterator[Table]:
     """Success of `climb` without an inertial sensor, and the pairs with those of a run with it."""
-    rows = outcome_of(WITHOUT).rows
-    for table in first_of(outcome_of(WITHOUT).result()):
+    run = outcome_of(WITHOUT)
+    runs = {"climb": outcome.frame[outcome.frame["condition"] == "climb"], "without": run.frame}
+    climbs = {name: rows[rows["part"] == "climbing"] for name, rows in runs.items()}
+    for table in first_of(run.result()):
         divisor = float(table.title.rpartition(" ")[2])
-        some = [
-            {(r.ground, r.trial): r for r in run if r.part == "climbing" and r.divisor == divisor}
-            for run in ([r for r in outcome.rows if r.condition == "climb"], rows)
-        ]
-        test = pairs({"climb": list(some[0].values()), "without": list(some[1].values())})
-        found = test["without"]
+        of = {name: rows[rows["divisor"] == divisor] for name, rows in climbs.items()}
+        test = pairs(of)["without"]
         note = (
-            f"Seed {outcome.config.seed}. Of {found['trials']} pairs {found['only_climb']} were "
-            f"climbed with the sensor alone, {found['only_other']} without it alone; McNemar p "
-            f"{found['mcnemar_p']:.3g}."
+            f"Seed {outcome.config.seed}. Of {test.trials} pairs {test.only_climb} were climbed "
+            f"with the sensor alone, {test.only_other} without it alone; McNemar p "
+            f"{test.mcnemar_p:.3g}."
         )
         yield replace(table, title=f"{table.title}, without the sensor", note=note)
 
@@ -110,13 +112,12 @@ def without(outcome: ClimbOutcome) -> Iterator[Table]:
 def far() -> Iterator[Table]:
     """Success where the distance of the step is drawn from two metres, and the pairs."""
     result = outcome_of(FAR).result()
-    for table, entry in zip(first_of(result), result["climbing"], strict=True):
-        test = entry["pairs"]["rhythm"]
+    for table, entry in zip(first_of(result), result.climbing, strict=True):
+        test = entry.pairs["rhythm"]
         note = (
-            f"Steps 0.35 to 2.35 m ahead, within {result['time_limit_s']:g} s, seed "
-            f"{outcome_of(FAR).config.seed}; `rhythm` walks for 10 s. Of {test['trials']} pairs "
-            f"{test['only_climb']} were climbed by climb alone, {test['only_other']} by rhythm "
-            f"alone; McNemar p {test['mcnemar_p']:.3g}."
+            f"Steps 0.35 to 2.35 m ahead, within {result.time_limit_s:g} s, seed {result.seed}; "
+            f"`rhythm` walks for 10 s. Of {test.trials} pairs {test.only_climb} were climbed by "
+            f"climb alone, {test.only_other} by rhythm alone; McNemar p {test.mcnemar_p:.3g}."
         )
         yield replace(table, title=f"{table.title}, 0.35 to 2.35 m ahead", note=note)
 
@@ -149,9 +150,10 @@ def plane() -> Table:
     rows = [TrialResult(**{**row, "reason": ""}) for row in from_csv(PLANE.read_text())]
     half = len(rows) // 2
     robots = {"scuttle3d": rows[:half], "scuttle": rows[half:]}
-    columns = {name: summary(own, TIME_LIMIT) for name, own in robots.items()}
-    pair = paired(robots, TIME_LIMIT)["scuttle3d-scuttle"]
-    low, high = pair["time_difference_95"]
+    frames = {name: frame(own) for name, own in robots.items()}
+    crossed = {name: summary(own, TIME_LIMIT) for name, own in frames.items()}
+    pair = paired(frames, TIME_LIMIT)["scuttle3d-scuttle"]
+    low, high = pair.time_difference_95 or (np.nan, np.nan)
     better = [
         (a.outcome == "success") - (b.outcome == "success")
         for a, b in zip(*robots.values(), strict=True)
@@ -160,17 +162,17 @@ def plane() -> Table:
     assert ends is not None
     note = (
         f"`closed` in {half} tunnels, seed {rows[0].seed}. Only scuttle3d crossed "
-        f"{pair['only_first']}, only scuttle {pair['only_second']}; McNemar p "
-        f"{pair['mcnemar_p']:.3g}; {mean:+.1f} points ({ends[0]:+.1f} to {ends[1]:+.1f}, Student's "
-        f"of the pairs). Time, a failure as the limit: {pair['time_difference_s']:+.1f} "
+        f"{pair.only_first}, only scuttle {pair.only_second}; McNemar p "
+        f"{pair.mcnemar_p:.3g}; {mean:+.1f} points ({ends[0]:+.1f} to {ends[1]:+.1f}, Student's "
+        f"of the pairs). Time, a failure as the limit: {pair.time_difference_s:+.1f} "
         f"s ({low:+.1f} to {high:+.1f})."
     )
     return Table.of(
-        "Tunnels crossed by robots with pitch joints and without", columns, CROSSED, note
+        "Tunnels crossed by robots with pitch joints and without", crossed, CROSSED, note
     )
 
 
-def outcome_of(path: Path) -> ClimbOutcome:
+def outcome_of(path: Path) -> Outcome:
     """The run of which a table of trials is."""
     rows = [
         ClimbRow(
@@ -189,7 +191,7 @@ def outcome_of(path: Path) -> ClimbOutcome:
         sensing=max((row.trial + 1 for row in felt), default=0),
         seed=rows[0].seed - round(10_000 * (rows[0].height_m or 0.0)),
     )
-    return ClimbOutcome(config, rows, {}, interrupted=False)
+    return Found(config, rows, {}, False, ClimbRow, summarise)
 
 
 def markdown(table: Table) -> str:

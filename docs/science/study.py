@@ -22,9 +22,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from antennate.control.readings import short_names
-from antennate.experiments.tunnel.experiment import run
+from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.figures import INK, WIDTH, above, canvas, render, styled
+from antennate.studies.columns import content
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
@@ -86,9 +87,9 @@ def _config(trials: int, seed: int, controllers: tuple[str, ...], **rest: Any) -
 
 
 def _results(config: TunnelConfig, workers: int, name: str) -> dict[str, Any]:
-    result = run(config, workers)
+    result = EXPERIMENT.run(config, workers)
     print(f"{name}: done", file=sys.stderr)
-    return result.result()
+    return content(result.result())
 
 
 def evaluation(trials: int, workers: int) -> dict[str, Any]:

@@ -23,8 +23,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from antennate import figures as style
-from antennate.experiments.wall.experiment import run
+from antennate.experiments.wall.experiment import EXPERIMENT
 from antennate.experiments.wall.physics import WallConfig, passage
+from antennate.studies.columns import content
 from antennate.studies.pool import core_count
 
 HERE = Path(__file__).parent
@@ -82,7 +83,12 @@ def _grid(places: Iterable[tuple[float, float, float, str]], workers: int) -> di
     cells = []
     for where in places:
         config = _config(*where, trials=MAP_TRIALS, seed=MAP_SEED)
-        cells.append({**_cell(*where), "profiles": run(config, workers).result()["profiles"]})
+        cells.append(
+            {
+                **_cell(*where),
+                "profiles": content(EXPERIMENT.run(config, workers).result())["profiles"],
+            }
+        )
         print(where, file=sys.stderr)
     return {"trials": MAP_TRIALS, "seed": MAP_SEED, "cells": cells}
 
@@ -122,7 +128,7 @@ def best_cells(workers: int) -> dict[str, Any]:
         cell = tied[len(tied) // 2]
         where = [cell[k] for k in ("link_mass_g", "overlap_mm", "base_angle_deg", "gravity")]
         config = _config(*where, trials=FRESH_TRIALS, seed=FRESH_SEED)
-        result = run(config, workers).result()
+        result = content(EXPERIMENT.run(config, workers).result())
         out[name] = {
             **_cell(*where),
             "score": best,
@@ -143,7 +149,7 @@ def sticks(workers: int) -> dict[str, Any]:
         config = WallConfig.model_validate(
             {"wall": wall, "trials": STICK_TRIALS, "seed": FRESH_SEED}
         )
-        outcome = run(config, workers)
+        outcome = EXPERIMENT.run(config, workers)
         rows += [
             {
                 "base_angle_deg": angle,
@@ -186,10 +192,10 @@ def convergence(workers: int) -> dict[str, Any]:
     for timestep in (5e-4, 2.5e-4):
         physics = {"timestep": timestep, "contact_time": 2 * timestep}
         config = WallConfig.model_validate({"physics": physics})
-        rows[timestep] = run(config, workers)
+        rows[timestep] = EXPERIMENT.run(config, workers)
     coarse, fine = rows.values()
     return {
-        "profiles": {str(k): o.result()["profiles"] for k, o in rows.items()},
+        "profiles": {str(k): content(o.result())["profiles"] for k, o in rows.items()},
         "trials": len(coarse.rows),
         "fates_that_differ": sum(
             a.outcome != b.outcome for a, b in zip(coarse.rows, fine.rows, strict=True)

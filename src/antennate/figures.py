@@ -154,7 +154,7 @@ def interval_note(trials: int) -> str:
 def intervals(
     panel: Axes,
     x: Sequence[float],
-    rows: Sequence[Mapping[str, Any]],
+    rows: Sequence[Any],
     keys: Keys,
     trials: int = ENOUGH_TRIALS,
     **look: Any,
@@ -164,14 +164,14 @@ def intervals(
     Args:
         panel: Where to draw.
         x: A place for each row.
-        rows: Objects of result.json.
+        rows: Parts of a result, or mappings.
         keys: Names of the measure and of its interval in a row; empty for no interval.
         trials: Trials behind each row; without `ENOUGH_TRIALS` of them no interval is drawn.
         look: Colour, marker and label, as for `plot`.
     """
     value, interval = keys
     interval = interval if trials >= ENOUGH_TRIALS else ""
-    known = [(a, row.get(value), row.get(interval)) for a, row in zip(x, rows, strict=True)]
+    known = [(a, _of(row, value), _of(row, interval)) for a, row in zip(x, rows, strict=True)]
     known = [(a, b, ends or (b, b)) for a, b, ends in known if b is not None and b == b]
     middle = np.array([b for _, b, _ in known])
     ends = np.array([ends for *_, ends in known], float).reshape(-1, 2)
@@ -179,6 +179,10 @@ def intervals(
     whiskers = np.maximum(0.0, [middle - low, high - middle])
     look = {"markersize": 5, "linestyle": "", "capsize": 2.5, "elinewidth": 1.2, **look}
     panel.errorbar([a for a, *_ in known], middle, yerr=whiskers, **look)
+
+
+def _of(row: Any, name: str) -> Any:
+    return row.get(name) if isinstance(row, Mapping) else getattr(row, name, None)
 
 
 @styled

@@ -1,45 +1,11 @@
-"""How a result leaves this package: as a data frame, and in a notebook as text, table and figure.
-
-pandas is optional: it is imported when the first data frame is asked for.
-"""
+"""How a result is shown in a notebook: as text, table and figure."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
-
-from antennate.errors import MissingPackageError
-
-
-def from_columns(columns: Mapping[str, Any]) -> Any:
-    """A pandas DataFrame of equally long columns.
-
-    Raises:
-        MissingPackageError: pandas is not installed.
-    """
-    try:
-        import pandas
-    except ImportError:
-        raise MissingPackageError(
-            "to_dataframe: expected pandas, found none; install it with `pip install pandas`, or "
-            "in a clone `uv sync --extra pandas`"
-        ) from None
-    return pandas.DataFrame(dict(columns))
-
-
-def from_rows(rows: Iterable[Any]) -> Any:
-    """A pandas DataFrame of dataclasses or mappings of one kind: a column for each field.
-
-    Raises:
-        MissingPackageError: pandas is not installed.
-    """
-    mappings = [row if isinstance(row, Mapping) else asdict(row) for row in rows]
-    names = mappings[0] if mappings else ()
-    return from_columns({name: [row[name] for row in mappings] for name in names})
-
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -191,16 +191,14 @@ OTHER_DIVIDERS = {"half the divider": 0.5, "twice the divider": 2.0}
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """How much smaller a rival's error of b is than the sigmoid's, over pushes left out.
-
-    Attributes:
-        mean: Mean over pushes; `interval_95` its 95 % interval.
-        pushes: How many.
-    """
+    """How much smaller a rival's error of b is than the sigmoid's, over pushes left out."""
 
     mean: float
+    """Mean over pushes."""
     interval_95: tuple[float, float]
+    """95 % interval of that mean."""
     pushes: int
+    """Pushes that were left out in turn."""
 
     @property
     def wins(self) -> bool:
@@ -284,15 +282,14 @@ _SIGMA = 1.0 / (0.6745 * 6.0**0.5)
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
-    """The highest reading [counts], and the share of all that stand at it.
-
-    Attributes:
-        still: Whether none lies below it by more than a converter that is stuck toggles.
-    """
+    """Readings that stand at the highest one."""
 
     counts: float
+    """Highest reading [counts]."""
     share: float
+    """Share of all readings that stand at it."""
     still: bool = False
+    """Whether no reading lies below it by more than a converter that is stuck toggles."""
 
     def text(self, whose: str) -> str:
         """It in words, with what may be wrong."""

@@ -24,8 +24,8 @@ from antennate.hardware.setup.zeros import forgotten
 from antennate.host import HostClock
 from antennate.messages import one_line
 from antennate.studies.formats import to_json
-from antennate.studies.measures import Table
 from antennate.studies.report import View
+from antennate.studies.tables import Table
 
 DESCRIPTION = """\
 Examine the antenna board and the servo bus of a robot at rest, or of its twin: one line for each

@@ -31,14 +31,15 @@ from antennate.experiments import FITTED, fitted
 from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import command_words, shortened, typed
 from antennate.params.base import Params
+from antennate.studies.columns import content
 from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
-from antennate.studies.measures import Interim, Table
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD
+from antennate.studies.tables import Interim, Table
 from antennate.telemetry import FilmView
 
 if TYPE_CHECKING:
@@ -351,7 +352,8 @@ def _end(
     argv: Sequence[str] | None,
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
-    result, title = outcome.result(), experiment.view.title
+    found, title = outcome.result(), experiment.view.title
+    result = content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
     if argv is not None and interrupted and run.store is not None and run.store.holds_trials:
@@ -363,9 +365,9 @@ def _end(
         keep(experiment, outcome, run, figures=not options.no_figures)
     except OutputError:
         with contextlib.suppress(AntennateError):
-            show_result(result, options, *_shown(experiment, result), experiment.explained)
+            show_result(result, options, *_shown(experiment, found), experiment.explained)
         raise
-    show_result(result, options, *_shown(experiment, result), experiment.explained)
+    show_result(result, options, *_shown(experiment, found), experiment.explained)
     if interrupted:
         number = len(outcome.rows)
         rest = f"kept {number} trial{'s' * (number != 1)}, all that had ended"
@@ -379,7 +381,7 @@ def _end(
             run.keep_trials()
             sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
             return INTERRUPTED
-    return BAD_INPUT if experiment.failed(result) else OK
+    return BAD_INPUT if experiment.failed(found) else OK
 
 
 def _shown(experiment: Experiment[Any, Any], result: Any) -> tuple[Sequence[Table], str]:

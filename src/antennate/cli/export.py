@@ -9,14 +9,15 @@ from antennate import __version__
 from antennate.errors import ConfigError
 from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
-from antennate.studies.measures import Measure, Table
+from antennate.studies.columns import Column
+from antennate.studies.tables import Table
 
 _MEASURES = (
-    Measure("joints", "joints", form="d"),
-    Measure("servos", "servos", form="d"),
-    Measure("mass", "mass", "kg", form=".4f"),
-    Measure("ticks", "control periods", form="d"),
-    Measure("walk_difference_m", "head apart", "m", form=".2g"),
+    Column("joints", "joints", form="d"),
+    Column("servos", "servos", form="d"),
+    Column("mass", "mass", "kg", form=".4f"),
+    Column("ticks", "control periods", form="d"),
+    Column("walk_difference_m", "head apart", "m", form=".2g"),
 )
 
 

@@ -27,11 +27,11 @@ from antennate.files import remove_abandoned, require_room, write_whole, writing
 from antennate.messages import command_words, one_line, shortened, typed
 from antennate.params.base import Params, from_values
 from antennate.studies.formats import csv_lines
-from antennate.studies.measures import Table
 from antennate.studies.parquet import require_parquet
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
+from antennate.studies.tables import Table
 from antennate.telemetry import FilmView
 from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, parts
 from antennate.telemetry.reader import LogReader, left_out, recover

@@ -18,10 +18,11 @@ from antennate.cli.results import ResultOptions, folder_for, log_of, show_result
 from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
 from antennate.messages import one_line, shortened
+from antennate.studies.columns import Column, shown
 from antennate.studies.formats import csv_lines
-from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.tables import Table
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import (
     ReplayConfig,
@@ -40,10 +41,10 @@ TICKS = "ticks.csv"
 _NO_STATE = "none"
 """State of ticks without a supervisor, as in a simulation."""
 COUNTS = (
-    Measure("different", "maneuvers that differ", form="d"),
-    Measure("different_commands", "commands that differ", form="d"),
-    Measure("failures", "failures", form="d"),
-    Measure("missing", "ticks missing", form="d"),
+    Column("different", "maneuvers that differ", form="d"),
+    Column("different_commands", "commands that differ", form="d"),
+    Column("failures", "failures", form="d"),
+    Column("missing", "ticks missing", form="d"),
 )
 
 
@@ -166,11 +167,11 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
     now = {**result, "states": {}}
     done = [m.name for m in Maneuver if then["shares"][m.name] + now["shares"][m.name]]
     measures = [
-        Measure(f"shares.{name}", name, "% of ticks", form=".1f", scale=100.0) for name in done
+        Column(f"shares.{name}", name, "% of ticks", form=".1f", scale=100.0) for name in done
     ]
     for name in () if set(result["states"]) == {_NO_STATE} else result["states"]:
         label = one_line(f"supervisor {name}")
-        measures.append(Measure(f"states.{name}", label, "% of ticks", form=".1f", scale=100.0))
+        measures.append(Column(f"states.{name}", label, "% of ticks", form=".1f", scale=100.0))
     note = (
         f"{result['ticks']} ticks, {shown(result['duration_s'])} s, in "
         f"{one_line(', '.join(result['parts']))}.\n"

@@ -25,7 +25,6 @@ from antennate.files import write_whole
 from antennate.messages import command_words
 from antennate.params.base import Params
 from antennate.studies.formats import to_json
-from antennate.studies.measures import Table
 from antennate.studies.page import spaced
 from antennate.studies.report import View, command_of, compare, report, write_report
 from antennate.studies.run_directory import RunDirectory
@@ -37,6 +36,7 @@ from antennate.studies.run_files import (
     listed,
 )
 from antennate.studies.store import Tasks
+from antennate.studies.tables import Table
 from antennate.telemetry.header import RECOVERED
 
 
@@ -309,5 +309,5 @@ def _page(run: RunDirectory, make: Callable[[View], str]) -> str:
     except (LookupError, TypeError, AttributeError, ValueError) as error:
         raise BadInputError(
             f"{run.path}: expected a result of this version's {name}, found another form "
-            f"({type(error).__name__}: {error})"
+            f"({type(error).__name__}: {error}); run it again, or take the version that wrote it"
         ) from None

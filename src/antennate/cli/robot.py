@@ -30,9 +30,10 @@ from antennate.params.base import Config, Params, read_file
 from antennate.params.hardware import ZerosParams
 from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
 from antennate.robots.spec import RobotSpec
+from antennate.studies.columns import NONE, Column
 from antennate.studies.formats import to_csv
-from antennate.studies.measures import NONE, Measure, Table
 from antennate.studies.report import View
+from antennate.studies.tables import Table
 
 USUAL = Path("robot.toml")
 """The robot's file if --config names no other."""
@@ -234,11 +235,11 @@ it, a walk (gait.csv) and walk.py, which drives scene.xml by it in MuJoCo alone,
 urdf: robot.urdf. README.txt tells what the files cannot hold."""
 _COLUMNS = ("id", "servo", "mode", "zero", "direction")
 _RAIL = (
-    Measure("servos", "servos", form="d"),
-    Measure("standby", "standby", "A"),
-    Measure("walking", "walking, mean", "A"),
-    Measure("peak", "walking, most", "A"),
-    Measure("stall", "all stalled", "A"),
+    Column("servos", "servos", form="d"),
+    Column("standby", "standby", "A"),
+    Column("walking", "walking, mean", "A"),
+    Column("peak", "walking, most", "A"),
+    Column("stall", "all stalled", "A"),
 )
 
 

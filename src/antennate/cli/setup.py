@@ -34,7 +34,7 @@ from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, forgott
 from antennate.host import HostClock, StopOnce
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
-from antennate.studies.measures import Table
+from antennate.studies.tables import Table
 
 DESCRIPTION = """\
 Set up the servos of a new robot. First the two ports are found by unplugging one adapter after the

@@ -27,7 +27,8 @@ from antennate.hardware.driving.report import late_sentence
 from antennate.hardware.safety.causes import what_to_do
 from antennate.host import STOPS, Priority
 from antennate.messages import one_line
-from antennate.studies.measures import Measure, Table
+from antennate.studies.columns import Column
+from antennate.studies.tables import Table
 from antennate.telemetry.feed import KEPT, NOT_KEPT, Message, messages
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
@@ -234,22 +235,22 @@ def warn(text: str) -> None:
 
 
 MEASURES = (
-    Measure("pace.ticks", "ticks", form="d"),
-    Measure("pace.missed_cycles", "missed ticks", form="d"),
-    Measure("pace.missed_share", "missed", "%", scale=100.0),
-    Measure("walking.missed_share", "missed since the walk began", "%", scale=100.0),
-    Measure("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
-    Measure("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
-    Measure("frames", "frames", form="d"),
-    Measure("crc_errors", "crc errors", form="d"),
-    Measure("lost_samples", "lost samples", form="d"),
-    Measure("resets", "resets", form="d"),
-    Measure("missed_answers", "missed answers", form="d"),
-    Measure("stale_answers", "stale answers", form="d"),
-    Measure("unlogged", "unlogged ticks", form="d"),
-    Measure("commands_sent", "commands sent", form="d"),
-    Measure("commands_refused", "commands refused", form="d"),
-    Measure("priority", "priority"),
+    Column("pace.ticks", "ticks", form="d"),
+    Column("pace.missed_cycles", "missed ticks", form="d"),
+    Column("pace.missed_share", "missed", "%", scale=100.0),
+    Column("walking.missed_share", "missed since the walk began", "%", scale=100.0),
+    Column("pace.worst_lateness_s", "worst lateness", "ms", form=".1f", scale=1e3),
+    Column("pace.worst_tick_s", "worst tick", "ms", form=".1f", scale=1e3),
+    Column("frames", "frames", form="d"),
+    Column("crc_errors", "crc errors", form="d"),
+    Column("lost_samples", "lost samples", form="d"),
+    Column("resets", "resets", form="d"),
+    Column("missed_answers", "missed answers", form="d"),
+    Column("stale_answers", "stale answers", form="d"),
+    Column("unlogged", "unlogged ticks", form="d"),
+    Column("commands_sent", "commands sent", form="d"),
+    Column("commands_refused", "commands refused", form="d"),
+    Column("priority", "priority"),
 )
 
 

@@ -12,17 +12,18 @@ from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, KINDS, ControllerFactory
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
-from antennate.notebook import from_rows, html
+from antennate.notebook import html
 from antennate.params.base import Params, from_values
+from antennate.studies.columns import content, frame
 from antennate.studies.engines import LOCAL, Device, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity, texts
-from antennate.studies.measures import Table
 from antennate.studies.pool import Workers
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import FILMS
-from antennate.studies.work import require_sent
+from antennate.studies.sending import require_sent
+from antennate.studies.tables import Table
 from antennate.telemetry import FilmView
 
 _PARTS = 100
@@ -52,7 +53,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """A sentence, the first table and the first figure, for a notebook."""
-        tables, figures = self.experiment.tables(self.summary), self.figures()
+        tables, figures = self.experiment.tables(self.found), self.figures()
         table = tables[0] if tables else Table("", (), ())
         first = next(iter(self.experiment.view.ordered(figures)), "")
         return html(*(self.sentence, table.columns, table.rows, figures.get(first), table.preface))
@@ -63,14 +64,19 @@ class Result:
         return self.outcome.rows
 
     @property
-    def summary(self) -> dict[str, Any]:
-        """The content of result.json; names end in units, see docs/results.md."""
+    def found(self) -> Any:
+        """What it came to, an object with the fields of result.json, see docs/results.md."""
         return self.outcome.result()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of result.json, `found` as a dictionary; names end in units."""
+        return content(self.found)
 
     @property
     def sentence(self) -> str:
         """What came out and how sure it is, in one sentence."""
-        return self.experiment.sentence(self.summary)
+        return self.experiment.sentence(self.found)
 
     def figures(self) -> Mapping[str, Any]:
         """Its figures by name, of matplotlib."""
@@ -81,14 +87,13 @@ class Result:
 
         Raises:
             BadInputError: The experiment has no trials.
-            MissingPackageError: pandas is not installed.
         """
         if not self.rows:
             raise BadInputError(
                 f"to_dataframe: expected trials, found none: {self.experiment.name} has no rows of "
                 f"trials{_elsewhere(self.summary)}"
             )
-        return from_rows(self.rows)
+        return frame(self.rows)
 
     def __reduce__(self) -> tuple[Callable[..., Result], tuple[Any, ...]]:
         """Pickle the name of the experiment in place of its functions."""
@@ -213,9 +218,9 @@ def keep(
     Raises:
         OutputError: Something cannot be written; what was written stays.
     """
-    for name, content in experiment.files(outcome).items():
-        directory.write(name, content)
-    directory.finish(outcome.result(), outcome.rows)
+    for name, text in experiment.files(outcome).items():
+        directory.write(name, text)
+    directory.finish(content(outcome.result()), outcome.rows)
     if figures:
         directory.write_figures(experiment.figures(outcome))
 

@@ -217,13 +217,13 @@ def _docstrings(model: type) -> dict[str, str]:
     texts: dict[str, str] = {}
     for kind in reversed(model.__mro__):
         if issubclass(kind, BaseModel) and not kind.__module__.startswith("pydantic"):
-            texts |= _own_docstrings(kind)
+            texts |= docstrings(kind)
     return texts
 
 
 @functools.cache
-def _own_docstrings(kind: type) -> dict[str, str]:
-    """As `_docstrings`, of the fields that a class itself declares."""
+def docstrings(kind: type) -> dict[str, str]:
+    """The docstring below each field that a class itself declares, by name."""
     texts: dict[str, str] = {}
     for field, text in pairwise(_body(kind)):
         match field, text:

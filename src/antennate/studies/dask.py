@@ -13,15 +13,16 @@ import struct
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.lookup import require_package
 from antennate.studies.processes import Processes
+from antennate.studies.sending import Packed
 from antennate.studies.submitted import NO_PLACE, Submitted, folder_of, require_same, work_apart
-from antennate.studies.work import Emit, Fail, Packed, Part, Processor, Work
+from antennate.studies.work import Call, Processor, Work
 
 CONNECT = 10.0
 """Time within which a scheduler has to answer, or to come back [s]."""
@@ -60,10 +61,8 @@ class Dask:
         self._address = address
         require_package("distributed", "dask", "engine")
 
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
-        """Run the tasks at these places; see `Engine`."""
+    def run(self, call: Call, count: int) -> None:
+        """Carry out the parts of a call; see `Engine`."""
         from distributed import KilledWorker
 
         run = secrets.token_hex(8)
@@ -74,9 +73,7 @@ class Dask:
 
             workers = _Workers(client, place, count, cluster is not None)
             try:
-                Submitted(self.name, submit, (KilledWorker,), workers=workers).run(
-                    work, parts, count, emit, fail
-                )
+                Submitted(self.name, submit, (KilledWorker,), workers=workers).run(call, count)
             except WorkerError as error:
                 if client.status == "running" and not isinstance(error.__cause__, CancelledError):
                     raise
@@ -196,7 +193,7 @@ def _quiet() -> Iterator[None]:
 
 
 def carry_out_apart(
-    part: Part, theirs: Mapping[str, Any], added: Packed, run: str
+    part: Work, theirs: Mapping[str, Any], added: Packed, run: str
 ) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place, of trials that run in a process beside it.
 
@@ -214,9 +211,12 @@ def carry_out_apart(
     def take(place: int, answer: Any) -> None:
         answers.append((place, answer))
 
-    work = work_apart(part, folder, added, lambda model: take(NO_PLACE, Processor(model)))
+    def saw(model: str) -> None:
+        take(NO_PLACE, Processor(model))
+
+    work = work_apart(part, folder, added)
     with _processes(run) as processes:
-        processes.run(work, [list(part.tasks)], 1, take, take)
+        processes.run(Call(work, [list(part.tasks)], take, take, saw), 1)
     return answers
 
 

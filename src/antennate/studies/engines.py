@@ -9,7 +9,7 @@ from typing import Any
 from antennate.errors import ConfigError
 from antennate.messages import shown
 from antennate.studies.submitted import Submitted
-from antennate.studies.work import Emit, Engine, Fail, Work, processor
+from antennate.studies.work import Call, Engine, processor
 
 LOCAL = "local"
 WARP = "warp"
@@ -69,22 +69,20 @@ class Device:
     def __init__(self, device: str | None = None) -> None:
         self._device = device
 
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
-        """Run the tasks at these places; see `Engine`.
+    def run(self, call: Call, count: int) -> None:
+        """Carry out all parts of a call; see `Engine`.
 
         Raises:
             ConfigError: This work has no batch.
         """
-        if work.batched is None:
+        if call.batched is None:
             raise ConfigError(f"{NO_BATCHES}; this one has no batches on a GPU")
-        work.saw(processor())
-        places = [place for part in parts for place in part]
-        tasks = [work.tasks[place] for place in places]
-        work.batched(
+        call.saw(processor())
+        places = call.places
+        tasks = [call.work.tasks[place] for place in places]
+        call.batched(
             tasks,
-            lambda i, result: emit(places[i], result),
-            lambda i, failure: fail(places[i], failure),
+            lambda i, result: call.emit(places[i], result),
+            lambda i, failure: call.fail(places[i], failure),
             self._device,
         )

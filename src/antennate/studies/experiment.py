@@ -6,18 +6,20 @@ its result in a run directory, prints its tables and its closing sentence, and d
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from antennate.params.base import Params
-from antennate.studies.measures import Measure, Table
+from antennate.studies.columns import Frame, frame, typed
 from antennate.studies.pool import Workers, chunk_of, gather
-from antennate.studies.report import Body, View
+from antennate.studies.report import View
+from antennate.studies.tables import Table
 from antennate.studies.work import Fail, Failure, no_failure
 from antennate.telemetry.view import Restart
 
@@ -42,16 +44,28 @@ def no_row(row: Any) -> None:
 
 
 class Outcome(Protocol):
-    """What a run returns: the rows of trials.csv, and the content of result.json."""
+    """What a run returns: the rows of trials.csv, and the result that result.json holds."""
 
     @property
     def rows(self) -> Sequence[Any]:
         """Finished trials, dataclasses, in a fixed order; by default there are none."""
         return ()
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json; `interrupted` is true if trials are missing."""
+    def result(self) -> Any:
+        """The result, a dataclass or a dictionary; `interrupted` is true if trials are missing."""
         ...
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a run returns that needs no more: its rows, and what they come to."""
+
+    rows: Sequence[Any]
+    found: Any
+
+    def result(self) -> Any:
+        """What they come to."""
+        return self.found
 
 
 Config = TypeVar("Config", bound=Params)
@@ -59,7 +73,7 @@ Trial = tuple[str, int]
 """A condition, such as a controller or a profile, and the number of a trial."""
 OnTrial = Callable[[Any], None]
 """Takes what a trial came to: its row and what figures draw of it, None for nothing."""
-Found = TypeVar("Found", bound=Outcome)
+Out = TypeVar("Out", bound=Outcome)
 
 
 @dataclass(frozen=True)
@@ -231,6 +245,41 @@ def _in_lockstep(
         carry_out(tasks[0][0], name, numbers, take)
 
 
+Result = TypeVar("Result")
+Drawn = TypeVar("Drawn")
+
+
+@dataclass(frozen=True)
+class Found(Generic[Config, Result, Drawn]):
+    """What the trials of a run came to.
+
+    Attributes:
+        config: The configuration.
+        rows: Finished trials in the order of conditions and numbers.
+        drawn: What figures draw of a trial, by its condition and its number.
+        interrupted: Whether trials are missing.
+        row: Class of the rows.
+        summarise: summarise(config, rows) -> result.
+    """
+
+    config: Config
+    rows: list[Any]
+    drawn: dict[Trial, Drawn]
+    interrupted: bool
+    row: type
+    summarise: Callable[[Config, Frame], Result]
+
+    @functools.cached_property
+    def frame(self) -> Frame:
+        """The rows as a pandas DataFrame."""
+        return frame(self.rows, self.row)
+
+    def result(self) -> Result:
+        """What they come to, with `interrupted` where the result has it."""
+        found: Any = self.summarise(self.config, self.frame)
+        return replace(found, interrupted=True) if self.interrupted else found
+
+
 @dataclass(frozen=True)
 class OneByOne:
     """Runs trials one after the other: `Trials.carry_out` where nothing goes in lockstep.
@@ -250,7 +299,7 @@ class OneByOne:
 
 
 @dataclass(frozen=True)
-class Experiment(Generic[Config, Found]):
+class Experiment(Generic[Config, Out]):
     """An experiment.
 
     Attributes:
@@ -262,6 +311,8 @@ class Experiment(Generic[Config, Found]):
             where it can be `shown` a `view`: then all runs in this process.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
+        result: Class of its results, a dataclass; without one they are dictionaries.
+        row: Class of its rows, a dataclass.
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
         names: names(config) -> the names of those files, so that one that is somebody else's is
@@ -275,10 +326,9 @@ class Experiment(Generic[Config, Found]):
         shown: Whether its trials can be shown on a page.
         films: films(config, trial) -> for each condition, by name, what runs this trial of it once
             more and records it; None where nothing can be filmed.
-        body: HTML that stands in its report in place of tables and figures.
+        body: body(result, images) -> HTML that stands in its report in place of tables and figures.
         trials: Its trials one by one, for studies; without them a study runs it as a whole.
         continued: Whether its folder is continued without being asked, and keeps its trials.
-        measures: What it tells of its trials; studies take labels and units from them.
         explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
@@ -294,23 +344,24 @@ class Experiment(Generic[Config, Found]):
     name: str
     description: str
     config: type[Config]
-    run: Callable[..., Found]
-    tables: Callable[[Mapping[str, Any]], Sequence[Table]]
-    sentence: Callable[[Mapping[str, Any]], str]
-    figures: Callable[[Found], Mapping[str, Figure]] = lambda outcome: {}
-    files: Callable[[Found], Mapping[str, str | bytes]] = lambda outcome: {}
+    run: Callable[..., Out]
+    tables: Callable[[Any], Sequence[Table]]
+    sentence: Callable[[Any], str]
+    result: type | None = None
+    row: type | None = None
+    figures: Callable[[Out], Mapping[str, Figure]] = lambda outcome: {}
+    files: Callable[[Out], Mapping[str, str | bytes]] = lambda outcome: {}
     names: Callable[[Config], Sequence[str]] = lambda config: ()
     settled: Callable[[Config, Path | None], Config] = lambda config, folder: config
     check: Callable[[Config], None] = lambda config: None
-    failed: Callable[[Mapping[str, Any]], bool] = lambda result: False
+    failed: Callable[[Any], bool] = lambda result: False
     parts: str = "trials"
     logs: Callable[[Config], Sequence[str]] | None = None
     shown: bool = False
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
-    body: Body | None = None
+    body: Callable[[Any, Mapping[str, str]], str] | None = None
     trials: Trials[Config] | None = None
     continued: bool = False
-    measures: Sequence[Measure] = ()
     explained: str = ""
     captions: Mapping[str, str] = field(default_factory=dict)
     on_workers: bool = True
@@ -323,11 +374,22 @@ class Experiment(Generic[Config, Found]):
     @property
     def view(self) -> View:
         """How its result is shown."""
+        body = self.body
         return View(
-            *(self.name, self.description, self.config, self.tables, self.sentence),
-            body=self.body,
+            *(self.name, self.description, self.config),
+            tables=lambda data: self.tables(self.read(data)),
+            sentence=lambda data: self.sentence(self.read(data)),
+            body=body and (lambda data, images: body(self.read(data), images)),
             captions=self.captions,
         )
+
+    def read(self, data: Mapping[str, Any]) -> Any:
+        """A result as its run returned it, from the content of result.json.
+
+        Raises:
+            ValueError: Another version wrote it.
+        """
+        return data if self.result is None else typed(self.result, data)
 
     @property
     def grows(self) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
@@ -342,11 +404,11 @@ class Experiment(Generic[Config, Found]):
         cls,
         module: str,
         config: type[Config],
-        run: Callable[..., Found],
-        tables: Callable[[Mapping[str, Any]], Sequence[Table]],
-        sentence: Callable[[Mapping[str, Any]], str],
+        run: Callable[..., Out],
+        tables: Callable[[Any], Sequence[Table]],
+        sentence: Callable[[Any], str],
         **more: Any,
-    ) -> Experiment[Config, Found]:
+    ) -> Experiment[Config, Out]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. Without `figures` they are those that
@@ -364,3 +426,36 @@ class Experiment(Generic[Config, Found]):
             *(config, run, tables, sentence),
             **more,
         )
+
+    @classmethod
+    def of_trials(
+        cls,
+        module: str,
+        config: type[Config],
+        trials: Trials[Config],
+        summarise: Callable[[Config, Frame], Any],
+        tables: Callable[[Any], Sequence[Table]],
+        sentence: Callable[[Any], str],
+        **more: Any,
+    ) -> Experiment[Config, Any]:
+        """An experiment of a folder that is its trials: they are run, then summarised."""
+
+        def run(
+            config: Config,
+            workers: int | Workers = 1,
+            on_step: OnStep = no_step,
+            on_row: OnRow = no_row,
+            **how: Any,
+        ) -> Found[Config, Any, Any]:
+            ended, interrupted = trials.gather(config, workers, on_step, on_row, **how)
+            rows = [row for row, _ in ended]
+            drawn = {
+                (getattr(row, trials.condition), row.trial): seen
+                for row, seen in ended
+                if seen is not None
+            }
+            return Found(config, rows, drawn, interrupted, trials.row, summarise)
+
+        more = {"trials": trials, "row": trials.row, "shown": True, **more}
+        carry_out: Callable[..., Any] = run
+        return cls.of_folder(module, config, carry_out, tables, sentence, **more)

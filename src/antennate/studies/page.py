@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from antennate.studies.measures import Table
+from antennate.studies.tables import Table
 
 _DPI, _CSS_DPI = 200, 96
 """Pixels an inch of our pictures, and of a page."""

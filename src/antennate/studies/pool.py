@@ -17,8 +17,9 @@ from typing import Any, TypeVar
 from antennate.errors import WorkerError
 from antennate.studies.formats import decoded, encoded
 from antennate.studies.processes import Processes
+from antennate.studies.sending import IMPORTING
 from antennate.studies.store import Store, key_of
-from antennate.studies.work import IMPORTING, Engine, Failure, Here, Work
+from antennate.studies.work import Call, Engine, Failure, Here, Work
 
 Result = TypeVar("Result")
 TIMEOUT = 3600.0
@@ -112,8 +113,8 @@ def places_of(records: Iterable[str]) -> set[int]:
     return {int(key.removeprefix("0.")) for key in records if key.startswith("0.")}
 
 
-class _Call:
-    """One call of `gather`: what is finished, by place, and how it is kept."""
+class _Kept:
+    """What a call of `gather` has finished, by place, and how it is kept."""
 
     def __init__(
         self,
@@ -213,26 +214,25 @@ def gather(
     if IMPORTING:
         raise WorkerError(f'{IMPORTING[0]}: expected `if __name__ == "__main__":` around what runs')
     package = function.__module__.partition(".")[0]
-    call = _Call(workers, len(tasks), package, on_result, on_step, lost)
-    call.resume()
+    kept = _Kept(workers, len(tasks), package, on_result, on_step, lost)
+    kept.resume()
     todo = [
-        place for place in range(len(tasks)) if place not in call.results and workers.mine(place)
+        place for place in range(len(tasks)) if place not in kept.results and workers.mine(place)
     ]
     if todo and workers.closed:
         raise WorkerError(
-            f"expected {len(tasks)} finished trials, found {len(call.results)}: a shard is missing"
+            f"expected {len(tasks)} finished trials, found {len(kept.results)}: a shard is missing"
         )
     groups = itertools.groupby(todo, lambda i: group(*tasks[i]) if group else None)
     divided = [_divided([*some], chunk) for _, some in groups]
     parts = [part for turn in itertools.zip_longest(*divided) for part in turn if part]
     if parts:
-        folder = None if workers.store is None else workers.store.path.parent
         timeout = TIMEOUT if workers.timeout is None else workers.timeout
-        how: dict[str, Any] = {"batched": batched, "shared": workers.shared}
+        work = Work(function, dict(enumerate(tasks)), together, timeout)
+        call = Call(work, parts, kept.emit, kept.fail, batched=batched, shared=workers.shared)
         if workers.store is not None:
-            how["saw"] = workers.store.saw
-        work = Work(function, tasks, together, timeout, folder, **how)
-        workers.engine_for(len(parts)).run(work, parts, workers.count, call.emit, call.fail)
+            call.saw, call.folder = workers.store.saw, workers.store.path.parent
+        workers.engine_for(len(parts)).run(call, workers.count)
     if workers.shard is not None:
-        raise ShardEnd(sum(map(workers.mine, call.results)), len(tasks))
-    return [call.results[place] for place in range(len(tasks))]
+        raise ShardEnd(sum(map(workers.mine, kept.results)), len(tasks))
+    return [kept.results[place] for place in range(len(tasks))]

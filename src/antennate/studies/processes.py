@@ -15,7 +15,7 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from multiprocessing.connection import Connection, wait
 from multiprocessing.spawn import get_preparation_data
 from pathlib import Path
@@ -24,19 +24,8 @@ from typing import Any
 from antennate.errors import WorkerError, in_one_line
 from antennate.lookup import NotSent
 from antennate.sim.engine_setup import dropped
-from antennate.studies.work import (
-    Emit,
-    Fail,
-    Failure,
-    Packed,
-    Part,
-    Waiting,
-    Work,
-    added_objects,
-    processor,
-    sendable,
-    take_added,
-)
+from antennate.studies.sending import Packed, added_objects, sendable, take_added
+from antennate.studies.work import Call, Failure, Work, processor
 
 _GUARD = (
     '; a script that uses several workers needs `if __name__ == "__main__":` around what it runs'
@@ -69,19 +58,17 @@ class Processes:
         self._stay = stay
         self._workers: list[_Worker] = []
 
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
+    def run(self, call: Call, count: int) -> None:
         """Run the tasks on `count` processes; see `Engine`."""
         _require_children()
-        tasks = sendable(work.tasks)
+        tasks = sendable(call.work.tasks)
         if isinstance(tasks, NotSent):
             raise WorkerError(tasks.reason)
-        work.saw(processor())
-        pool = _Pool(work, parts, self._workers, emit, fail)
+        call.saw(processor())
+        pool = _Pool(call, self._workers)
         stays = False
         try:
-            pool.run(min(count, len(parts)))
+            pool.run(min(count, len(call)))
             stays = self._stay
         except KeyboardInterrupt:
             pool.take_what_came()
@@ -99,27 +86,19 @@ class Processes:
 class _Pool:
     """One call: parts that wait, and the workers that carry them out, as many as are needed."""
 
-    def __init__(
-        self,
-        work: Work,
-        parts: Sequence[Sequence[int]],
-        workers: list[_Worker],
-        emit: Emit,
-        fail: Fail,
-    ) -> None:
-        self._work, self._waiting, self._workers = work, Waiting(parts), workers
-        self._emit, self._fail = emit, fail
+    def __init__(self, call: Call, workers: list[_Worker]) -> None:
+        self._call, self._workers = call, workers
         self._added = added_objects()
         self._failed_starts = 0
 
     def run(self, count: int) -> None:
-        while self._waiting or any(worker.places for worker in self._workers):
+        while self._call or any(worker.places for worker in self._workers):
             busy = sum(bool(worker.places) for worker in self._workers)
-            while len(self._workers) < min(count, busy + len(self._waiting)):
+            while len(self._workers) < min(count, busy + len(self._call)):
                 self._workers.append(_Worker(self._added))
             for worker in self._workers:
-                if worker.ready and not worker.places and self._waiting:
-                    worker.give(self._work, self._waiting.next())
+                if worker.ready and not worker.places and self._call:
+                    worker.give(self._call.work.only(self._call.next()))
             end = min(worker.deadline for worker in self._workers)
             left = min(max(0.0, end - time.monotonic()), _LONGEST_WAIT)
             owners: dict[Any, _Worker] = {
@@ -147,12 +126,12 @@ class _Pool:
             self._remove(worker)
 
     def _take(self, worker: _Worker, kind: int, place: int, content: Any) -> None:
-        worker.answered(self._work)
+        worker.answered(self._call.work)
         if kind == _READY:
             worker.ready, self._failed_starts = True, 0
         elif kind != _BEGUN:
             worker.places.remove(place)
-            (self._emit if kind == _RESULT else self._fail)(place, content)
+            (self._call.emit if kind == _RESULT else self._call.fail)(place, content)
 
     def _remove(self, worker: _Worker, hung: bool = False) -> None:
         worker.kill()
@@ -165,14 +144,10 @@ class _Pool:
                 raise WorkerError(f"a worker process ended with code {code} before its work{guard}")
         if not left:
             return
-        given_up = self._waiting.lost(left, self._work.together, final=hung)
-        if given_up is not None:
-            why = (
-                Failure("hung", f"no result within {self._work.timeout:g} s")
-                if hung
-                else Failure("crashed", f"a worker process ended with code {code} in its work")
-            )
-            self._fail(given_up, why)
+        why = Failure("crashed", f"a worker process ended with code {code} in its work")
+        if hung:
+            why = Failure("hung", f"no result within {self._call.work.timeout:g} s")
+        self._call.lost(left, self._call.work.together, why, final=hung)
 
     def take_what_came(self) -> None:
         """Take the results that are on their way."""
@@ -209,12 +184,12 @@ class _Worker:
         self.places: list[int] = []
         self.deadline = float("inf")
 
-    def give(self, work: Work, places: list[int]) -> None:
-        self.places = places
+    def give(self, work: Work) -> None:
+        self.places = list(work.tasks)
         self.answered(work)
         self.deadline += _IMPORT
         with contextlib.suppress(OSError):  # it has died: that is noticed next
-            self.connection.send(work.part(places))
+            self.connection.send(work)
 
     def answered(self, work: Work) -> None:
         """Begin the time until the next answer."""
@@ -285,7 +260,7 @@ def _serve(connection: Connection, added: Packed) -> None:
 
     with dropped(), contextlib.suppress(EOFError):
         while True:
-            part: Part = connection.recv()
+            part: Work = connection.recv()
             connection.send((_BEGUN, 0, None))  # what it needs is imported by now
             part.carry_out(emit, fail)
 

@@ -19,8 +19,8 @@ from antennate.errors import BadInputError
 from antennate.files import read_limited
 from antennate.params.base import Params
 from antennate.studies import page
+from antennate.studies.columns import NONE
 from antennate.studies.formats import to_toml
-from antennate.studies.measures import FEW, NONE, Table
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import (
     BY_HAND,
@@ -36,6 +36,7 @@ from antennate.studies.run_files import (
     VERSIONS,
     when_run,
 )
+from antennate.studies.tables import FEW, Table
 
 _MOST_REASONS = 20
 """Most trials whose failure is quoted."""

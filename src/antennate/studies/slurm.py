@@ -12,7 +12,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,19 +23,10 @@ from antennate.studies.formats import decoded, encoded
 from antennate.studies.identity import environment
 from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
+from antennate.studies.sending import Packed, added_objects, pack_whole
 from antennate.studies.store import Store, parsed
 from antennate.studies.submitted import require_same, work_apart
-from antennate.studies.work import (
-    Emit,
-    Fail,
-    Failure,
-    Packed,
-    Part,
-    Waiting,
-    Work,
-    added_objects,
-    pack_whole,
-)
+from antennate.studies.work import Call, Failure, Work
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
 """What SLURM may send to all processes of a job some time before it ends it."""
@@ -56,7 +47,7 @@ class Resumable:
     """
 
     def __init__(
-        self, file: str, identity: Mapping[str, Any], part: Part, added: Packed, at_once: int = 1
+        self, file: str, identity: Mapping[str, Any], part: Work, added: Packed, at_once: int = 1
     ) -> None:
         self._file, self._identity, self._part, self._added = file, identity, part, added
         self._at_once = at_once
@@ -100,11 +91,12 @@ class Resumable:
         def fail(place: int, failure: Failure) -> None:
             keep(place, {"failure": [failure.status, failure.reason]})
 
-        part, places, size = replace(self._part, tasks=left), list(left), self._at_once
-        parts = [places[i : i + size] for i in range(0, len(places), size)]
         if left:
-            work = work_apart(part, Path.cwd(), self._added, store.saw, _WARNINGS)
-            Processes().run(work, parts, 1, emit, fail)
+            part = self._part.only(list(left))
+            work = work_apart(part, Path.cwd(), self._added, _WARNINGS)
+            call = Call(work, [list(left)], emit, fail, store.saw)
+            call.divide(self._at_once)
+            Processes().run(call, 1)
         store.close()
         return len(left)
 
@@ -149,22 +141,18 @@ class Slurm:
             for warning in self._executor(Path(folder))[1]:
                 _NOTE.warning("--slurm: submitit says: %s", warning.message)
 
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
+    def run(self, call: Call, count: int) -> None:
         """Run the tasks on `count` jobs at once; see `Engine`."""
-        if work.folder is None:
+        if call.folder is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
-        folder = work.folder / JOBS
+        folder = call.folder / JOBS
         try:
             folder.mkdir(exist_ok=True)
             for file in folder.glob("*.jsonl"):  # of jobs whose driver has ended
                 file.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"expected to write {folder}, found: {error.strerror}") from None
-        at_once = max(map(len, parts)) if work.together else 1
-        driver = _Driver(work, folder, self._executor(folder)[0], at_once, emit, fail)
-        driver.run([place for part in parts for place in part], count)
+        _Driver(call, folder, self._executor(folder)[0]).run(count)
 
     def _executor(self, folder: Path) -> tuple[Any, list[warnings.WarningMessage]]:
         """What submits jobs, and what it warns of.
@@ -203,23 +191,19 @@ class _Job:
 class _Driver:
     """One run: its jobs, and what they have finished."""
 
-    def __init__(
-        self, work: Work, folder: Path, executor: Any, at_once: int, emit: Emit, fail: Fail
-    ) -> None:
-        self._work, self._folder, self._executor = work, folder, executor
-        self._at_once, self._emit, self._fail = at_once, emit, fail
-        self._packages = {"antennate", work.function.__module__.partition(".")[0]}
-        self._waiting = Waiting([])
+    def __init__(self, call: Call, folder: Path, executor: Any) -> None:
+        self._call, self._folder, self._executor = call, folder, executor
+        self._at_once = call.at_once
+        self._packages = {"antennate", call.work.function.__module__.partition(".")[0]}
         self._failed_starts = 0  # in a row
 
-    def run(self, places: Sequence[int], count: int) -> None:
-        size = -(-len(places) // count)  # as many lists as jobs: each job waits in a queue
-        self._waiting = Waiting([places[i : i + size] for i in range(0, len(places), size)])
+    def run(self, count: int) -> None:
+        self._call.divide(-(-len(self._call.places) // count))  # a list a job: each waits long
         running: list[_Job] = []
         try:
-            while self._waiting or running:
-                while self._waiting and len(running) < count:
-                    running.append(self._submit(self._waiting.next()))
+            while self._call or running:
+                while self._call and len(running) < count:
+                    running.append(self._submit(self._call.next()))
                 time.sleep(_LOOK)
                 for job in list(running):
                     ended = job.handle.done()
@@ -240,8 +224,8 @@ class _Driver:
 
     def _submit(self, places: list[int]) -> _Job:
         file = self._folder / f"{time.time_ns()}.jsonl"
-        identity = self._work.shared or environment()
-        part = self._work.part(places)
+        identity = self._call.shared or environment()
+        part = self._call.work.only(places)
         call = Resumable(str(file), identity, part, added_objects(pack_whole), self._at_once)
         try:
             file.touch()
@@ -264,15 +248,15 @@ class _Driver:
             self._failed_starts = 0
         lines = parsed(data)
         for model in lines.processors:
-            self._work.saw(model)
+            self._call.saw(model)
         for place in [place for place in job.left if str(place) in lines.records]:
             record = lines.records[str(place)]
             job.has_trials = True
             job.left.remove(place)
             if "failure" in record:
-                self._fail(place, Failure(*record["failure"]))
+                self._call.fail(place, Failure(*record["failure"]))
             else:
-                self._emit(place, decoded(record["result"], self._packages))
+                self._call.emit(place, decoded(record["result"], self._packages))
         job.read += len(data)
 
     def _end(self, job: _Job) -> None:
@@ -298,8 +282,8 @@ class _Driver:
             )
         if job.read:
             together = len(job.left) <= self._at_once
-            if (given_up := self._waiting.lost(job.left, together)) is not None:
-                self._fail(given_up, Failure("crashed", f"its job ended: {_last_words(job)}"))
+            why = Failure("crashed", f"its job ended: {_last_words(job)}")
+            self._call.lost(job.left, together, why)
             return
         self._failed_starts += 1
         if self._failed_starts >= _FAILED_STARTS:
@@ -307,7 +291,7 @@ class _Driver:
                 f"slurm: expected jobs to begin, found {self._failed_starts} in a row that "
                 f"ended before: {_last_words(job)}"
             )
-        self._waiting.put_back(job.left)
+        self._call.put_back(job.left)
 
 
 def _last_words(job: _Job) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from antennate.jackknife import ENOUGH, student95
+from antennate.studies.columns import Ends, Frame, column, tabular
 from antennate.types import Bools, Floats, Ints
 
 _Z95 = 1.959963984540054
@@ -36,8 +37,16 @@ def wilson95(successes: float, trials: float) -> tuple[float, float]:
     return low, 1.0 if successes == trials else center + half
 
 
-Ends = tuple[float, float]
 """Lower and upper end of an interval."""
+
+
+def wilson(name: str = "outcome", value: Any = "success") -> Any:
+    """A column: Wilson's 95 % interval of the share of rows that hold a value in a column."""
+
+    def ends(rows: Frame, _: str) -> Ends | None:
+        return wilson95(int((rows[name] == value).sum()), len(rows)) if len(rows) else None
+
+    return column("  Wilson 95 %", "%", ends, form=".0f", scale=100.0)
 
 
 def mean95(
@@ -163,18 +172,18 @@ def _mean(values: Floats, without: float) -> float:
     return float(values.mean()) if len(values) else without
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Discordance:
-    """Two conditions on the same trials, by success alone.
+    """Two conditions on the same trials, by success alone."""
 
-    Attributes:
-        only_first: Trials on which only the first succeeded; `only_second` likewise.
-        mcnemar_p: Exact two-sided McNemar test on those.
-    """
-
-    only_first: int
-    only_second: int
-    mcnemar_p: float
+    trials: int = column("valid in both", form="d")
+    """Trials that are valid in both."""
+    only_first: int = column("only the first", form="d")
+    """Trials on which only the first succeeded."""
+    only_second: int = column("only the second", form="d")
+    """Trials on which only the second succeeded."""
+    mcnemar_p: float = column("McNemar p", form=".3g")
+    """McNemar's test on those, exact and two-sided."""
 
 
 def mcnemar(ok: Bools) -> Discordance:
@@ -184,7 +193,8 @@ def mcnemar(ok: Bools) -> Discordance:
     first, second = ok[:, 0], ok[:, 1]
     only_first, only_second = int((first & ~second).sum()), int((second & ~first).sum())
     tail = float(bdtr(min(only_first, only_second), only_first + only_second, 0.5))
-    return Discordance(only_first, only_second, min(1.0, 2.0 * tail))
+    p = min(1.0, 2.0 * tail)
+    return Discordance(trials=len(ok), only_first=only_first, only_second=only_second, mcnemar_p=p)
 
 
 def sign_flips(sums: Ints) -> float:
@@ -283,29 +293,21 @@ def signed_rank(difference: Floats) -> float:
     return float(chance[off >= off[twice[difference[known] > 0].sum()]].sum())
 
 
-@dataclass(frozen=True, slots=True)
-class PairedTest:
-    """Two conditions on the same seeds.
+@tabular
+class PairedTest(Discordance):
+    """Two conditions on the same seeds, by success and by time."""
 
-    Attributes:
-        only_first: Seeds on which only the first succeeded; `only_second` likewise.
-        mcnemar_p: Exact two-sided McNemar test on those.
-        time_difference_s: Mean of restricted time, first minus second [s].
-        time_difference_95: Its 95 % interval, see `difference95`.
-        wilcoxon_p: Two-sided signed-rank test on restricted times, see `signed_rank`; None of one
-            seed.
-        both: Seeds on which both succeeded; `both_time_s` are the mean times of the first and the
-            second on those [s], None without any.
-    """
-
-    only_first: int
-    only_second: int
-    mcnemar_p: float
-    time_difference_s: float
-    time_difference_95: Ends | None
-    wilcoxon_p: float | None
-    both: int
-    both_time_s: tuple[float, float] | None
+    both: int = column("both succeeded", form="d")
+    """Trials on which both succeeded."""
+    both_time_s: Ends | None = column("  time of each", "s", form=".1f", join=", ")
+    """Mean times of the first and of the second on those; `null` without any."""
+    time_difference_s: float | None = column(
+        "difference", "s", form="+.1f", interval="time_difference_95", default=None
+    )
+    """Mean of restricted time, first minus second, and its interval, see `difference95`."""
+    time_difference_95: Ends | None = None
+    wilcoxon_p: float | None = column("Wilcoxon p", form=".3g")
+    """Two-sided signed-rank test on restricted times, see `signed_rank`; `null` of one trial."""
 
 
 def compare(
@@ -331,6 +333,10 @@ def compare(
     both = first_ok & second_ok
     times = (float(first_t[both].mean()), float(second_t[both].mean())) if both.any() else None
     return PairedTest(
-        *(success.only_first, success.only_second, success.mcnemar_p),
-        *(mean, ends, rank, int(both.sum()), times),
+        **vars(success),
+        both=int(both.sum()),
+        both_time_s=times,
+        time_difference_s=mean,
+        time_difference_95=ends,
+        wilcoxon_p=rank,
     )

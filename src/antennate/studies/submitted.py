@@ -14,25 +14,14 @@ import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from antennate.errors import WorkerError, in_one_line
 from antennate.studies.identity import differences, environment, environment_here
-from antennate.studies.work import (
-    Emit,
-    Fail,
-    Failure,
-    Packed,
-    Part,
-    Processor,
-    Waiting,
-    Work,
-    added_objects,
-    pack_whole,
-    processor,
-    take_added,
-)
+from antennate.studies.sending import Packed, added_objects, pack_whole, take_added
+from antennate.studies.work import Call, Failure, Processor, Work, processor
 
 NO_PLACE = -1
 """Place of what is no result."""
@@ -64,22 +53,20 @@ class Submitted:
         self.name, self._submit, self._deaths, self._ahead = name, submit, deaths, ahead
         self._workers = workers
 
-    def run(
-        self, work: Work, parts: Sequence[Sequence[int]], count: int, emit: Emit, fail: Fail
-    ) -> None:
-        """Run the tasks at these places; see `Engine`."""
-        waiting, running = Waiting(parts), dict[Any, list[int]]()
-        theirs = {**(work.shared or environment()), _FOLDER: _folder()}
+    def run(self, call: Call, count: int) -> None:
+        """Carry out the parts of a call; see `Engine`."""
+        running = dict[Any, list[int]]()
+        theirs = {**(call.shared or environment()), _FOLDER: _folder()}
         environs = (theirs, added_objects(pack_whole))
         try:
-            while waiting or running:
+            while call or running:
                 count = self._workers() if self._workers is not None else count
-                while waiting and len(running) < count * self._ahead:
-                    places = waiting.next()
-                    running[self._submitted(work.part(places), *environs)] = places
+                while call and len(running) < count * self._ahead:
+                    places = call.next()
+                    running[self._submitted(call.work.only(places), *environs)] = places
                 ended = [future for future in running if future.done()]
                 for future in ended:
-                    self._take(future, running.pop(future), work, waiting, emit, fail)
+                    self._take(future, running.pop(future), call)
                 if not ended:
                     time.sleep(_POLL)
         finally:
@@ -93,32 +80,23 @@ class Submitted:
         except Exception as error:
             raise WorkerError(f"{self.name}: cannot be given work: {in_one_line(error)}") from error
 
-    def _take(
-        self,
-        future: Any,
-        places: list[int],
-        work: Work,
-        waiting: Waiting,
-        emit: Emit,
-        fail: Fail,
-    ) -> None:
+    def _take(self, future: Any, places: list[int], call: Call) -> None:
         try:
             answers = future.result()
         except self._deaths as error:
-            given_up = waiting.lost(places, together=True)
-            if given_up is not None:
-                fail(given_up, Failure("crashed", f"its worker died: {in_one_line(error)}"))
+            why = Failure("crashed", f"its worker died: {in_one_line(error)}")
+            call.lost(places, together=True, failure=why)
             return
         except Exception as error:
             raise WorkerError(f"{self.name}: {in_one_line(error)}") from error
         for place, answer in answers:
             if isinstance(answer, Processor):
-                work.saw(answer)
+                call.saw(answer)
             else:
-                (fail if isinstance(answer, Failure) else emit)(place, answer)
+                (call.fail if isinstance(answer, Failure) else call.emit)(place, answer)
 
 
-def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
+def carry_out(part: Work, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
     """In a worker: results and failures by place, and the model of its processor.
 
     Raises:
@@ -135,27 +113,21 @@ def carry_out(part: Part, theirs: Mapping[str, Any], added: Packed) -> list[tupl
     return answers
 
 
-def work_apart(
-    part: Part,
-    folder: Path,
-    added: Packed,
-    saw: Callable[[str], None],
-    ignored: Sequence[int] = (),
-) -> Work:
+def work_apart(part: Work, folder: Path, added: Packed, ignored: Sequence[int] = ()) -> Work:
     """A part as work for a process beside this one, which needs nothing that this one imported.
 
     Args:
         part: Some tasks.
         folder: Where they are run.
         added: Objects that were added to registries in the driver.
-        saw: Takes the model of the processor.
         ignored: Signals that it ignores.
     """
     import cloudpickle  # which Dask and submitit need too; it sends what was typed at a prompt
 
     content = cloudpickle.dumps((part, str(folder), added, ignored))
-    tasks = {place: (place,) for place in part.tasks}
-    return Work(_Carried(content), tasks, part.together, part.timeout, saw=saw)
+    return replace(
+        part, function=_Carried(content), tasks={place: (place,) for place in part.tasks}
+    )
 
 
 class _Carried:
@@ -180,7 +152,7 @@ class _Carried:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run one task, or some together and emit their results."""
-        part: Part = self._part
+        part: Work = self._part
         if not part.together:
             return part.function(*part.tasks[arguments[0]])
         chosen, emit = arguments

@@ -13,7 +13,7 @@ import numpy as np
 
 from antennate.errors import BadInputError
 from antennate.messages import shortened
-from antennate.notebook import from_columns, html
+from antennate.notebook import html
 from antennate.telemetry.topics import MOTION
 from antennate.types import AntennaFrame, Contact, Floats, Ints, JointCommand, Maneuver
 
@@ -126,12 +126,10 @@ class TimeSeries:
         return columns
 
     def to_dataframe(self) -> Any:
-        """A pandas DataFrame with one row for each tick and the columns of `columns`.
+        """A pandas DataFrame with one row for each tick and the columns of `columns`."""
+        from pandas import DataFrame  # slow to import
 
-        Raises:
-            MissingPackageError: pandas is not installed.
-        """
-        return from_columns(self.columns())
+        return DataFrame(self.columns())
 
 
 _NAMES = tuple(each.name for each in fields(TimeSeries) if each.name != "meta")

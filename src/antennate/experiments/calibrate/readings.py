@@ -7,8 +7,6 @@ the converter, both of `antenna.sensor`: what the simulated antenna has.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +17,7 @@ from antennate.antenna.sensor import FULL_SCALE, divider, transfer_curve
 from antennate.errors import CalibrationError
 from antennate.params.base import Params, meaning, number
 from antennate.robots.antenna import SensorParams
+from antennate.studies.columns import tabular
 from antennate.types import Bools, Floats, Ints
 
 TRIAL, SPEED, TIME, READING, BEND = range(5)
@@ -83,28 +82,28 @@ class RecordingParams(Params):
     """Share of damaged rows, and of outliers, up to which they are left out and counted."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Conversion:
-    """How readings became counts.
-
-    Attributes:
-        unit: Unit of the readings.
-        how: What they went through.
-        values: Each parameter used, its value, unit and source.
-    """
+    """How readings became counts."""
 
     unit: str
+    """Unit of the readings."""
     how: str
-    values: Mapping[str, tuple[float, str, str]]
+    """Parts of the board that they went through."""
+    values: dict[str, tuple[float, str, str]]
+    """Parameters used, by name: value, unit and source."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Outlier:
-    """A reading far from the others around it [counts], in this row of the file."""
+    """A reading far from the others around it."""
 
     row: int
+    """Row of the file."""
     counts: float
+    """The reading [counts]."""
     usual: float
+    """Median of the readings at nearly the same bend [counts]."""
 
 
 def unit_named(name: str) -> str:
@@ -166,7 +165,7 @@ def to_counts(
         whole = np.abs(steps - np.round(steps)) < _ON_STEPS
         if whole.all() and steps.max() <= FULL_SCALE + 0.5:
             how = f"steps of 3.3 V / {FULL_SCALE}: they were counts and are taken as such"
-            return np.round(steps), Conversion(unit, how, {})
+            return np.round(steps), Conversion(unit=unit, how=how, values={})
     apart = (volts > corners[0]) & (volts < corners[-1])
     if (~apart).mean() > _RAIL_SHARE:
         low, high = values.min(), values.max()
@@ -181,7 +180,7 @@ def to_counts(
     how = "the divider and the board's converter" if len(used) > 1 else "the board's converter"
     how += f", {(~apart).sum()} of them held at an end of its range" if not apart.all() else ""
     counts = np.clip(np.interp(volts, corners, readings), 0.0, FULL_SCALE)
-    return counts, Conversion(unit, how, used)
+    return counts, Conversion(unit=unit, how=how, values=used)
 
 
 def _parameter(sensor: SensorParams, name: str) -> tuple[float, str, str]:
@@ -191,15 +190,15 @@ def _parameter(sensor: SensorParams, name: str) -> tuple[float, str, str]:
     return value, str(extra["unit"]), str(extra["source"]) if value == field.default else "given"
 
 
-def conversion_sentence(conversion: Mapping[str, Any]) -> str:
-    """How readings became counts, in a sentence; the conversion as result.json has it."""
-    if not conversion["values"]:
-        return f"Readings in {conversion['unit']} come in {conversion['how']}."
+def conversion_sentence(conversion: Conversion) -> str:
+    """How readings became counts, in a sentence."""
+    if not conversion.values:
+        return f"Readings in {conversion.unit} come in {conversion.how}."
     values = ", ".join(
         f"{meaning(SensorParams, name, unit=False)} {value:g} {unit} ({source})"
-        for name, (value, unit, source) in conversion["values"].items()
+        for name, (value, unit, source) in conversion.values.items()
     )
-    return f"Readings in {conversion['unit']} became counts by {conversion['how']}: {values}."
+    return f"Readings in {conversion.unit} became counts by {conversion.how}: {values}."
 
 
 def _require_counts(path: Path, values: Floats, rows: Ints) -> None:

@@ -41,6 +41,7 @@ from antennate.experiments.calibrate.readings import (
 )
 from antennate.files import read_limited
 from antennate.robots.antenna import SensorParams
+from antennate.studies.columns import tabular
 from antennate.types import Bools, Floats, Ints
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -66,38 +67,36 @@ _NAMED = 20
 COLUMNS = ("trial", "speed_m_s", "time", "counts", "bend")
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Wrap:
-    """A clock that began at 0 again in this row of the file, and its kind."""
+    """A clock that began at 0 again."""
 
     row: int
+    """Row of the file."""
     clock: str
+    """Kind of the clock."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Handled:
-    """What was wrong with a file, and what was done about it.
-
-    Attributes:
-        rows: Rows of the file below its header.
-        damaged: How many were left out: too many or few cells, no number, a time out of place.
-        damages: Row and reason of the first of these.
-        outliers: Readings that were left out, or kept if they are more than `most_lost`.
-        outliers_kept: Whether they are kept.
-        wraps: Where the clock began at 0 again and was unwrapped.
-        conversion: How readings became counts, None if they are.
-        units: Where a declared unit was taken and not that in the name of its column, one sentence
-            each.
-    """
+    """What was wrong with a file, and what was done about it."""
 
     rows: int
+    """Rows of the file below its header."""
     damaged: int
+    """Rows that were left out: too many or few cells, no number, a time out of place."""
     damages: tuple[tuple[int, str], ...]
+    """First damaged rows: the row, and the reason."""
     outliers: tuple[Outlier, ...]
+    """Readings that were left out, or kept if they are more than `most_lost`."""
     outliers_kept: bool
+    """Whether the outliers are kept."""
     wraps: tuple[Wrap, ...]
+    """Rows at which the clock began at 0 again and was unwrapped."""
     conversion: Conversion | None
+    """Way of the readings to counts; `null` if they are counts."""
     units: tuple[str, ...] = ()
+    """Units taken as declared, against the name of their column, in a sentence each."""
 
 
 @dataclass(frozen=True)
@@ -157,14 +156,20 @@ def read(
     speed = _of_pushes(np.abs(table[:, SPEED]) * SPEED_UNITS[params.speed_unit], trial)
     samples = Samples(counts, bend, trial, speed, lines)
     far, off = outliers(samples), usual(samples)
-    rows = zip(lines[far].tolist(), counts[far].tolist(), off[far].tolist(), strict=True)
+    strays = zip(lines[far].tolist(), counts[far].tolist(), off[far].tolist(), strict=True)
     many = bool(far.mean() > params.most_lost)
     if not many:
         samples = Samples(*(getattr(samples, field.name)[~far] for field in fields(Samples)))
         t = t[~far]
     handled = Handled(
-        *(total, len(damages), tuple(damages[:_NAMED]), tuple(Outlier(*row) for row in rows)),
-        *(many, tuple(wraps), conversion, units),
+        rows=total,
+        damaged=len(damages),
+        damages=tuple(damages[:_NAMED]),
+        outliers=tuple(Outlier(row=row, counts=one, usual=near) for row, one, near in strays),
+        outliers_kept=many,
+        wraps=tuple(wraps),
+        conversion=conversion,
+        units=units,
     )
     return Recording(t, samples, hashlib.sha256(data).hexdigest(), handled)
 
@@ -342,7 +347,7 @@ def _unwrapped(t: Floats, trial: Ints, rows: Ints) -> tuple[Floats, list[Wrap]]:
             if t[at - 1] <= span and t[at] >= 0 and 0 < gap < _LONGEST_GAP:
                 later = np.arange(len(t)) >= at
                 added[later & (trial == trial[at])] += span
-                wraps.append(Wrap(int(rows[at]), clock))
+                wraps.append(Wrap(row=int(rows[at]), clock=clock))
                 break
     return t + added, wraps
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -18,13 +18,20 @@ from pydantic import model_validator
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration, Kind
 from antennate.antenna.curves import Samples, plateau_of, white_noise
-from antennate.antenna.next_push import Assessment, Pushes, assess, sigmoid_r2
 from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import bending_level
 from antennate.errors import CalibrationError, ConfigError
 from antennate.experiments.bench import bench_films, mean_since, recorded
+from antennate.experiments.calibrate.next_push import (
+    Assessment,
+    Pushes,
+    assess,
+    one_way_r2,
+    sigmoid_r2,
+)
 from antennate.experiments.calibrate.readings import parameters_of
 from antennate.experiments.calibrate.recording import Recording, RecordingParams, read, write
+from antennate.experiments.calibrate.result import CalibrateResult, Curve
 from antennate.experiments.calibrate.rig import Push, RigParams
 from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams
@@ -137,22 +144,19 @@ class CalibrateOutcome(Outcome):
         """What is known about the next push."""
         return assess(self.recording.samples, self.calibration, self.recording.t)
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+    def result(self) -> CalibrateResult:
+        """The calibration and what is known of it."""
         samples = self.raw.samples
-        plateau = plateau_of(samples.counts, samples.level)
-        return {
-            "schema": 1,
-            "command": "calibrate",
-            "seed": self.config.seed,
-            "source": "rig" if self.config.recording is None else "recording",
-            "poor": self.calibration.r2 < self.config.good_r2,
-            "hysteretic": self._hysteretic(),
-            "recording": None if self.raw.handled is None else asdict(self.raw.handled),
-            "plateau": None if plateau is None else asdict(plateau),
-            "calibration": self.calibration.model_dump(mode="json"),
-            "assessment": asdict(self.assessment),
-        }
+        return CalibrateResult(
+            seed=self.config.seed,
+            source="rig" if self.config.recording is None else "recording",
+            poor=self.calibration.r2 < self.config.good_r2,
+            hysteretic=self._hysteretic(),
+            recording=self.raw.handled,
+            plateau=plateau_of(samples.counts, samples.level),
+            calibration=Curve.of(self.calibration),
+            assessment=self.assessment,
+        )
 
     def _hysteretic(self) -> bool:
         """Whether the fit is poor, and loading and unloading are fitted far better on their own.
@@ -302,7 +306,7 @@ def run(
 
 def _hysteresis(samples: Samples, pushes: Pushes) -> str:
     """A hint at hysteresis beside a fault, if each direction alone would be fitted far better."""
-    there, back = (sigmoid_r2(samples, pushes.way == sign) for sign in (1, -1))
+    there, back = one_way_r2(samples, pushes)
     both = sigmoid_r2(samples, pushes.way != 0)
     if min(there, back) < both + _BETTER:
         return ""

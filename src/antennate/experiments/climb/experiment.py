@@ -2,55 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from antennate.experiments.climb.config import CONTROLLERS, ClimbConfig, cells, config_of
-from antennate.experiments.climb.crossing import crossing, ground_tables
-from antennate.experiments.climb.measures import (
-    COLUMNS,
-    climbing,
-    felt_tables,
-    sensing,
-    sentence,
-    step_tables,
-)
-from antennate.experiments.climb.physics import ClimbPath, ClimbRow, carry_out, lost_row
+from antennate.experiments.climb.measures import summarise
+from antennate.experiments.climb.physics import carry_out, lost_row
+from antennate.experiments.climb.result import ClimbResult
+from antennate.experiments.climb.rows import ClimbRow
+from antennate.experiments.climb.tables import sentence, tables
 from antennate.experiments.tunnel.batch import BATCH, watched
-from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
-from antennate.studies.measures import Table
-from antennate.studies.pool import Workers
+from antennate.studies.experiment import Experiment, Trial, Trials
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
-    from antennate.telemetry.view.simulation import SimulationView
-
-
-@dataclass(frozen=True, slots=True)
-class ClimbOutcome:
-    """All rows in the order of cells and trials, and the courses that figures draw."""
-
-    config: ClimbConfig
-    rows: list[ClimbRow]
-    paths: dict[str, ClimbPath]
-    interrupted: bool
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        return {
-            "schema": 1,
-            "command": "climb",
-            "seed": config.seed,
-            "time_limit_s": config.time_limit,
-            "heights_m": list(config.heights),
-            "interrupted": self.interrupted,
-            "climbing": climbing(config, self.rows),
-            "grounds": crossing(config, self.rows),
-            "sensing": sensing(config, self.rows),
-        }
 
 
 def every(config: ClimbConfig) -> list[Trial]:
@@ -60,30 +26,6 @@ def every(config: ClimbConfig) -> list[Trial]:
         for name, cell in cells(config).items()
         for trial in range(config.sensing if cell.part == "sensing" else config.trials)
     ]
-
-
-TRIALS = Trials[ClimbConfig](
-    *("cell", every, carry_out, ClimbRow, lost_row, BATCH),
-    watched=watched,
-    interruptible=True,
-)
-
-
-def run(
-    config: ClimbConfig,
-    workers: int | Workers = 1,
-    on_step: OnStep = no_step,
-    on_row: OnRow = no_row,
-    view: SimulationView | None = None,
-) -> ClimbOutcome:
-    """Run all trials of all cells.
-
-    Raises:
-        WorkerError: A worker process failed.
-    """
-    trials, interrupted = TRIALS.gather(config, workers, on_step, on_row, None, view)
-    paths = {row.cell: path for row, path in trials if path is not None}
-    return ClimbOutcome(config, [row for row, _ in trials], paths, interrupted)
 
 
 def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
@@ -103,34 +45,40 @@ def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
     }
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
-    """Steps, other grounds, and what is felt."""
-    return [*step_tables(result), *ground_tables(result), *felt_tables(result)]
-
-
-def none_valid(result: dict[str, Any]) -> bool:
+def none_valid(result: ClimbResult) -> bool:
     """Whether every trial of some condition is invalid."""
-    summaries = [s for entry in result["climbing"] for s in entry["conditions"].values()]
-    summaries += [s for e in result["grounds"] for some in e["grounds"].values() for s in some]
-    return any(s["trials"] and s["trials"] == s["invalid"] for s in summaries)
+    climbs = [each for entry in result.climbing for each in entry.conditions.values()]
+    crosses = [each for e in result.grounds for some in e.grounds.values() for each in some]
+    return any(0 < each.trials == each.invalid for each in (*climbs, *crosses))
 
 
-CAPTIONS = {
-    "success": "Success over the height of the step and the width of the gap with Wilson's 95 % "
-    "interval, a row of panels for each gain divisor.",
-    "side": "One climb from the side: the links at six moments, and where the plan has the head.",
-    "plan": "Error of the plan when the centre of each link crosses the edge: 5, 50 and 95 % of "
-    "the trials; the band is the aim.",
-    "felt": "What climb takes the ground for, by the first thing that it feels.",
-}
-
-EXPERIMENT = Experiment.of_folder(
-    *(__name__, ClimbConfig, run, tables, sentence),
+EXPERIMENT = Experiment.of_trials(
+    __name__,
+    ClimbConfig,
+    Trials[ClimbConfig](
+        condition="cell",
+        every=every,
+        carry_out=carry_out,
+        row=ClimbRow,
+        invalid=lost_row,
+        most=BATCH,
+        watched=watched,
+        interruptible=True,
+    ),
+    summarise,
+    tables,
+    sentence,
+    result=ClimbResult,
     films=films,
     failed=none_valid,
-    shown=True,
-    trials=TRIALS,
-    measures=COLUMNS,
-    captions=CAPTIONS,
+    captions={
+        "success": "Success over the height of the step and the width of the gap with Wilson's "
+        "95 % interval, a row of panels for each gain divisor.",
+        "side": "One climb from the side: the links at six moments, and where the plan has the "
+        "head.",
+        "plan": "Error of the plan when the centre of each link crosses the edge: 5, 50 and 95 % "
+        "of the trials; the band is the aim.",
+        "felt": "What climb takes the ground for, by the first thing that it feels.",
+    },
     explained="docs/results.md",
 )

@@ -1,357 +1,262 @@
-"""What is measured of each cell and over cells, as numbers and in words."""
+"""What the trials of `antennate climb` come to: on steps, on other grounds, and those that feel."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from antennate.control.climbing.rule import Ground as Felt
-from antennate.experiments.climb.config import ABOUT, BUMPY, CLIFF, GROUND, ClimbConfig
-from antennate.experiments.climb.physics import ClimbRow
+from antennate.experiments.climb.config import BUMPY, CLIFF, GROUND, ClimbConfig
+from antennate.experiments.climb.grounds import FLAT, KINDS, Terrain
+from antennate.experiments.climb.result import (
+    REFERENCE,
+    Cliff,
+    Climbed,
+    Climbing,
+    ClimbResult,
+    Crossing,
+    FalseClimbs,
+    Height,
+    OnGround,
+    Pair,
+    PlanError,
+    ProbeError,
+    Sensing,
+    Walk,
+)
+from antennate.experiments.climb.rows import Probe
+from antennate.jackknife import ENOUGH, jackknife95
 from antennate.studies import statistics
-from antennate.studies.measures import Measure, Table, count, mean, share, shown, summarise
+from antennate.studies.columns import Ends, Frame, by, mean, pooled, total, valid
+from antennate.types import Floats
 
 PLAN_BAND = (-0.06, 0.04)
 """Where the error of the plan is to lie in PLAN_SHARE of the crossings [m], set beforehand."""
 PLAN_SHARE = 0.9
-FELT_HEIGHTS = (0.02, 0.10)
-"""Heights over which the error of the probe is summed up [m]."""
+STEPS = [name for name in GROUND if name.startswith("step") and (GROUND[name][1] or 0.0) <= 0.10]
+"""Steps over which the error of the probe is summed up: 2 to 10 cm."""
 VERDICTS = tuple(verdict.name for verdict in Felt)
 
 
-def _load(name: str, label: str, unit: str = "", scale: float = 1.0, form: str = ".2f") -> Measure:
-    return Measure(name, label, unit, of=_known, scale=scale, form=form, least=0.0)
+def summarise(config: ClimbConfig, rows: Frame) -> ClimbResult:
+    """The result of the rows of a run."""
+    return ClimbResult(
+        seed=config.seed,
+        time_limit_s=config.time_limit,
+        heights_m=list(config.heights),
+        climbing=climbing(config, rows),
+        grounds=crossing(config, rows),
+        sensing=sensing(config, rows),
+    )
 
 
-def _known(name: str, rows: Sequence[Any]) -> float | None:
-    """Mean of a column over the rows that have it."""
-    return mean(name, [row for row in rows if getattr(row, name) is not None])
-
-
-CONDITION = (
-    Measure("trials", "trials", form="d"),
-    Measure("successes", "successes", of=count("outcome", "success"), form="d"),
-    Measure("success_share", "  share", "%", form=".0f", scale=100.0),
-    Measure("wilson95", "  Wilson 95 %", "%", form=".0f", scale=100.0),
-    Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
-    Measure("overturned", "overturned", of=count("outcome", "overturned"), form="d"),
-    Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
-    Measure("invalid", "invalid", form="d"),
-    Measure("success_time_s", "time of a success", "s", form=".1f"),
-    Measure("success_speed_m_s", "speed of a success, climbing", "m/s", form=".3f"),
-    _load("climbs", "climbs begun, mean"),
-    _load("torque_rms_n_m", "RMS torque of the worst pitch joint", "N·m"),
-    _load("torque_peak_n_m", "largest torque, mean", "N·m"),
-    _load("above_half", "over half the stall torque", "% of climb", 100.0, ".1f"),
-    _load("saturated", "drive at its limit", "% of climb", 100.0, ".1f"),
-    _load("current_rms_a", "RMS current of the worst pitch joint", "A"),
-)
-TIME = Measure("time_s", "time to the end", "s", form=".1f", least=0.0, most="time_limit")
-COLUMNS = (*CONDITION, TIME)
-PLAN = (
-    Measure("crossings", "crossings", form="d"),
-    Measure("low_cm", "5 %", "cm", form="+.1f"),
-    Measure("middle_cm", "50 %", "cm", form="+.1f"),
-    Measure("high_cm", "95 %", "cm", form="+.1f"),
-    Measure("within", "within -6 to +4 cm", "%", form=".0f", scale=100.0),
-)
-PROBE = (
-    Measure("felt_height_m", "height", "cm", scale=100.0, form=".1f"),
-    Measure("ahead_m", "ahead", "cm", scale=100.0, form=".1f"),
-    Measure("latency_s", "latency", "s"),
-)
-FALSE = (
-    Measure("false_climbs", "false climbs", form="d"),
-    Measure("per_1000_s", "  per 1000 s", form=".2f", interval="per_1000_s_95"),
-    Measure("per_m", "  per metre", "1/m", form=".3f", interval="per_m_95"),
-)
-
-
-def summary(rows: Sequence[ClimbRow], more: Sequence[Measure] = ()) -> dict[str, Any]:
-    """Some trials of one condition; invalid ones are counted and left out of all else."""
-    valid = [row for row in rows if row.outcome != "invalid"]
-    won = [row for row in valid if row.outcome == "success"]
-    return {
-        "trials": len(rows),
-        "invalid": len(rows) - len(valid),
-        "first_reason": next((row.reason for row in rows if row.outcome == "invalid"), None),
-        **summarise([*CONDITION, *more], valid),
-        "success_share": len(won) / len(valid) if valid else None,
-        "wilson95": statistics.wilson95(len(won), len(valid)) if valid else None,
-        "success_time_s": _known("time_s", won),
-        "success_speed_m_s": _known("speed_m_s", won),
-    }
-
-
-def climbing(config: ClimbConfig, rows: Sequence[ClimbRow]) -> list[dict[str, Any]]:
+def climbing(config: ClimbConfig, rows: Frame) -> list[Climbing]:
     """The climbs with each divisor: by condition, by height, in pairs, and the plan's error."""
-    return [_with_divisor(config, divisor, rows) for divisor in config.divisors]
+    climbs = rows[rows["part"] == "climbing"]
+    return [_steps(config, divisor, climbs) for divisor in config.divisors]
 
 
-def _with_divisor(config: ClimbConfig, divisor: float, rows: Sequence[ClimbRow]) -> dict[str, Any]:
-    own = [row for row in rows if row.part == "climbing" and row.divisor == divisor]
-    by_name = {n: [row for row in own if row.condition == n] for n in config.conditions}
-    heights = {
-        name: [
-            {"height_m": height, **summary([row for row in some if row.height_m == height])}
-            for height in config.heights
-        ]
-        for name, some in by_name.items()
-    }
-    return {
-        "divisor": divisor,
-        "conditions": {name: summary(some) for name, some in by_name.items()},
-        "heights": heights,
-        "pairs": pairs(by_name),
-        "plan": plan_errors(by_name["climb"]) if "climb" in by_name else None,
-    }
+def _steps(config: ClimbConfig, divisor: float, rows: Frame) -> Climbing:
+    by_name = by(rows[rows["divisor"] == divisor], "condition", config.conditions)
+    return Climbing(
+        divisor=divisor,
+        conditions={name: pooled(Climbed, some) for name, some in by_name.items()},
+        heights={
+            name: [
+                pooled(Height, some[some["height_m"] == height], height_m=height)
+                for height in config.heights
+            ]
+            for name, some in by_name.items()
+        },
+        pairs=pairs(by_name),
+        plan=plan_errors(by_name["climb"]["plan_error_m"]) if "climb" in by_name else None,
+    )
 
 
-def pairs(by_name: Mapping[str, Sequence[ClimbRow]]) -> dict[str, Any]:
+def pairs(by_name: Mapping[str, Frame]) -> dict[str, Pair]:
     """`climb` beside each other condition, trial by trial, over all grounds of these rows."""
-    tests: dict[str, Any] = {}
-    first = _valid(by_name.get("climb", ()))
-    for name in by_name:
-        second = _valid(by_name[name])
-        both = sorted(first.keys() & second.keys())
-        if name == "climb" or not both:
+    tests: dict[str, Pair] = {}
+    first = by_name.get("climb")
+    for name, second in by_name.items():
+        if name == "climb" or first is None:
             continue
-        won = np.array([[rows[k].outcome == "success" for rows in (first, second)] for k in both])
-        test = statistics.mcnemar(won)
-        tests[name] = {
-            "trials": len(both),
-            "only_climb": test.only_first,
-            "only_other": test.only_second,
-            "mcnemar_p": test.mcnemar_p,
-        }
+        both = valid(first).merge(valid(second), on=["ground", "trial"], suffixes=("", "_other"))
+        if len(both):
+            test = statistics.mcnemar((both[["outcome", "outcome_other"]] == "success").to_numpy())
+            tests[name] = Pair(
+                trials=test.trials,
+                only_climb=test.only_first,
+                only_other=test.only_second,
+                mcnemar_p=test.mcnemar_p,
+            )
     return tests
 
 
-def _valid(rows: Iterable[ClimbRow]) -> dict[tuple[str, int], ClimbRow]:
-    return {(row.ground, row.trial): row for row in rows if row.outcome != "invalid"}
+def plan_errors(told: Sequence[str]) -> list[PlanError]:
+    """Error of the plan when the centre of each link crossed the edge, head first, then all.
 
-
-def plan_errors(rows: Sequence[ClimbRow]) -> list[dict[str, Any]]:
-    """Error of the plan when the centre of each link crossed the edge, head first, then all."""
+    Args:
+        told: The column `plan_error_m`.
+    """
     by_link: dict[int, list[float]] = {}
-    for row in rows:
-        for word in row.plan_error_m.split():
+    for text in told:
+        for word in text.split():
             link, _, error = word.partition(":")
             by_link.setdefault(int(link), []).append(float(error))
     named = {f"link {link}" if link else "head": by_link[link] for link in sorted(by_link)}
     named["all links"] = [error for errors in by_link.values() for error in errors]
-    return [_spread(name, errors) for name, errors in named.items()]
+    return [_spread(name, np.array(errors)) for name, errors in named.items()]
 
 
-def _spread(name: str, errors: Sequence[float]) -> dict[str, Any]:
-    known = np.array(errors)
-    low, middle, high = (
-        (100.0 * np.percentile(known, [5.0, 50.0, 95.0])).tolist() if len(known) else [None] * 3
-    )
+def _spread(link: str, errors: Floats) -> PlanError:
+    if not len(errors):
+        return PlanError(link=link, crossings=0)
+    low, middle, high = (100.0 * np.percentile(errors, [5.0, 50.0, 95.0])).tolist()
     low_end, high_end = PLAN_BAND
-    inside = (known >= low_end) & (known <= high_end)
-    return {
-        "link": name,
-        "crossings": len(known),
-        "low_cm": low,
-        "middle_cm": middle,
-        "high_cm": high,
-        "within": float(inside.mean()) if len(known) else None,
-    }
+    inside = (errors >= low_end) & (errors <= high_end)
+    return PlanError(
+        link=link,
+        crossings=len(errors),
+        low_cm=low,
+        middle_cm=middle,
+        high_cm=high,
+        within=float(inside.mean()),
+    )
 
 
-def sensing(config: ClimbConfig, rows: Sequence[ClimbRow]) -> list[dict[str, Any]]:
+def crossing(config: ClimbConfig, rows: Frame) -> list[Crossing]:
+    """The crossings with each divisor, by condition and ground, in pairs; and speed on the flat."""
+    crosses = rows[rows["part"] == "ground"]
+    return [_grounds(config, divisor, crosses) for divisor in config.divisors if config.grounds]
+
+
+def _grounds(config: ClimbConfig, divisor: float, rows: Frame) -> Crossing:
+    by_name = by(rows[rows["divisor"] == divisor], "condition", config.conditions)
+    crossed = [terrain for terrain in config.terrains if terrain.scene != FLAT]
+    flat = {name: some[some["ground"] == FLAT] for name, some in by_name.items()}
+    return Crossing(
+        divisor=divisor,
+        grounds={
+            name: [_on(terrain, some) for terrain in crossed] for name, some in by_name.items()
+        },
+        pairs={
+            kind: pairs({name: _of_kind(kind, some) for name, some in by_name.items()})
+            for kind in KINDS
+            if any(terrain.scene == kind for terrain in crossed)
+        },
+        flat=walks(flat) if FLAT in config.grounds else None,
+    )
+
+
+def _of_kind(kind: str, rows: Frame) -> Frame:
+    return rows[rows["ground"].map(lambda word: Terrain.of(word).scene) == kind]
+
+
+def _on(terrain: Terrain, rows: Frame) -> OnGround:
+    """The trials of one condition on one ground."""
+    own = rows[rows["ground"] == terrain.word]
+    return pooled(OnGround, own, ground=terrain.word, scene=terrain.scene, size=terrain.size)
+
+
+def walks(by_name: Mapping[str, Frame]) -> dict[str, Walk]:
+    """Speed of each condition on the flat floor, and its ratio to that of `level` in pairs."""
+    told = {name: rows.dropna(subset=["speed_m_s"]) for name, rows in by_name.items()}
+    found: dict[str, Walk] = {}
+    for name, rows in by_name.items():
+        own = told[name]
+        both = own.merge(told.get(REFERENCE, own[:0]), on="trial", suffixes=("", "_other"))
+        speeds = np.column_stack([both["speed_m_s"], both["speed_m_s_other"]]).astype(float)
+        speed, ends = statistics.mean95(own["speed_m_s"].to_numpy(float), 0.0)
+        ratio, ratio_95 = ratio95(speeds)
+        found[name] = Walk(
+            trials=len(own),
+            speed_m_s=speed if len(own) else None,
+            speed_95=ends,
+            ratio=ratio,
+            ratio_95=ratio_95,
+            climbs=mean(valid(rows), "climbs"),
+        )
+    return found
+
+
+def ratio95(speeds: Floats) -> tuple[float | None, Ends | None]:
+    """Ratio of two mean speeds of the same trials, shape (n, 2), with its jackknife interval."""
+    if not len(speeds):
+        return None, None
+    sums = speeds.sum(axis=0)
+    ratio = float(sums[0] / sums[1])
+    if len(speeds) < ENOUGH:
+        return ratio, None
+    left = np.log(sums - speeds)
+    low, high = np.exp(jackknife95(np.log(ratio), left[:, 0] - left[:, 1])).tolist()
+    return ratio, (low, high) if low == low else None
+
+
+def sensing(config: ClimbConfig, rows: Frame) -> list[Sensing]:
     """What `climb` felt, with each divisor."""
-    feels = [row for row in rows if row.part == "sensing"]
+    feels = rows[rows["part"] == "sensing"]
     return [
-        _felt(divisor, [row for row in feels if row.divisor == divisor])
+        _felt(divisor, feels[feels["divisor"] == divisor])
         for divisor in config.divisors
         if config.sensing
     ]
 
 
-def _felt(divisor: float, every: Sequence[ClimbRow]) -> dict[str, Any]:
-    rows = [row for row in every if row.outcome != "invalid"]
-    by_ground = {name: [row for row in rows if row.ground == name] for name in GROUND}
-    verdicts = {name: Counter(row.verdict for row in some) for name, some in by_ground.items()}
-    cliff = by_ground[CLIFF]
-    stopped = sum(row.outcome == "stopped" for row in cliff)
-    return {
-        "divisor": divisor,
-        "invalid": len(every) - len(rows),
-        "first_reason": next((row.reason for row in every if row.outcome == "invalid"), None),
-        "confusion": {
-            name: {verdict: counts[verdict] for verdict in VERDICTS}
-            for name, counts in verdicts.items()
+def _felt(divisor: float, every: Frame) -> Sensing:
+    rows = valid(every)
+    by_ground = by(rows, "ground", GROUND)
+    stops = by_ground[CLIFF]["outcome"] == "stopped"
+    stopped, trials = int(stops.sum()), len(stops)
+    return pooled(
+        Sensing,
+        every,
+        divisor=divisor,
+        confusion={
+            name: {verdict: int((some["verdict"] == verdict).sum()) for verdict in VERDICTS}
+            for name, some in by_ground.items()
         },
-        "felt": {name: _probe(some) for name, some in by_ground.items()},
-        "heights": probe_error(rows),
-        "false_climbs": {name: false_climbs(by_ground[name]) for name in ("flat", BUMPY)},
-        "cliff": {
-            "trials": len(cliff),
-            "stopped": stopped,
-            "wilson95": statistics.wilson95(stopped, len(cliff)),
-        },
-    }
-
-
-def _probe(rows: Sequence[ClimbRow]) -> dict[str, Any]:
-    return {name: _known(name, rows) for name in ("felt_height_m", "ahead_m", "latency_s")}
-
-
-def probe_error(rows: Sequence[ClimbRow]) -> dict[str, Any]:
-    """Height by the probe against the true one, of steps within FELT_HEIGHTS."""
-    low, high = FELT_HEIGHTS
-    steps = [
-        row
-        for row in rows
-        if row.ground.startswith("step") and low <= (row.height_m or 0.0) <= high
-    ]
-    errors = np.array(
-        [
-            row.felt_height_m - row.height_m
-            for row in steps
-            if row.verdict == "STEP_UP" and row.felt_height_m is not None and row.height_m
-        ]
+        felt={name: pooled(Probe, some) for name, some in by_ground.items()},
+        heights=probe_error(rows),
+        false_climbs={name: false_climbs(by_ground[name]) for name in (FLAT, BUMPY)},
+        cliff=Cliff(trials=trials, stopped=stopped, wilson95=statistics.wilson95(stopped, trials)),
     )
+
+
+def probe_error(rows: Frame) -> ProbeError:
+    """Height by the probe against the true one, over STEPS."""
+    steps = rows[rows["ground"].isin(STEPS)]
+    told = steps[steps["verdict"] == "STEP_UP"]
+    off = told["felt_height_m"].astype(float) - told["height_m"].astype(float)
+    errors = off.dropna().to_numpy()
     known = len(errors) > 0
-    return {
-        "steps": len(steps),
-        "told": len(errors),
-        "bias_m": float(errors.mean()) if known else None,
-        "rmse_m": float(np.sqrt((errors**2).mean())) if known else None,
-    }
+    return ProbeError(
+        steps=len(steps),
+        told=len(errors),
+        bias_m=float(errors.mean()) if known else None,
+        rmse_m=float(np.sqrt((errors**2).mean())) if known else None,
+    )
 
 
-def false_climbs(rows: Sequence[ClimbRow]) -> dict[str, Any]:
+def false_climbs(rows: Frame) -> FalseClimbs:
     """Climbs begun where there is no step, over time and way."""
-    number, time, way = (
-        sum(getattr(row, name) for row in rows) for name in ("climbs", "time_s", "walked_m")
+    number, time, way = (total(rows, name) for name in ("climbs", "time_s", "walked_m"))
+    per_1000_s, per_1000_s_95 = _rate(number, time / 1000.0)
+    per_m, per_m_95 = _rate(number, way)
+    return FalseClimbs(
+        false_climbs=number,
+        time_s=time,
+        way_m=way,
+        per_1000_s=per_1000_s,
+        per_1000_s_95=per_1000_s_95,
+        per_m=per_m,
+        per_m_95=per_m_95,
     )
+
+
+def _rate(number: int, amount: float) -> tuple[float | None, Ends | None]:
+    """A Poisson count over an amount, and its interval."""
+    if not amount:
+        return None, None
     low, high = statistics.poisson95(number)
-    rates: dict[str, Any] = {"false_climbs": number, "time_s": time, "way_m": way}
-    for name, amount in (("per_1000_s", time / 1000.0), ("per_m", way)):
-        rates[name] = number / amount if amount else None
-        rates[f"{name}_95"] = (low / amount, high / amount) if amount else None
-    return rates
-
-
-def step_tables(result: Mapping[str, Any]) -> list[Table]:
-    """Success over heights, what climbing costs, pairs and plan, with each divisor."""
-    shown_tables: list[Table] = []
-    for entry in result["climbing"]:
-        where = f", gain divisor {entry['divisor']:g}"
-        shown_tables += [_success(entry, where, result), _costs(entry, where)]
-        if entry["pairs"]:
-            shown_tables.append(_pairs(entry, where))
-        if entry["plan"]:
-            shown_tables.append(_plan(entry, where))
-    return shown_tables
-
-
-def felt_tables(result: Mapping[str, Any]) -> list[Table]:
-    """What is felt, with each divisor."""
-    shown_tables: list[Table] = []
-    for entry in result["sensing"]:
-        where = f", gain divisor {entry['divisor']:g}"
-        shown_tables += [_confusion(entry, where), _probes(entry, where), _rates(entry, where)]
-    return shown_tables
-
-
-def _success(entry: Mapping[str, Any], where: str, result: Mapping[str, Any]) -> Table:
-    heights = [f"{100 * h:g} cm" for h in result["heights_m"]]
-    rows = [(name, [briefly(row) for row in some]) for name, some in entry["heights"].items()]
-    note = (
-        f"Successes of valid trials, and the Wilson 95 % interval [%]; within "
-        f"{result['time_limit_s']:g} s, seed {result['seed']}.\nAll conditions meet the same "
-        "steps, starts and disturbances."
-    )
-    about = "\n".join(f"{n}: {text}" for n, text in ABOUT.items() if n in entry["heights"])
-    return Table(f"Climbed{where}", heights, rows, note, preface=about)
-
-
-def briefly(row: Mapping[str, Any]) -> str:
-    """Successes and interval, so short that five heights fit into a terminal."""
-    valid = row["trials"] - row["invalid"]
-    return f"{row['successes']}/{valid} {shown(row['wilson95'], '.0f', 100.0, '-')}"
-
-
-def _costs(entry: Mapping[str, Any], where: str) -> Table:
-    note = "All heights. Loads are means over trials, from a link before the edge to the end."
-    return Table.of(f"Conditions{where}", entry["conditions"], CONDITION, note)
-
-
-def _pairs(entry: Mapping[str, Any], where: str) -> Table:
-    rows = [
-        (
-            f"climb, {name}",
-            [str(p["trials"]), str(p["only_climb"]), str(p["only_other"]), f"{p['mcnemar_p']:.3g}"],
-        )
-        for name, p in entry["pairs"].items()
-    ]
-    heads = ("valid in both", "only climb", "only the other", "McNemar p")
-    note = "All heights pooled. McNemar's test is exact and two-sided."
-    return Table(f"Trial by trial{where}", heads, rows, note)
-
-
-def _plan(entry: Mapping[str, Any], where: str) -> Table:
-    rows = [(row["link"], [measure.cell(row) for measure in PLAN]) for row in entry["plan"]]
-    share_within = entry["plan"][-1]["within"]
-    word = "reached" if (share_within or 0.0) >= PLAN_SHARE else "not reached"
-    note = (
-        "Head by the plan less the true one as the centre of each link crosses the edge; positive "
-        f"is ahead of the robot.\nThe aim is {100 * PLAN_SHARE:g} % within -6 to +4 cm: {word}."
-    )
-    heads = [measure.title for measure in PLAN]
-    return Table(f"Error of the plan of climb{where}", heads, rows, note)
-
-
-def _confusion(entry: Mapping[str, Any], where: str) -> Table:
-    rows = [
-        (name, [str(counts[verdict]) for verdict in VERDICTS])
-        for name, counts in entry["confusion"].items()
-    ]
-    cliff, invalid = entry["cliff"], entry["invalid"]
-    note = (
-        "Valid trials by the first thing that climb feels.\nStopped at a drop of 35 cm: "
-        f"{share(cliff['stopped'], cliff['trials'], cliff['wilson95'])}."
-    )
-    note += f"\nInvalid: {invalid}; the first, {entry['first_reason']}." if invalid else ""
-    return Table(f"What climb takes the ground for{where}", VERDICTS, rows, note)
-
-
-def _probes(entry: Mapping[str, Any], where: str) -> Table:
-    error = entry["heights"]
-    note = (
-        f"Means. Height of steps of 2 to 10 cm: {error['told']} of {error['steps']} told, bias "
-        f"{shown(error['bias_m'], '+.1f', 100.0)} cm, RMSE {shown(error['rmse_m'], '.1f', 100.0)} "
-        "cm."
-    )
-    rows = [(name, [m.cell(felt) for m in PROBE]) for name, felt in entry["felt"].items()]
-    return Table(f"The first probe{where}", [m.title for m in PROBE], rows, note)
-
-
-def _rates(entry: Mapping[str, Any], where: str) -> Table:
-    note = "Climbs begun where there is no step; Garwood's exact interval of a Poisson count."
-    return Table.of(f"False climbs{where}", entry["false_climbs"], FALSE, note)
-
-
-def sentence(result: Mapping[str, Any]) -> str:
-    """How many steps were climbed by each condition, with each divisor."""
-    parts = []
-    for entry in result["climbing"]:
-        each = ", ".join(
-            f"{name} {share(s['successes'], s['trials'] - s['invalid'], s['wilson95'])}"
-            for name, s in entry["conditions"].items()
-            if s["trials"]
-        )
-        if each:
-            parts.append(f"with gain divisor {entry['divisor']:g} {each}")
-    lost = sum(s["invalid"] for e in result["climbing"] for s in e["conditions"].values())
-    lost += sum(entry["invalid"] for entry in result["sensing"])
-    why = f" Invalid trials: {lost}; trials.csv gives the reason of each." if lost else ""
-    shares = "; ".join(parts) or "none"
-    return f"Steps climbed, all heights (95 % interval): {shares}.{why}"
+    return number / amount, (low / amount, high / amount)

@@ -21,6 +21,7 @@ from antennate.experiments.climb.config import (
 from antennate.experiments.climb.criterion import Criterion
 from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.load import PitchLoad
+from antennate.experiments.climb.rows import ClimbRow, Place
 from antennate.experiments.climb.sensing import Touch, Verdict
 from antennate.experiments.tunnel.batch import BATCH, Watch, run_trials
 from antennate.sim.scenes.scene import SceneInstance
@@ -33,69 +34,6 @@ _EVERY = 0.2
 """Between two postures that are kept [s]."""
 _STRIDE = 2.0
 """Between two places by which the way is summed up [s]: more than a gait cycle."""
-
-
-@dataclass(frozen=True, slots=True)
-class ClimbRow:
-    """One trial.
-
-    Attributes:
-        seed: Seed of the trials of this height; with `trial` it decides all chance.
-        cell: Name of the cell: part, condition, ground and divisor.
-        part: climbing, ground or sensing.
-        condition: Who.
-        ground: Name of the ground; in the part `ground` its word.
-        height_m: Height of its edge [m], None without one.
-        divisor: Gain divisor of the body's servos.
-        outcome: success, timeout, overturned, left, fell, stopped (before a drop), felt (the trial
-            was there for a verdict, and ended with it), walked (the flat floor) or invalid.
-        time_s: Time to the end [s], at most the limit.
-        climb_time_s: Time from a link pitch before the first edge on [s], None if it never came
-            there; `speed_m_s` is how fast the middle of the robot got on in it, or on a flat floor.
-        torque_rms_n_m: RMS torque of the pitch motor with the largest one, while it climbs.
-        torque_peak_n_m: Largest torque of any of them.
-        above_half: Share of that time in which any of them gives more than half its stall torque.
-        saturated: Share of that time in which the drive of any of them is at its limit.
-        current_rms_a: RMS current of the one with the largest, on the torque-speed line [A].
-        climbs: Climbs begun.
-        walked_m: Way of the middle of the robot [m].
-        verdict: What `climb` took the first thing for that it felt: FLOOR (it felt nothing),
-            STEP_UP, DROP, WALL or UNKNOWN; None for others.
-        felt_height_m: Height by that probe [m], None if it is not finite.
-        ahead_m: Distance of the edge ahead of the head when it felt it [m].
-        latency_s: Time from the first touch, or from when an antenna was past a drop, until it felt
-            it [s].
-        plan_error_m: Place of the head by the plan minus its true one when the centre of a link
-            crossed the first edge [m], as `0:-0.012 1:0.004`: links are counted from the head, and
-            those that crossed it without a plan are left out.
-        reason: Why a trial is invalid; empty otherwise.
-    """
-
-    seed: int
-    cell: str
-    trial: int
-    part: str
-    condition: str
-    ground: str
-    height_m: float | None
-    divisor: float
-    outcome: str
-    time_s: float
-    climb_time_s: float | None = None
-    speed_m_s: float | None = None
-    torque_rms_n_m: float | None = None
-    torque_peak_n_m: float | None = None
-    above_half: float | None = None
-    saturated: float | None = None
-    current_rms_a: float | None = None
-    climbs: int = 0
-    walked_m: float = 0.0
-    verdict: str | None = None
-    felt_height_m: float | None = None
-    ahead_m: float | None = None
-    latency_s: float | None = None
-    plan_error_m: str = ""
-    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +165,7 @@ class ClimbMonitor:
         feels = self._cell.condition == "climb"
         height = felt.height if felt.felt_at is not None and math.isfinite(felt.height) else None
         return ClimbRow(
-            **_columns(self._config, self._cell, self.trial),
+            **vars(_place(self._config, self._cell, self.trial)),
             outcome=outcome,
             time_s=round(min(self.time_limit, world.t), 6),
             climb_time_s=_rounded(took),
@@ -270,24 +208,24 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else round(float(value), 6)
 
 
-def _columns(config: ClimbConfig, cell: Cell, trial: int) -> dict[str, Any]:
-    return {
-        "seed": seed_of(config, cell),
-        "cell": cell.name,
-        "trial": trial,
-        "part": cell.part,
-        "condition": cell.condition,
-        "ground": cell.ground,
-        "height_m": cell.height,
-        "divisor": cell.divisor,
-    }
+def _place(config: ClimbConfig, cell: Cell, trial: int) -> Place:
+    return Place(
+        seed=seed_of(config, cell),
+        cell=cell.name,
+        trial=trial,
+        part=cell.part,
+        condition=cell.condition,
+        ground=cell.ground,
+        height_m=cell.height,
+        divisor=cell.divisor,
+    )
 
 
 def lost_row(config: ClimbConfig, name: str, trial: int, reason: str) -> ClimbRow:
     """The row of a trial of which there is nothing else."""
     cell = cells(config)[name]
-    columns, limit = _columns(config, cell, trial), limit_of(config, cell)
-    return ClimbRow(**columns, outcome="invalid", time_s=limit, reason=reason)
+    place, limit = vars(_place(config, cell, trial)), limit_of(config, cell)
+    return ClimbRow(**place, outcome="invalid", time_s=limit, reason=reason)
 
 
 def carry_out(

@@ -26,50 +26,48 @@ from antennate.experiments.tunnel.physics import TrialResult
 from antennate.sim.judge import Outcome, time_limit_of
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import draw_scene, scene_of
+from antennate.studies.columns import tabular
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 from antennate.types import Controller
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Episode:
-    """One row of the table.
-
-    Attributes:
-        controller: Name of the controller.
-        scene: The scene, with its other parameters if it has some.
-        seed: Seed of the run; with `trial` and `scene` it decides all chance.
-        trial: Number of the draw.
-        outcome: success, timeout, left, overturned, fell, or invalid, which counts as a failure.
-        time_s: Time to the exit [s]; the limit for every failure.
-        limit_s: Time limit [s].
-        progress_m: How far the head came [m].
-        overturned: Whether the robot lies on its back at the end.
-        void_decisions: Decisions of a learned policy whose answer was no number: it held.
-        given: What the simulation gave to the controller, in words; empty for its readings alone.
-        drawn: Whether the seed was drawn when the run began, so that nobody knew it.
-        version: Version of antennate.
-        engine: Version of MuJoCo.
-        processor: Model of the processor.
-        reason: Why it is invalid; empty otherwise.
-    """
+    """One episode, a row of trials.csv."""
 
     controller: str
+    """Name of the controller."""
     scene: str
+    """Scene, with its other parameters if it has some, as `uturn+variation.broken=random`."""
     seed: int
+    """Seed of the run; with `trial` and `scene` it decides all chance."""
     trial: int
+    """Number of the draw."""
     outcome: Outcome
+    """Outcome: success, timeout, left, overturned, fell, or invalid, which counts as a failure."""
     time_s: float
+    """Time to the exit; the limit for every failure."""
     limit_s: float = TIME_LIMIT
+    """Time limit."""
     progress_m: float = 0.0
+    """Where the head ended along the route."""
     overturned: bool = False
+    """Whether the robot lies on its back at the end."""
     void_decisions: int = 0
+    """Decisions of a learned policy whose answer was no number, so that the robot held."""
     given: str = ""
+    """What the simulation gave to the controller, in words; empty for its readings alone."""
     drawn: bool = False
+    """Whether the seed was drawn when the run began, so that nobody knew it."""
     version: str = __version__
+    """Version of antennate."""
     engine: str = ""
+    """Version of MuJoCo."""
     processor: str = ""
+    """Model of the processor."""
     reason: str = ""
+    """Why it is INVALID; empty otherwise."""
 
 
 @dataclass(frozen=True)
@@ -118,16 +116,15 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
 
 
 def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
-    return Episode(
-        *(draw.controller, draw.scene, draw.seed, draw.trial, row.outcome, row.time_s),
+    return _episode(
+        draw,
+        outcome=row.outcome,
+        time_s=row.time_s,
         limit_s=row.limit_s,
         progress_m=row.progress_m,
         overturned=row.overturned,
         void_decisions=row.void_decisions,
         given=given,
-        drawn=draw.drawn,
-        engine=versions()["mujoco"],
-        processor=processor(),
         reason=row.reason,
     )
 
@@ -136,13 +133,19 @@ def lost(draw: Draw, reason: str) -> Episode:
     """The row of an episode whose process died, failed, or did not end."""
     config = tunnel_config(draw.scene, draw.controller, draw.seed)
     limit = time_limit_of(draw_scene(config, scene_of(config), draw.trial), config.time_limit)
+    return _episode(draw, outcome="invalid", time_s=limit, limit_s=limit, reason=reason)
+
+
+def _episode(draw: Draw, **ended: Any) -> Episode:
     return Episode(
-        *(draw.controller, draw.scene, draw.seed, draw.trial, "invalid", limit),
-        limit_s=limit,
+        controller=draw.controller,
+        scene=draw.scene,
+        seed=draw.seed,
+        trial=draw.trial,
         drawn=draw.drawn,
         engine=versions()["mujoco"],
         processor=processor(),
-        reason=reason,
+        **ended,
     )
 
 

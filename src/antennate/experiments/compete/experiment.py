@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,24 +15,20 @@ from antennate.control.loop import CheckedController
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.compete.apart import Apart
-from antennate.experiments.compete.checking import compared, read_rows, refusal
+from antennate.experiments.compete.checking import read_rows
+from antennate.experiments.compete.comparison import compared, refusal
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
-from antennate.experiments.compete.episodes import (
-    Draw,
-    Episode,
-    all_drawn,
-    lost,
-    run_episodes,
-)
+from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
 from antennate.experiments.compete.page import readme, sentence, tables
+from antennate.experiments.compete.result import CompeteResult, none_valid
 from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
-from antennate.experiments.compete.standings import CONTROLLER, none_valid, standings
+from antennate.experiments.compete.standings import standing
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.judge import time_limit_of
 from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
-from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
 from antennate.studies.run_files import span
 from antennate.studies.work import Failure
@@ -44,33 +39,6 @@ START, COSTS = 2.0, (0.01, 0.2)
 draws go in lockstep, and where most run into the limit, one by one (docs/performance.md)."""
 PATIENCE = 120.0
 """Time in which a controller has to be made and to decide once, before anything is run [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class CompeteOutcome:
-    """All rows in the order of `draws`, and the table that was checked."""
-
-    config: CompeteConfig
-    rows: list[Episode]
-    theirs: list[Episode] | None
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        seeds = list(dict.fromkeys(row.seed for row in self.rows))
-        return {
-            "schema": 1,
-            "command": "compete",
-            "seed": config.seed if self.theirs is None else None,
-            "seeds": seeds,
-            "hidden": all_drawn(self.rows),
-            "trials": max((row.trial for row in self.rows), default=-1) + 1,
-            "decision_limit_s": config.decision_limit,
-            "tie": config.tie,
-            "interrupted": False,
-            **standings(self.rows, config.tie),
-            "check": None if self.theirs is None else compared(self.theirs, self.rows),
-        }
 
 
 def draws(config: CompeteConfig) -> list[Draw]:
@@ -184,7 +152,7 @@ def run(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
-) -> CompeteOutcome:
+) -> Done:
     """Run all episodes.
 
     Raises:
@@ -205,14 +173,26 @@ def run(
         lost=given_up,
         group=lambda draw: (draw.controller, draw.scene, draw.seed),
     )
-    return CompeteOutcome(config, rows, read_rows(Path(config.check)) if config.check else None)
+    return Done(rows, summarise(config, rows))
 
 
-def failed(result: Mapping[str, Any]) -> bool:
+def summarise(config: CompeteConfig, rows: Sequence[Episode]) -> CompeteResult:
+    """The result of the rows of a run."""
+    check = compared(read_rows(Path(config.check)), rows) if config.check else None
+    return CompeteResult(
+        **vars(standing(rows, config.tie, check)),
+        seed=None if config.check else config.seed,
+        trials=max((row.trial for row in rows), default=-1) + 1,
+        decision_limit_s=config.decision_limit,
+        tie=config.tie,
+    )
+
+
+def failed(result: CompeteResult) -> bool:
     """Whether a table that was checked does not repeat, or there is no valid episode at all."""
-    if (check := result["check"]) is not None:
-        return bool(refusal(check))
-    return len(none_valid(result)) == len(result["controllers"])
+    if result.check is not None:
+        return bool(refusal(result.check))
+    return len(none_valid(result)) == len(result.controllers)
 
 
 def undivided(config: CompeteConfig) -> str:
@@ -225,6 +205,8 @@ def undivided(config: CompeteConfig) -> str:
 
 EXPERIMENT = Experiment.of_folder(
     *(__name__, CompeteConfig, run, tables, sentence),
+    result=CompeteResult,
+    row=Episode,
     settled=settled,
     check=check,
     names=lambda config: ["README.md"],
@@ -233,7 +215,6 @@ EXPERIMENT = Experiment.of_folder(
     undivided=undivided,
     foretold=foretold,
     parts="episodes",
-    measures=CONTROLLER,
     anywhere=False,
     captions={
         "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "

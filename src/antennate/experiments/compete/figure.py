@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,30 +13,31 @@ from matplotlib.ticker import MaxNLocator
 from antennate import figures as style
 from antennate.control.readings import short_names
 from antennate.control.registry import looks
-from antennate.experiments.compete.experiment import CompeteOutcome
 from antennate.experiments.compete.page import ordered
+from antennate.experiments.compete.result import Standing
 from antennate.experiments.compete.scenes import label
 from antennate.experiments.compete.standings import Rows, profiles
+from antennate.studies.experiment import Done
 
 _DARK = 0.83
 """Share of successes whose blue is so dark that white stands out more on it."""
 
 
-def figures(outcome: CompeteOutcome) -> dict[str, Figure]:
+def figures(outcome: Done) -> dict[str, Figure]:
     """All three figures of a run."""
-    return drawn(outcome.result(), outcome.rows)
+    return drawn(outcome.found, outcome.rows)
 
 
-def drawn(result: Mapping[str, Any], rows: Rows) -> dict[str, Figure]:
+def drawn(result: Standing, rows: Rows) -> dict[str, Figure]:
     """All three figures of a result and its rows."""
     if not rows:
         return {}
-    ranked = [name for name in ordered(result) if result["controllers"][name]["rank"] is not None]
+    ranked = [name for name in ordered(result) if result.controllers[name].rank is not None]
     return {"ranks": ranks(result), "scenes": scenes(result), "profiles": profile(rows, ranked)}
 
 
 @style.styled
-def ranks(result: Mapping[str, Any]) -> Figure:
+def ranks(result: Standing) -> Figure:
     """Rank and success of each controller with their intervals, a line each."""
     names = ordered(result)
     colours = {name: colour for name, (colour, _) in looks(names).items()}
@@ -44,21 +45,21 @@ def ranks(result: Mapping[str, Any]) -> Figure:
     figure = style.canvas(style.WIDTH, 2 * (0.9 + 0.27 * len(names)))
     rank, success = figure.subplots(2, 1)
     for i, name in enumerate(names):
-        row = result["controllers"][name]
-        if row["rank"] is not None:
-            _interval(rank, i, row["rank"], row["rank_95"], colours[name])
+        row = result.controllers[name]
+        if row.rank is not None and row.rank_95 is not None:
+            _interval(rank, i, row.rank, row.rank_95, colours[name])
         else:
             rank.text(1, i, "not ranked", va="center", fontsize=8, color=style.MUTED)
-        if row["episodes"]:
-            ends = [100.0 * end for end in row["wilson95"]]
-            _interval(success, i, 100.0 * row["success_share"], ends, colours[name])
+        if row.success_share is not None and row.wilson95 is not None:
+            ends = [100.0 * end for end in row.wilson95]
+            _interval(success, i, 100.0 * row.success_share, ends, colours[name])
     for panel in (rank, success):
         panel.set_yticks(range(len(names)), [short[name] for name in names])
         panel.set_ylim(len(names) - 0.5, -0.5)
         panel.grid(visible=False, axis="y")
     rank.xaxis.set_major_locator(MaxNLocator(integer=True))
     rank.set(xlabel="rank", title="Rank; 95 %, all together")
-    ranked = sum(row["rank"] is not None for row in result["controllers"].values())
+    ranked = sum(row.rank is not None for row in result.controllers.values())
     rank.set_xlim(0.7, max(2, ranked) + 0.3)
     success.set(xlabel="draws crossed [%]", title="Success; Wilson 95 %", xlim=(-2, 102))
     return figure
@@ -70,15 +71,12 @@ def _interval(panel: Axes, at: int, value: float, ends: Any, colour: str) -> Non
 
 
 @style.styled
-def scenes(result: Mapping[str, Any]) -> Figure:
+def scenes(result: Standing) -> Figure:
     """Share of successes, a line a scene and a column a controller."""
-    names, places = ordered(result), list(result["scenes"])
+    names, places = ordered(result), list(result.scenes)
     short = style.plain(short_names(names))
     shares = np.array(
-        [
-            [np.nan if (s := result["scenes"][p][n]["success_share"]) is None else s for n in names]
-            for p in places
-        ]
+        [[cells[name].success_share for name in names] for cells in result.scenes.values()], float
     )
     figure = style.canvas(style.WIDTH, 1.3 + 0.32 * len(places))
     panel = figure.subplots()
@@ -88,7 +86,7 @@ def scenes(result: Mapping[str, Any]) -> Figure:
             ink = "white" if share > _DARK else style.INK
             number = str(int(100.0 * share + 0.5))  # halves go up
             panel.text(j, i, number, ha="center", va="center", fontsize=8, color=ink)
-    ranked = sum(result["controllers"][name]["rank"] is not None for name in names)
+    ranked = sum(result.controllers[name].rank is not None for name in names)
     if 0 < ranked < len(names):  # the others stand apart
         panel.axvline(ranked - 0.5, color="white", linewidth=3)
     panel.set_xticks(range(len(names)), [short[name] for name in names], rotation=45, ha="right")

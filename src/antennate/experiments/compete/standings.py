@@ -16,145 +16,93 @@ Where a controller is better in one scene and worse in another it errs on the sa
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from antennate.experiments.compete.episodes import Episode, restricted
+from antennate.experiments.compete.comparison import Check
+from antennate.experiments.compete.episodes import Episode, all_drawn, restricted
+from antennate.experiments.compete.result import Cell, Controller, Pair, Ranked, Standing
 from antennate.studies import statistics
-from antennate.studies.measures import Measure, count, summarise, total
+from antennate.studies.columns import Frame, by, frame, pooled
 from antennate.types import Floats, Ints
 
 ALPHA = 0.05
-CONTROLLER = (
-    Measure("rank", "rank", form="d"),
-    Measure("rank_95", "  95 %", form=".0f"),
-    Measure("episodes", "episodes", form="d"),
-    Measure("successes", "successes", of=count("outcome", "success"), form="d"),
-    Measure("success_share", "  share", "%", form=".0f", scale=100.0),
-    Measure("wilson95", "  Wilson 95 %", "%", form=".0f", scale=100.0),
-    Measure(
-        *("restricted_mean_share", "restricted mean time", "% of limit"),
-        form=".1f",
-        scale=100.0,
-        interval="restricted_mean_share_95",
-    ),
-    Measure("speed_m_s", "speed over successes", "m/s", form=".3f", interval="speed_95"),
-    Measure("timeouts", "out of time", of=count("outcome", "timeout"), form="d"),
-    Measure("left", "left the scene", of=count("outcome", "left"), form="d"),
-    Measure("fell", "fell", of=count("outcome", "fell"), form="d"),
-    Measure("overturned", "on its back at the end", of=total, form="d"),
-    Measure("invalid", "INVALID", of=count("outcome", "invalid"), form="d"),
-)
-PAIR = (
-    Measure("only_first", "only first", form="d"),
-    Measure("only_second", "only second", form="d"),
-    Measure("mcnemar_holm_p", "McNemar p", form=".2g"),
-    Measure(
-        *("share_difference", "time apart", "% of limit"),
-        form="+.1f",
-        scale=100.0,
-        interval="share_difference_95",
-    ),
-    Measure("wilcoxon_holm_p", "Wilcoxon p", form=".2g"),
-)
-
+_DRAW = ["scene", "seed", "trial"]
+"""Columns that tell a draw of a scene."""
 Rows = Sequence[Episode]
-Key = tuple[str, int, int]
-"""Scene, seed and trial of a draw."""
 
 
-def standings(rows: Rows, tie: float) -> dict[str, Any]:
+def standing(rows: Rows, tie: float, check: Check | None = None) -> Standing:
     """All that is told of these rows.
 
     Args:
         rows: All episodes.
         tie: Largest difference of success shares that is none.
+        check: How they repeat a table, if they are of one.
     """
-    by_name = {name: [r for r in rows if r.controller == name] for name in names_of(rows)}
-    ranked = [name for name, own in by_name.items() if not any(row.given for row in own)]
-    controllers = {name: _controller(own) for name, own in by_name.items()}
+    table = frame(rows, Episode).rename(columns={"outcome": "end"})  # so INVALID is not left out
+    by_name = by(table.assign(share=np.array(restricted(rows))), "controller")
+    given = {name: next(filter(None, own["given"]), "") for name, own in by_name.items()}
+    ranked = [name for name, words in given.items() if not words]
     pairs = _pairs({name: by_name[name] for name in ranked}, tie)
-    for name in ranked:
-        controllers[name] |= _rank(name, ranked, pairs)
     scenes = dict.fromkeys(row.scene for row in rows)
-    return {
-        "controllers": controllers,
-        "scenes": {
-            scene: {
-                name: _cell([row for row in own if row.scene == scene])
-                for name, own in by_name.items()
-            }
-            for scene in scenes
+    cells = {name: by(own, "scene", scenes) for name, own in by_name.items()}
+    return Standing(
+        seeds=list(dict.fromkeys(row.seed for row in rows)),
+        hidden=all_drawn(rows),
+        controllers={
+            name: _controller(own, _ranked(name, given[name], len(ranked), pairs))
+            for name, own in by_name.items()
         },
-        "paired": {f"{first}-{second}": pair for (first, second), pair in pairs.items()},
-    }
+        scenes={
+            scene: {name: _cell(own[scene]) for name, own in cells.items()} for scene in scenes
+        },
+        paired={"-".join(pair.names): pair for pair in pairs},
+        check=check,
+    )
 
 
-def none_valid(result: Mapping[str, Any]) -> dict[str, str]:
-    """Controllers of which every episode is INVALID, and why the first one is."""
-    return {
-        name: row["first_reason"]
-        for name, row in result["controllers"].items()
-        if row["episodes"] and row["invalid"] == row["episodes"]
-    }
+def _cell(rows: Frame) -> Cell:
+    """One controller in one scene."""
+    mean, ends = statistics.mean95(rows["share"].to_numpy(), 0.0, 1.0, restricted=True)
+    return pooled(
+        Cell,
+        rows,
+        episodes=len(rows),
+        restricted_mean_share=mean if len(rows) else None,
+        restricted_mean_share_95=ends,
+    )
 
 
-def names_of(rows: Rows) -> list[str]:
-    """The controllers of these rows, in their order."""
-    return list(dict.fromkeys(row.controller for row in rows))
-
-
-def _cell(rows: Rows) -> dict[str, Any]:
-    """One controller in one scene; all None without rows."""
-    won = sum(row.outcome == "success" for row in rows)
-    share, ends = statistics.mean95(np.array(restricted(rows)), 0.0, 1.0, restricted=True)
-    return {
-        "episodes": len(rows),
-        "successes": won,
-        "success_share": won / len(rows) if rows else None,
-        "wilson95": statistics.wilson95(won, len(rows)) if rows else None,
-        "restricted_mean_share": share if rows else None,
-        "restricted_mean_share_95": ends,
-    }
-
-
-def _controller(rows: Rows) -> dict[str, Any]:
+def _controller(rows: Frame, where: Ranked) -> Controller:
     """One controller over all scenes, whose draws count once each."""
-    draw = _draws([_key(row) for row in rows])
-    won = np.array([row.outcome == "success" for row in rows])
-    times = _by_draw(draw, np.array(restricted(rows)))
-    share, share_ends = statistics.mean95(times, 0.0, 1.0, restricted=True)
-    speeds = [row.progress_m / row.time_s for row in rows if row.outcome == "success"]
-    speed, ends = statistics.mean95_by_draw(np.array(speeds), draw[won], 0.0)
-    given = next((row.given for row in rows if row.given), "")
-    return {
-        "given": given,
-        "rank": None,
-        "rank_95": None,
-        **_cell(rows),
-        "wilson95": statistics.wilson95_by_draw(
+    draw, won = _draws(rows), (rows["end"] == "success").to_numpy()
+    times = _by_draw(draw, rows["share"].to_numpy())
+    mean, ends = statistics.mean95(times, 0.0, 1.0, restricted=True)
+    speeds = (rows["progress_m"] / rows["time_s"]).to_numpy()[won]
+    speed, speed_ends = statistics.mean95_by_draw(speeds, draw[won], 0.0)
+    return pooled(
+        Controller,
+        rows,
+        **vars(where),
+        episodes=len(rows),
+        wilson95=statistics.wilson95_by_draw(
             np.bincount(draw, weights=won).round().astype(int), np.bincount(draw)
         ),
-        "restricted_mean_share": share,
-        "restricted_mean_share_95": share_ends,
-        **summarise(CONTROLLER, rows),
-        "void_decisions": total("void_decisions", rows),
-        "speed_m_s": speed if speeds else None,
-        "speed_95": ends,
-        "first_reason": next((row.reason for row in rows if row.reason), None),
-    }
+        restricted_mean_share=mean,
+        restricted_mean_share_95=ends,
+        speed_m_s=speed if won.any() else None,
+        speed_95=speed_ends,
+        invalid=int((rows["end"] == "invalid").sum()),
+        first_reason=next(filter(None, rows["reason"]), None),
+    )
 
 
-def _key(row: Episode) -> Key:
-    return row.scene, row.seed, row.trial
-
-
-def _draws(keys: Sequence[Key]) -> Ints:
-    """The number of the draw that each of these is of, from 0, shape (n,)."""
-    numbers: dict[tuple[int, int], int] = {}
-    return np.array([numbers.setdefault(key[1:], len(numbers)) for key in keys])
+def _draws(rows: Frame) -> Ints:
+    """The number of the draw that each row is of, from 0, shape (n,)."""
+    return rows.groupby(["seed", "trial"], sort=False).ngroup().to_numpy()
 
 
 def _by_draw(draw: Ints, values: Floats) -> Floats:
@@ -163,56 +111,62 @@ def _by_draw(draw: Ints, values: Floats) -> Floats:
     return means
 
 
-def _pairs(by_name: Mapping[str, Rows], tie: float) -> dict[tuple[str, str], dict[str, Any]]:
+def _pairs(by_name: Mapping[str, Frame], tie: float) -> list[Pair]:
     """Every two controllers on the draws that both have, with Holm's correction over all pairs."""
-    keyed, pairs = {name: {_key(row): row for row in rows} for name, rows in by_name.items()}, {}
+    pairs = list[Pair]()
     for first, second in combinations(by_name, 2):
-        both = [key for key in keyed[first] if key in keyed[second]]
-        times = np.array([restricted(keyed[n][k] for k in both) for n in (first, second)])
-        won = np.array(
-            [[keyed[n][k].outcome == "success" for k in both] for n in (first, second)], dtype=bool
-        )
-        if both:
-            draw = _draws(both)
-            one, other = (_by_draw(draw, each) for each in times)
-            mean, ends = statistics.difference95(one, other, 1.0)
-            sums = np.bincount(draw, weights=won[0].astype(int) - won[1]).round().astype(int)
-            apart = float(won[0].mean() - won[1].mean())
-            pairs[first, second] = {
-                "names": [first, second],
-                "episodes": len(both),
-                "draws": len(sums),
-                "only_first": int((won[0] & ~won[1]).sum()),
-                "only_second": int((won[1] & ~won[0]).sum()),
-                "mcnemar_p": statistics.sign_flips(sums),
-                "share_difference": mean,
-                "share_difference_95": ends,
-                "wilcoxon_p": statistics.signed_rank(one - other) if len(one) > 1 else None,
-                "both": int((won[0] & won[1]).sum()),
-                "success_difference": apart,
-                "tie": abs(apart) <= tie + 1e-12,
-            }
-    for p in ("mcnemar_p", "wilcoxon_p"):
-        raised = statistics.holm([1.0 if (v := pair[p]) is None else v for pair in pairs.values()])
-        for pair, value in zip(pairs.values(), raised, strict=True):
-            pair[p.replace("_p", "_holm_p")] = value
-    return pairs
+        both = by_name[first].merge(by_name[second], on=_DRAW, suffixes=("", "_other"))
+        if len(both):
+            pairs.append(_pair((first, second), both, tie))
+    mcnemar = statistics.holm([pair.mcnemar_holm_p for pair in pairs])
+    wilcoxon = statistics.holm([pair.wilcoxon_holm_p for pair in pairs])
+    return [
+        replace(pair, mcnemar_holm_p=one, wilcoxon_holm_p=other)
+        for pair, one, other in zip(pairs, mcnemar, wilcoxon, strict=True)
+    ]
 
 
-def _rank(
-    name: str, ranked: Sequence[str], pairs: Mapping[tuple[str, str], Mapping[str, Any]]
-) -> dict[str, Any]:
-    """The rank of a controller, and its interval."""
+def _pair(names: tuple[str, str], both: Frame, tie: float) -> Pair:
+    """Two controllers, as if there were no others."""
+    draw, won = _draws(both), (both[["end", "end_other"]] == "success").to_numpy().T
+    one, other = (_by_draw(draw, both[each].to_numpy()) for each in ("share", "share_other"))
+    mean, ends = statistics.difference95(one, other, 1.0)
+    sums = np.bincount(draw, weights=won[0].astype(int) - won[1]).round().astype(int)
+    mcnemar = statistics.sign_flips(sums)
+    wilcoxon = statistics.signed_rank(one - other) if len(one) > 1 else None
+    apart = float(won[0].mean() - won[1].mean())
+    return Pair(
+        names=names,
+        episodes=len(both),
+        draws=len(sums),
+        only_first=int((won[0] & ~won[1]).sum()),
+        only_second=int((won[1] & ~won[0]).sum()),
+        mcnemar_p=mcnemar,
+        mcnemar_holm_p=mcnemar,
+        share_difference=mean,
+        share_difference_95=ends,
+        wilcoxon_p=wilcoxon,
+        wilcoxon_holm_p=1.0 if wilcoxon is None else wilcoxon,
+        both=int((won[0] & won[1]).sum()),
+        success_difference=apart,
+        tie=abs(apart) <= tie + 1e-12,
+    )
+
+
+def _ranked(name: str, given: str, among: int, pairs: Sequence[Pair]) -> Ranked:
+    """The rank of a controller among so many, and its interval; none of one that is given more."""
+    if given:
+        return Ranked(given=given, rank=None, rank_95=None)
     ahead = better = worse = 0
-    for (first, second), pair in pairs.items():
-        if name not in (first, second) or pair["tie"]:
+    for pair in pairs:
+        if name not in pair.names or pair.tie:
             continue
-        loses = (pair["success_difference"] > 0) == (name == second)
-        sure = pair["mcnemar_holm_p"] < ALPHA
+        loses = (pair.success_difference > 0) == (name == pair.names[1])
+        sure = pair.mcnemar_holm_p < ALPHA
         ahead += loses
         better += loses and sure
         worse += not loses and sure
-    return {"rank": 1 + ahead, "rank_95": [1 + better, len(ranked) - worse]}
+    return Ranked(given="", rank=1 + ahead, rank_95=(1 + better, among - worse))
 
 
 def profiles(rows: Rows) -> tuple[Floats, dict[str, Floats]]:
@@ -225,21 +179,13 @@ def profiles(rows: Rows) -> tuple[Floats, dict[str, Floats]]:
         Factors from 1 on, shape (n,), and of each controller the share of draws that it crosses
         within that factor of the fastest, shape (n,).
     """
-    ranked = [row for row in rows if not row.given]
-    best: dict[Key, float] = {}
-    for row in ranked:
-        key = _key(row)
-        time = row.time_s if row.outcome == "success" else np.inf
-        best[key] = min(best.get(key, np.inf), time)
+    ranked = frame([row for row in rows if not row.given], Episode)
+    won = ranked["outcome"] == "success"
+    draws = [ranked[each] for each in _DRAW]
+    best = ranked["time_s"].where(won, np.inf).groupby(draws).transform("min")
+    ratios = (ranked["time_s"] / best).where(won, np.inf)
     factors = np.linspace(1.0, 10.0, 181)
-    shares = {}
-    for name in names_of(ranked):
-        ratios = np.array(
-            [
-                row.time_s / best[_key(row)] if row.outcome == "success" else np.inf
-                for row in ranked
-                if row.controller == name
-            ]
-        )
-        shares[name] = (ratios[:, None] <= factors + 1e-12).mean(axis=0)
-    return factors, shares
+    return factors, {
+        name: (own["ratio"].to_numpy()[:, None] <= factors + 1e-12).mean(axis=0)
+        for name, own in by(ranked.assign(ratio=ratios), "controller").items()
+    }

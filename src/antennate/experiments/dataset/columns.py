@@ -48,7 +48,6 @@ class Task:
         label: Its column.
         unit: Unit of the label.
         about: What it is.
-        relative: Whether an error in % of the truth means something.
         title: What figures call it.
     """
 
@@ -58,7 +57,6 @@ class Task:
     unit: str
     about: str
     title: str
-    relative: bool = True
 
 
 TASKS = (
@@ -77,7 +75,6 @@ TASKS = (
         "rad",
         "angle of the body to the wall, mean over the window, positive towards the wall",
         "Angle of the wall",
-        relative=False,
     ),
     Task("gap", "gap", "gap_m", "m", "width of the gap, wall to wall", "Width of the gap"),
     Task(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -18,29 +19,40 @@ from antennate.experiments.sweep.physics import Trace, Wall, record
 from antennate.params.bench import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
+from antennate.studies.columns import column, tabular, tabular_row, total
 from antennate.types import Floats
 
 
-@dataclass(frozen=True, slots=True)
-class EpisodeRow:
-    """One episode, a row of trials.csv.
+@tabular
+class Kept:
+    """Windows of episodes, kept and left out."""
 
-    Attributes:
-        windows: Rows that it gave.
-        untouched: Windows left out because nothing touched in them, or no longer at their end.
-        reason: Why it is invalid.
-    """
+    windows: int = column("windows", pool=total, form="d", default=0)
+    """Windows in the file, a row each."""
+    untouched: int = column("left out, untouched", pool=total, form="d", default=0)
+    """Windows left out because nothing touched in them, or no longer at their end."""
+
+
+@tabular_row
+class EpisodeRow(Kept):
+    """One episode, a row of trials.csv."""
 
     seed: int
+    """Seed of the run."""
     trial: int
+    """Number of the episode."""
     kind: str
+    """`walk`, `gap` or `push`."""
     split: str
-    status: str
+    """Split of the episode."""
+    status: Literal["valid", "invalid"]
+    """`valid`, or `invalid` if the physics became so."""
     profile: str
-    speed_factor: float
-    windows: int = 0
-    untouched: int = 0
+    """Springs of the antennae."""
+    speed_factor: float | None
+    """Speed over the usual one; empty if its worker died."""
     reason: str = ""
+    """Why the episode is invalid."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from antennate.experiments.dataset.closed_form import closed_form
 from antennate.experiments.dataset.columns import TASKS, Task, Windows
 from antennate.experiments.dataset.config import TESTS, DatasetConfig, Kind
 from antennate.experiments.dataset.features import features
+from antennate.studies.columns import Ends, column, column_of, tabular
 from antennate.studies.statistics import mean95
 from antennate.types import Bools, Floats, Ints
 
@@ -34,6 +35,80 @@ LEAST = 5
 
 Estimate = Callable[[Floats], Floats]
 """estimate(features (m, k)) -> estimates (m,)."""
+
+
+@tabular
+class Estimated:
+    """Windows of a split that a baseline estimates."""
+
+    windows: int
+    """Windows estimated."""
+    episodes: int
+    """Episodes of these windows."""
+    untold: int
+    """Windows in which the baseline cannot tell."""
+
+
+@tabular
+class LengthErrors(Estimated):
+    """Errors of a baseline in a length, on a split of test.
+
+    Each is a mean over episodes of their means, `null` without any, with its 95 % interval
+    (Student's t over episodes), `null` below five of them.
+    """
+
+    mae_m: float | None = column(
+        "mean absolute error", "mm", scale=1e3, join="–", interval="mae_m_95"
+    )
+    """Mean absolute error."""
+    mae_m_95: Ends | None
+    gain_m: float | None = column(interval="gain_m_95")
+    """Mean absolute error of the mean of the training labels, less that of the baseline."""
+    gain_m_95: Ends | None
+    mape_percent: float | None = column(form=".1f", interval="mape_percent_95")
+    """Mean absolute error over the true value."""
+    mape_percent_95: Ends | None
+
+
+@tabular
+class AngleErrors(Estimated):
+    """Errors of a baseline in an angle, on a split of test; in % they would mean nothing."""
+
+    mae_rad: float | None = column(
+        "mean absolute error", "deg", scale=math.degrees(1.0), join="–", interval="mae_rad_95"
+    )
+    """Mean absolute error."""
+    mae_rad_95: Ends | None
+    gain_rad: float | None = column(interval="gain_rad_95")
+    """Mean absolute error of the mean of the training labels, less that of the baseline."""
+    gain_rad_95: Ends | None
+
+
+Errors = LengthErrors | AngleErrors
+MAE = {"m": column_of(LengthErrors, "mae_m"), "rad": column_of(AngleErrors, "mae_rad")}
+"""Mean absolute error, by the unit of a task."""
+GAIN = {"m": column_of(LengthErrors, "gain_m"), "rad": column_of(AngleErrors, "gain_rad")}
+"""Gain over the mean of the labels, likewise."""
+
+
+@tabular
+class TaskResult:
+    """Errors of the baselines in a task."""
+
+    label: str
+    """Column to be estimated."""
+    unit: str
+    """Unit of the label."""
+    chosen: dict[str, float]
+    """Penalty of `polynomial` and number of `neighbours`, chosen by the validation split."""
+    best: str | None
+    """Baseline of least error on the validation split, `mean` apart; `null` if nothing is
+    learned."""
+    told: dict[str, bool | None]
+    """Whether `best` errs less than `mean` on each split of test, by an interval that lies above 0
+    as a whole; `null` without an interval."""
+    tests: dict[str, dict[str, Errors]]
+    """Errors of each baseline, by split of test."""
 
 
 def polynomial(known: Floats, truth: Floats, penalty: float) -> Estimate:
@@ -114,34 +189,47 @@ def estimates(
     return {name: told[name] for name in BASELINES}, options
 
 
-def score(task: Task, windows: Windows, told: Mapping[str, Floats], rows: Bools) -> dict[str, Any]:
-    """Errors of each baseline on some windows, by name.
+def score(
+    task: Task, windows: Windows, told: Mapping[str, Floats], rows: Bools
+) -> dict[str, Errors]:
+    """Errors of each baseline on some windows, by name."""
+    truth, episode = windows[task.label][rows], windows["episode"][rows]
+    rival = abs(told["mean"][rows] - truth) if "mean" in told else None
+    return {name: _errors(task, guess[rows], truth, episode, rival) for name, guess in told.items()}
 
-    Returns:
-        For each `windows`, `episodes`, `untold`, mean absolute error `mae_m` or `mae_rad`, and in %
-        of the truth `mape_percent` where that means something; `gain_m` or `gain_rad`, by how much
-        less it errs than the mean of the training labels. Each is a mean over episodes of their
-        means, with its 95 % interval.
-    """
-    truth, episode, unit = windows[task.label][rows], windows["episode"][rows], task.unit
-    rival = abs(told["mean"][rows] - truth) if "mean" in told else np.full(len(truth), math.nan)
-    result: dict[str, Any] = {}
-    for name, guess in told.items():
-        error = abs(guess[rows] - truth)
-        known = np.isfinite(error)
-        entry: dict[str, Any] = {
-            "windows": int(known.sum()),
-            "episodes": len(np.unique(episode[known])),
-            "untold": int((~known).sum()),
-        }
-        measures = {f"mae_{unit}": (error, 0.0), f"gain_{unit}": (rival - error, -math.inf)}
-        if task.relative:
-            measures["mape_percent"] = (100.0 * error / truth, 0.0)
-        for key, (values, least) in measures.items():
-            mean, ends = mean95(by_episode(values[known], episode[known]), least)
-            entry |= {key: mean, f"{key}_95": ends}
-        result[name] = entry
-    return result
+
+def _errors(
+    task: Task, guess: Floats, truth: Floats, episode: Ints, rival: Floats | None
+) -> Errors:
+    """Errors of a baseline, all of shape (n,); `rival` are those of the mean of the labels."""
+    error = abs(guess - truth)
+    known = np.isfinite(error)
+    counts = {
+        "windows": int(known.sum()),
+        "episodes": len(np.unique(episode[known])),
+        "untold": int((~known).sum()),
+    }
+
+    def mean(values: Floats, least: float) -> tuple[float | None, Ends | None]:
+        means = by_episode(values[known], episode[known])
+        return mean95(means, least) if len(means) else (None, None)
+
+    mae, mae_95 = mean(error, 0.0)
+    gain, gain_95 = (None, None) if rival is None else mean(rival - error, -math.inf)
+    if task.unit == "rad":
+        return AngleErrors(
+            mae_rad=mae, mae_rad_95=mae_95, gain_rad=gain, gain_rad_95=gain_95, **counts
+        )
+    mape, mape_95 = mean(100.0 * error / truth, 0.0)
+    return LengthErrors(
+        mae_m=mae,
+        mae_m_95=mae_95,
+        gain_m=gain,
+        gain_m_95=gain_95,
+        mape_percent=mape,
+        mape_percent_95=mape_95,
+        **counts,
+    )
 
 
 def by_episode(values: Floats, episode: Ints) -> Floats:
@@ -150,40 +238,44 @@ def by_episode(values: Floats, episode: Ints) -> Floats:
     return np.bincount(place, values) / np.maximum(np.bincount(place), 1)
 
 
-def summary(config: DatasetConfig, by_kind: Mapping[Kind, Windows]) -> dict[str, Any]:
+def summary(config: DatasetConfig, by_kind: Mapping[Kind, Windows]) -> dict[str, TaskResult]:
     """What each baseline comes to in each task whose episodes there are, by split of test."""
-    tasks: dict[str, Any] = {}
+    tasks: dict[str, TaskResult] = {}
     for task in TASKS:
         if task.kind not in by_kind:
             continue
         windows = by_kind[task.kind]
-        told, options = estimates(config, task, windows)
-        tests = {name: score(task, windows, told, windows["split"] == name) for name in TESTS}
-        best = _best(task, windows, told)
-        tasks[task.name] = {
-            "label": task.label,
-            "unit": task.unit,
-            "chosen": options,
-            "best": best,
-            "told": {name: _told(task, test, best) for name, test in tests.items()},
-            "tests": tests,
-        }
+        guesses, options = estimates(config, task, windows)
+        tests = {name: score(task, windows, guesses, windows["split"] == name) for name in TESTS}
+        best = _best(task, windows, guesses)
+        tasks[task.name] = TaskResult(
+            label=task.label,
+            unit=task.unit,
+            chosen=options,
+            best=best,
+            told={
+                name: None if best is None else _told(task, test[best])
+                for name, test in tests.items()
+            },
+            tests=tests,
+        )
     return tasks
 
 
-def _told(task: Task, test: Mapping[str, Any], best: str | None) -> bool | None:
+def _told(task: Task, best: Errors) -> bool | None:
     """Whether the best baseline errs less than the mean, its whole interval; None if unknown."""
-    ends = None if best is None else test[best][f"gain_{task.unit}_95"]
-    return None if ends is None or math.isnan(ends[0]) else bool(ends[0] > 0.0)
+    ends = GAIN[task.unit].ends.value(best)
+    return None if ends is None else bool(ends[0] > 0.0)
 
 
 def _best(task: Task, windows: Windows, told: Mapping[str, Floats]) -> str | None:
     """The baseline of least error on the validation split, the mean of the labels apart."""
     if "mean" not in told:
         return None
-    rows = windows["split"] == "validation"
-    entries = score(task, windows, {n: t for n, t in told.items() if n != "mean"}, rows)
+    errors = score(task, windows, told, windows["split"] == "validation")
     able = {
-        n: e[f"mae_{task.unit}"] for n, e in entries.items() if e["windows"] and not e["untold"]
+        name: MAE[task.unit].value(each)
+        for name, each in errors.items()
+        if name != "mean" and each.windows and not each.untold
     }
     return min(able, key=lambda name: able[name]) if able else None

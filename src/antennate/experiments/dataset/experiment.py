@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from antennate.errors import SimulationError
 from antennate.experiments.dataset.card import files
@@ -20,77 +19,137 @@ from antennate.experiments.dataset.config import (
 )
 from antennate.experiments.dataset.episodes import (
     EpisodeRow,
+    Kept,
     drawn,
     gap_windows,
     push_windows,
     setting,
 )
-from antennate.experiments.dataset.estimates import BASELINES, summary
+from antennate.experiments.dataset.estimates import (
+    BASELINES,
+    MAE,
+    LengthErrors,
+    TaskResult,
+    summary,
+)
 from antennate.experiments.dataset.walk import walk_windows
+from antennate.studies.columns import (
+    INVALID,
+    NONE,
+    Frame,
+    by,
+    column,
+    column_of,
+    frame,
+    pooled,
+    tabular,
+)
 from antennate.studies.experiment import (
+    Done,
     Experiment,
     OneByOne,
     OnRow,
     OnStep,
-    Outcome,
     Trials,
     no_row,
     no_step,
 )
-from antennate.studies.measures import Measure, Table, shown
 from antennate.studies.parquet import require_parquet
 from antennate.studies.pool import Workers
+from antennate.studies.tables import Table
 
 _MAKE = {"walk": walk_windows, "gap": gap_windows, "push": push_windows}
 PUBLISHED = {"base_to_tip": 7.75, "gap": 6.73}
 """Errors that CITRAS published [%], arXiv:2507.23719: a real antenna with hinge sensors."""
 
 
-@dataclass(frozen=True, slots=True)
-class DatasetOutcome(Outcome):
+@tabular
+class Ran:
+    """Episodes of a kind."""
+
+    trials: int = column("episodes", form="d")
+    """Episodes run."""
+    invalid: int = column("invalid", form="d")
+    """Episodes whose physics became invalid."""
+
+
+@tabular
+class KindSummary(Kept, Ran):
+    """All episodes of a kind."""
+
+    splits: dict[str, int]
+    """Windows of each split."""
+
+
+@tabular
+class DatasetResult:
+    """What a run comes to."""
+
+    schema: int = 1
+    command: str = "dataset"
+    format: int
+    """Version of columns, splits and definitions."""
+    seed: int
+    """Seed of the run."""
+    rate_hz: float
+    """Samples a second."""
+    history: int
+    """Samples of a window."""
+    kinds: dict[str, KindSummary]
+    """Episodes of each kind: `walk`, `gap` and `push`."""
+    tasks: dict[str, TaskResult]
+    """Result of each task: `distance`, `angle`, `gap`, `place` and `base_to_tip`."""
+    published_percent: dict[str, float]
+    """Published errors of CITRAS, of `base_to_tip` and `gap`."""
+
+
+@dataclass(frozen=True)
+class DatasetOutcome(Done):
     """All episodes and their windows.
 
     Attributes:
-        episodes: A row for each episode.
         by_kind: Columns of the windows, by kind.
-        summary: The content of result.json.
     """
 
     config: DatasetConfig
-    episodes: list[EpisodeRow]
     by_kind: dict[Kind, Windows]
-    summary: dict[str, Any]
-
-    @property
-    def rows(self) -> Sequence[EpisodeRow]:
-        """The episodes, kind by kind."""
-        return self.episodes
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return self.summary
 
 
 def episode(config: DatasetConfig, kind: Kind, trial: int) -> tuple[EpisodeRow, Windows | None]:
     """One episode: its row, and its windows if there are any."""
     draw = drawn(config, kind, trial)
-    names = {"profile": draw.profile, "speed_factor": draw.factor}
-    key = (config.seed, trial, kind, draw.split)
+    row = EpisodeRow(
+        seed=config.seed,
+        trial=trial,
+        kind=kind,
+        split=draw.split,
+        status="valid",
+        profile=draw.profile,
+        speed_factor=draw.factor,
+    )
     try:
         windows = _MAKE[kind](config, draw)
     except SimulationError as error:
-        return EpisodeRow(*key, "invalid", **names, reason=str(error)), None
+        return replace(row, status="invalid", reason=str(error)), None
     label = next(task.label for task in TASKS if task.kind == kind)
     count = len(windows.get(label, ()))
     most = config.walk.windows if kind == "walk" else 1
-    row = EpisodeRow(*key, "valid", **names, windows=count, untouched=most - count)
+    row = replace(row, windows=count, untouched=most - count)
     return row, {**setting(draw, trial, count), **windows} if count else None
 
 
 def invalid(config: DatasetConfig, kind: str, trial: int, reason: str) -> EpisodeRow:
     """The row of an episode whose worker died."""
-    split = split_of(trial)
-    return EpisodeRow(config.seed, trial, kind, split, "invalid", "", math.nan, reason=reason)
+    return EpisodeRow(
+        seed=config.seed,
+        trial=trial,
+        kind=kind,
+        split=split_of(trial),
+        status="invalid",
+        profile="",
+        speed_factor=None,
+        reason=reason,
+    )
 
 
 TRIALS = Trials[DatasetConfig](
@@ -119,38 +178,28 @@ def run(
     for kind in config.kinds:
         parts = [windows for row, windows in ended if row.kind == kind and windows is not None]
         by_kind[kind] = joined(columns_of(kind, config.robot), parts)
-    result = {
-        "schema": 1,
-        "command": "dataset",
-        "format": FORMAT,
-        "seed": config.seed,
-        "rate_hz": config.rate,
-        "history": HISTORY,
-        "kinds": {kind: _counts(rows, kind, by_kind[kind]) for kind in config.kinds},
-        "tasks": summary(config, by_kind),
-        "published_percent": PUBLISHED,
-    }
-    return DatasetOutcome(config, rows, by_kind, result)
+    result = DatasetResult(
+        format=FORMAT,
+        seed=config.seed,
+        rate_hz=config.rate,
+        history=HISTORY,
+        kinds={
+            kind: _kind(some, by_kind[kind])
+            for kind, some in by(frame(rows, EpisodeRow), "kind", config.kinds).items()
+        },
+        tasks=summary(config, by_kind),
+        published_percent=PUBLISHED,
+    )
+    return DatasetOutcome(rows, result, config, by_kind)
 
 
-def _counts(rows: Sequence[EpisodeRow], kind: str, windows: Windows) -> dict[str, Any]:
-    own = [row for row in rows if row.kind == kind]
-    splits = windows["split"].tolist()
-    return {
-        "trials": len(own),
-        "invalid": sum(row.status == "invalid" for row in own),
-        "windows": len(splits),
-        "untouched": sum(row.untouched for row in own),
-        "splits": {split: splits.count(split) for split in dict.fromkeys(splits)},
-    }
+def _kind(rows: Frame, windows: Windows) -> KindSummary:
+    """Episodes of a kind, and the rows of their file in each split."""
+    splits = Counter(windows["split"].tolist())
+    bad = int((rows["status"] == INVALID).sum())
+    return pooled(KindSummary, rows, invalid=bad, splits=dict(splits))
 
 
-KIND = (
-    Measure("trials", "episodes", form="d"),
-    Measure("invalid", "invalid", form="d"),
-    Measure("windows", "windows", form="d"),
-    Measure("untouched", "left out, untouched", form="d"),
-)
 TITLES = {
     "test": "test",
     "test_antenna": "other antennae",
@@ -158,73 +207,60 @@ TITLES = {
 }
 
 
-def shown_error(name: str, unit: str) -> Measure:
-    """How the error of a task is shown: in mm or degrees, with its interval."""
-    if unit == "rad":
-        return Measure("mae_rad", name, "deg", form=".2f", scale=math.degrees(1.0))
-    return Measure("mae_m", name, "mm", form=".2f", scale=1e3)
-
-
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: DatasetResult) -> Sequence[Table]:
     """Windows of each kind, and for each task the errors of the baselines by split."""
-    counts = Table.of("Windows", result["kinds"], KIND)
-    return counts, *(_table(result, name, entry) for name, entry in result["tasks"].items())
+    counts = Table.of("Windows", result.kinds)
+    return counts, *(_table(result, name, task) for name, task in result.tasks.items())
 
 
-def _table(result: Mapping[str, Any], name: str, entry: Mapping[str, Any]) -> Table:
-    measure = shown_error(name, entry["unit"])
+def _table(result: DatasetResult, name: str, task: TaskResult) -> Table:
     rows = [
-        (
-            baseline.replace("_", " "),
-            [_cell(measure, test, baseline) for test in entry["tests"].values()],
-        )
+        (baseline.replace("_", " "), [_cell(task, split, baseline) for split in TESTS])
         for baseline in BASELINES
     ]
-    test, notes = entry["tests"]["test"], [_verdict(entry)]
-    if "mape_percent" in test.get(entry["best"], {}):
-        percent = [
-            Measure("mape_percent", form=".1f").cell(test[b]) for b in (entry["best"], "mean")
-        ]
-        notes.append(f"On test it errs by {percent[0]} % of the truth, the mean by {percent[1]} %.")
-    if name in result["published_percent"]:
-        notes.append(f"CITRAS, a real antenna: {result['published_percent'][name]:g} %.")
-    untold = {b: e["untold"] for b, e in test.items() if e["untold"]}
+    test, notes = task.tests["test"], [_verdict(task)]
+    best, mape = test.get(task.best or ""), column_of(LengthErrors, "mape_percent")
+    if isinstance(best, LengthErrors):
+        ours, rival = mape.cell(best), mape.cell(test["mean"])
+        notes.append(f"On test it errs by {ours} % of the truth, the mean by {rival} %.")
+    if name in result.published_percent:
+        notes.append(f"CITRAS, a real antenna: {result.published_percent[name]:g} %.")
+    untold = {b: e.untold for b, e in test.items() if e.untold}
     notes += [f"{b.replace('_', ' ')}: {n} windows of test not told." for b, n in untold.items()]
-    title = f"{name.replace('_', ' ')}: mean absolute error in {measure.unit} (95 %)"
+    mae = MAE[task.unit]
+    title = f"{name.replace('_', ' ')}: {mae.label} in {mae.unit} (95 %)"
     return Table(title, [TITLES[split] for split in TESTS], rows, "\n".join(notes))
 
 
-def _verdict(entry: Mapping[str, Any]) -> str:
+def _verdict(task: TaskResult) -> str:
     """On which splits the best baseline errs less than the mean."""
-    if entry["best"] is None:
+    if task.best is None:
         return "Too few windows to learn from."
     words = {True: "yes", False: "no", None: "too few"}
-    told = ", ".join(f"{TITLES[split]}: {words[told]}" for split, told in entry["told"].items())
-    return (
-        f"Best on validation: {entry['best'].replace('_', ' ')}. Less error than the mean? {told}."
-    )
+    told = ", ".join(f"{TITLES[split]}: {words[told]}" for split, told in task.told.items())
+    return f"Best on validation: {task.best.replace('_', ' ')}. Less error than the mean? {told}."
 
 
-def _cell(measure: Measure, test: Mapping[str, Any], baseline: str) -> str:
-    if baseline not in test:
-        return shown(None)
-    entry = test[baseline]
-    ends = entry[f"{measure.name}_95"]
-    value = measure.cell(entry)
-    return value if ends is None else f"{value} ({shown(ends, measure.form, measure.scale, '–')})"
+def _cell(task: TaskResult, split: str, baseline: str) -> str:
+    """Error of a baseline with its interval, if there are any."""
+    mae, errors = MAE[task.unit], task.tests[split].get(baseline)
+    if errors is None:
+        return NONE
+    value, ends = mae.cell(errors), mae.ends.cell(errors)
+    return value if ends == NONE else f"{value} ({ends})"
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: DatasetResult) -> str:
     """What touch tells by the best baseline of each task, beside the mean of the labels."""
     told = []
-    for name, entry in result["tasks"].items():
-        best, test = entry["best"], entry["tests"]["test"]
-        if name == TASKS[-1].name or best is None or "mean" not in test:
+    for name, task in result.tasks.items():
+        mean = task.tests["test"].get("mean")
+        if name == TASKS[-1].name or task.best is None or mean is None:
             continue
-        measure = shown_error(name, entry["unit"])
+        mae = MAE[task.unit]
         told.append(
-            f"{name} {_cell(measure, test, best)} {measure.unit} by {best.replace('_', ' ')} "
-            f"(mean {measure.cell(test['mean'])})"
+            f"{name} {_cell(task, 'test', task.best)} {mae.unit} by {task.best.replace('_', ' ')} "
+            f"(mean {mae.cell(mean)})"
         )
     if not told:
         return "Too few windows to learn from."
@@ -234,13 +270,12 @@ def sentence(result: Mapping[str, Any]) -> str:
 EXPERIMENT = Experiment.of_folder(
     *(__name__, DatasetConfig, run, tables, sentence),
     trials=TRIALS,
-    measures=KIND,
+    result=DatasetResult,
+    row=EpisodeRow,
     names=lambda config: ["README.md", *(f"{kind}.parquet" for kind in config.kinds)],
     files=lambda outcome: files(outcome.config, outcome.by_kind),
     check=lambda config: require_parquet("dataset") and None,
-    failed=lambda result: any(
-        0 < kind["trials"] == kind["invalid"] for kind in result["kinds"].values()
-    ),
+    failed=lambda result: any(0 < kind.trials == kind.invalid for kind in result.kinds.values()),
     parts="episodes",
     captions={
         "dataset": "Mean absolute error of each baseline, by task and split, with its interval "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,9 @@ from matplotlib.figure import Figure
 from antennate import figures as style
 from antennate.experiments.dataset.columns import TASKS
 from antennate.experiments.dataset.config import TESTS
-from antennate.experiments.dataset.estimates import BASELINES
-from antennate.experiments.dataset.experiment import TITLES, DatasetOutcome, shown_error
+from antennate.experiments.dataset.estimates import BASELINES, MAE, Errors, TaskResult
+from antennate.experiments.dataset.experiment import TITLES, DatasetOutcome
+from antennate.studies.columns import Column
 
 _MARKS = {
     "test": ("o", style.INK),
@@ -25,45 +25,39 @@ _MARKS = {
 @style.styled
 def figures(outcome: DatasetOutcome) -> dict[str, Figure]:
     """Errors of the baselines in each task, on the three splits of test."""
-    entries = outcome.result()["tasks"]
-    tasks = [task for task in TASKS if task.name in entries]
+    results = outcome.result().tasks
+    tasks = [task for task in TASKS if task.name in results]
     figure = style.canvas(style.WIDTH, 0.9 + 2.1 * len(tasks))
     panels = np.atleast_1d(np.array(figure.subplots(len(tasks), 1)))
     for panel, task in zip(panels, tasks, strict=True):
-        _draw(panel, task.name, entries[task.name])
+        _draw(panel, results[task.name])
         panel.set_title(task.title)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(TESTS))
     return {"dataset": figure}
 
 
-def _draw(panel: Axes, name: str, entry: Mapping[str, Any]) -> None:
-    measure = shown_error(name, entry["unit"])
-    key = measure.name
-    for i, (split, test) in enumerate(entry["tests"].items()):
+def _draw(panel: Axes, task: TaskResult) -> None:
+    mae = MAE[task.unit]
+    for i, (split, test) in enumerate(task.tests.items()):
         marker, colour = _MARKS[split]
-        rows = [
-            {
-                "value": measure.scale * test[b][key],
-                "ends": _scaled(test[b][f"{key}_95"], measure.scale),
-            }
-            if test.get(b, {}).get("windows")
-            else {}
-            for b in BASELINES
-        ]
-        places = [k + 0.18 * (i - 1) for k in range(len(BASELINES))]
         style.intervals(
             panel,
-            places,
-            rows,
-            ("value", "ends"),
+            [k + 0.18 * (i - 1) for k in range(len(BASELINES))],
+            [_drawn(mae, test.get(baseline)) for baseline in BASELINES],
+            ("mean", "ends"),
             marker=marker,
             color=colour,
             label=TITLES[split],
         )
     style.categories(panel, [b.replace("_", "\n") for b in BASELINES])
-    panel.set(ylabel=f"mean absolute\nerror [{measure.unit}] (95 %)", ylim=(0, None))
+    panel.set(ylabel=f"mean absolute\nerror [{mae.unit}] (95 %)", ylim=(0, None))
 
 
-def _scaled(ends: Any, scale: float) -> Any:
-    return None if ends is None else [scale * end for end in ends]
+def _drawn(mae: Column, errors: Errors | None) -> dict[str, Any]:
+    """Mean absolute error and its interval in the unit shown; None where there is none."""
+    value, ends = mae.value(errors), mae.ends.value(errors)
+    return {
+        "mean": None if value is None else mae.scale * value,
+        "ends": ends and tuple(mae.scale * end for end in ends),
+    }

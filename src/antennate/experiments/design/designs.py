@@ -2,114 +2,147 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from antennate.experiments.design.config import DesignConfig, Objective
+from antennate.experiments.design.config import DesignConfig, Goal, Objective
 from antennate.experiments.design.evaluate import Row
 from antennate.experiments.study import measures
 from antennate.experiments.study.effects import SUCCESS
 from antennate.experiments.study.run import STATUS
 from antennate.experiments.study.subject import OUTCOME
 from antennate.studies import statistics
+from antennate.studies.columns import Ends, column, tabular
 from antennate.studies.plan import Point
 from antennate.types import Bools, Floats
 
-Value = Mapping[str, Any]
-"""`value` of an objective, its interval `value95` (None of few trials), its number of `trials`. The
-value is None if it is that of successes and there are none."""
 State = Literal["ok", "failed", "refused", "unfinished"]
+
+
+@tabular
+class Value:
+    """What a design is worth in an objective."""
+
+    value: float | None = column(interval="value95")
+    """Mean over the trials, or share of successes, and its interval; `null` if it is that of
+    successes and there are none. Fewer than five trials have no interval of a mean."""
+    value95: Ends | None
+    trials: int
+    """Trials behind it."""
 
 
 @dataclass(kw_only=True)
 class Design:
-    """One design, as result.json tells it.
-
-    Attributes:
-        design: Its number in the order of the run.
-        name: That of a reference, else the number.
-        state: Whether it was judged (ok), had too few trials that are ok (failed), could not be
-            configured (refused), or the run was interrupted (unfinished).
-        reason: Why it was refused.
-        front: Whether no other design is better.
-        objectives: Value of each objective by name, None if it was not judged.
-        fresh: The same on fresh seeds, None if it was not validated.
-        fresh_front: Whether of those that were validated none is better on fresh seeds.
-    """
+    """A design: a reference, or one that was proposed."""
 
     design: int
+    """Number in the order of the run."""
     name: str
+    """Name of a reference, else the number."""
     reference: bool
-    state: State = "unfinished"
-    reason: str = ""
+    """Whether it is a reference."""
+    state: State
+    """`ok` if it was judged, `failed` with too few trials that are ok, `refused` if it could not be
+    configured, `unfinished` if the run was interrupted."""
+    reason: str
+    """Why it was refused."""
     values: Point
-    front: bool = False
-    objectives: dict[str, Value] | None = None
-    fresh: dict[str, Value] | None = None
-    fresh_front: bool = False
+    """Value of each parameter that is searched, by dotted name; of a reference those it states."""
+    front: bool
+    """Whether no other design is better, by the trials of the search."""
+    objectives: dict[str, Value] | None
+    """Each objective in the search, by name; `null` if the design was not judged."""
+    fresh: dict[str, Value] | None
+    """Each objective on fresh seeds; `null` if the design was not validated."""
+    fresh_front: bool
+    """Whether none of those that were validated is better on fresh seeds."""
 
 
-@dataclass(frozen=True)
-class DesignOutcome:
-    """All designs and all rows, in order.
+@tabular
+class Aim:
+    """An objective, with its unit."""
 
-    Attributes:
-        designs: The references, then the proposals.
-        rows: One for each trial, all with the same keys.
-        proposed: How many designs were proposed, those among them that came again.
-        repeated: How many came again.
-        optuna: Version of what proposed.
-        interrupted: Whether trials are missing.
-    """
+    name: str
+    """Label of the evaluation and measure, as `wall.success_share`."""
+    goal: Goal
+    """`maximize` or `minimize`."""
+    title: str
+    """What is measured, with the unit shown."""
+    scale: float
+    """Factor from the values of the designs to that unit."""
 
-    config: DesignConfig
-    designs: Sequence[Design]
-    rows: list[Row]
-    proposed: int
-    repeated: int
+
+@tabular
+class DesignResult:
+    """What a search comes to."""
+
+    schema: int = 1
+    command: str = "design"
+    interrupted: bool
+    """Whether trials are missing."""
     optuna: str
-    interrupted: bool = False
+    """Version of Optuna, which proposed the designs."""
+    objectives: list[Aim]
+    """What designs are judged by."""
+    axes: list[str]
+    """Parameters that are searched, by dotted name."""
+    proposed: int
+    """Designs that were proposed, those that came again among them."""
+    repeated: int
+    """Designs among these that came again, and were not run again."""
+    trials: int
+    """Trials that have ended."""
+    statuses: dict[str, int]
+    """Trials of each status."""
+    designs: list[Design]
+    """The references, then the proposals."""
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        statuses = [row[STATUS] for row in self.rows]
-        return {
-            "schema": 1,
-            "command": "design",
-            "interrupted": self.interrupted,
-            "optuna": self.optuna,
-            "objectives": [self._about(objective) for objective in self.config.objectives()],
-            "axes": list(self.config.search),
-            "proposed": self.proposed,
-            "repeated": self.repeated,
-            "trials": len(self.rows),
-            "statuses": {name: statuses.count(name) for name in sorted(set(statuses))},
-            "designs": [asdict(design) for design in self.designs],
-        }
 
-    def _about(self, objective: Objective) -> dict[str, Any]:
-        """What an objective is called, and its unit."""
-        experiment = self.config.evaluate[objective.label].experiment or objective.label
-        measure = measures.measure_of(experiment, objective.column)
-        if objective.of_successes:
-            label = f"{measure.label} (successes only)"
-            measure = dataclasses.replace(measure, label=label)
-        several = len(self.config.evaluate) > 1
-        return {
-            "name": objective.name,
-            "goal": objective.goal,
-            "title": f"{objective.label}: {measure.title}" if several else measure.title,
-            "scale": measure.scale,
-        }
+def summarise(
+    config: DesignConfig,
+    designs: Sequence[Design],
+    rows: Sequence[Row],
+    proposed: int,
+    repeated: int,
+    optuna: str,
+    interrupted: bool,
+) -> DesignResult:
+    """What the designs and the rows of a search come to."""
+    statuses = [row[STATUS] for row in rows]
+    return DesignResult(
+        interrupted=interrupted,
+        optuna=optuna,
+        objectives=[_aim(config, objective) for objective in config.objectives()],
+        axes=list(config.search),
+        proposed=proposed,
+        repeated=repeated,
+        trials=len(rows),
+        statuses={name: statuses.count(name) for name in sorted(set(statuses))},
+        designs=[*designs],
+    )
+
+
+def _aim(config: DesignConfig, objective: Objective) -> Aim:
+    """An objective with what it is called, and its unit."""
+    experiment = config.evaluate[objective.label].experiment or objective.label
+    measure = measures.measure_of(experiment, objective.column)
+    if objective.of_successes:
+        measure = replace(measure, label=f"{measure.label} (successes only)")
+    several = len(config.evaluate) > 1
+    return Aim(
+        name=objective.name,
+        goal=objective.goal,
+        title=f"{objective.label}: {measure.title}" if several else measure.title,
+        scale=measure.scale,
+    )
 
 
 def worth_of(
-    rows: Sequence[Mapping[str, Any]],
+    rows: Sequence[Row],
     objectives: Sequence[Objective],
     least_ok: float,
     bounds: Mapping[str, tuple[float, float, bool]] | None = None,
@@ -125,34 +158,30 @@ def worth_of(
     """
     values_by_name: dict[str, Value] = {}
     for objective in objectives:
-        column = OUTCOME if objective.measure == SUCCESS else objective.column
+        name = OUTCOME if objective.measure == SUCCESS else objective.column
         trials = [row for row in rows if row["evaluation"] == objective.label]
-        needed = OUTCOME if objective.of_successes else column
+        needed = OUTCOME if objective.of_successes else name
         known = [r for r in trials if r[STATUS] == "ok" and r.get(needed) is not None]
         if not known or len(known) < least_ok * len(trials) - 1e-9:
             return None
         if objective.of_successes:
-            known = [r for r in known if r[OUTCOME] == "success" and r.get(column) is not None]
-        values = [row[column] for row in known]
+            known = [r for r in known if r[OUTCOME] == "success" and r.get(name) is not None]
+        values = [row[name] for row in known]
         between = (bounds or {}).get(objective.name, (-math.inf, math.inf, False))
         if not values:
             value, interval = None, None
-        elif column == OUTCOME:
+        elif name == OUTCOME:
             won = sum(outcome == "success" for outcome in values)
             value, interval = won / len(values), statistics.wilson95(won, len(values))
         else:
             value, interval = statistics.mean95(np.array(values, float), *between)
-        values_by_name[objective.name] = {
-            "value": value,
-            "value95": interval,
-            "trials": len(values),
-        }
+        values_by_name[objective.name] = Value(value=value, value95=interval, trials=len(values))
     return values_by_name
 
 
 def small(worth: Mapping[str, Value], objectives: Sequence[Objective]) -> list[float]:
     """Objectives as numbers that shall be small; infinity where there is no value."""
-    values = [(worth[objective.name]["value"], objective.sign) for objective in objectives]
+    values = [(worth[objective.name].value, objective.sign) for objective in objectives]
     return [math.inf if value is None else sign * value for value, sign in values]
 
 

@@ -15,7 +15,6 @@ from antennate.experiments.study.subject import (
     OF_TRIALS,
     OUTCOME,
     Columns,
-    columns_of,
     find,
     nested,
     numbers,
@@ -24,6 +23,7 @@ from antennate.experiments.study.subject import (
 from antennate.messages import nearest, shortened
 from antennate.params.base import Params, put_over
 from antennate.params.faults import group_of
+from antennate.studies.columns import content
 from antennate.studies.experiment import Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
@@ -187,8 +187,8 @@ class Evaluator:
                 f"evaluate.{self.label}.trials: expected none, as {self.name} has no seed, found "
                 f"{self._asked.trials}"
             )
-        if (columns := columns_of(self.name)) is not None:
-            self.require(columns)
+        if self._subject.columns is not None and not self._subject.whole:
+            self.require(self._subject.columns)
 
     def require(self, columns: Columns) -> None:
         """Check that there is a column for each objective, with numbers.
@@ -287,7 +287,7 @@ def run_tasks(tasks: Sequence[Task], emit: Callable[[int, tuple[int, Row]], None
 def _run_whole(task: Task) -> Row:
     """An experiment without trials of its own, as one row: what is judged, or all if that lacks."""
     outcome = experiments.load(task.experiment).run(task.config, Workers(1), no_step, no_row)
-    known = numbers(outcome.result())
+    known = numbers(content(outcome.result()))
     judged = {name: known[name] for name in task.judged if name in known}
     row = judged if len(judged) == len(set(task.judged)) else known
     start = {"seed": task.config.seed} if hasattr(task.config, "seed") else {}

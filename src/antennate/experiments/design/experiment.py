@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from antennate import figures as style
 from antennate.experiments.design.config import DesignConfig
-from antennate.experiments.design.designs import DesignOutcome
+from antennate.experiments.design.designs import Aim, Design, DesignResult, Value
 from antennate.experiments.design.search import check, run
 from antennate.experiments.study import measures
-from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Table, few, shown
+from antennate.studies.columns import NONE, shown
+from antennate.studies.experiment import Done, Experiment
+from antennate.studies.tables import Table, few
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,197 +25,194 @@ if TYPE_CHECKING:
 _MOST = 40
 """Most lines of a table."""
 _GOOD = {"minimize": "small is good", "maximize": "large is good"}
-Entry = Mapping[str, Any]
-"""A design or an objective, as result.json has it."""
 _MOST_PANELS = 6
 _MARKERS = "*^vDsPX<>"
 """The first reference is a star."""
+Worth = Mapping[str, Value]
+"""What a design is worth in each objective, by name."""
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: DesignResult) -> Sequence[Table]:
     """The front beside the references, and both on fresh seeds."""
     return [table for table in (_front(result), _on_fresh_seeds(result)) if table.rows]
 
 
-def _front(result: Mapping[str, Any]) -> Table:
+def _front(result: DesignResult) -> Table:
     """The designs of the front and the references, by the trials of the search."""
-    judged = [design for design in result["designs"] if design["objectives"]]
-    judged = [design for design in judged if design["reference"] or design["front"]]
-    objectives = result["objectives"]
-    names = [_title(objective) for objective in objectives]
+    judged = [
+        (design, design.objectives)
+        for design in result.designs
+        if design.objectives and (design.reference or design.front)
+    ]
+    names = [_title(aim) for aim in result.objectives]
     rows = [
         (
-            f"{design['name']}{' *' if design['front'] else ''}",
+            f"{design.name}{' *' if design.front else ''}",
             [
-                *(measures.text(design["values"].get(axis, NONE)) for axis in result["axes"]),
-                *(_worth(design, "objectives", objective) for objective in objectives),
+                *(measures.text(design.values.get(axis, NONE)) for axis in result.axes),
+                *(_cell(worth[aim.name], aim) for aim in result.objectives),
             ],
         )
-        for design in judged[:_MOST]
+        for design, worth in judged[:_MOST]
     ]
     note = "".join(
-        f"{name}: {_GOOD[o['goal']]}.\n" for name, o in zip(names, objectives, strict=True)
+        f"{name}: {_GOOD[aim.goal]}.\n" for name, aim in zip(names, result.objectives, strict=True)
     )
     note += (
         "* is on the front: no other design is as good in all of these and better in one.\nMeans "
         "with 95 % intervals. The front was chosen by these values, so they are optimistic."
     )
-    so_few = _few(judged, "objectives")
-    if so_few and any(design["fresh"] for design in result["designs"]):
+    so_few = _few(worth for _, worth in judged)
+    if so_few and any(design.fresh for design in result.designs):
         note += f" {so_few}"  # without fresh trials the sentence says it
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
-    heads = [axis.rpartition(".")[2] for axis in result["axes"]]
+    heads = [axis.rpartition(".")[2] for axis in result.axes]
     return Table("The front and the references", [*heads, *names], rows, note)
 
 
-def _on_fresh_seeds(result: Mapping[str, Any]) -> Table:
+def _on_fresh_seeds(result: DesignResult) -> Table:
     """The designs that were run again: in the search, and on fresh seeds."""
     rows: list[tuple[str, list[str]]] = []
-    for design in (design for design in result["designs"] if design["fresh"]):
-        cells: list[str] = []
-        for objective in result["objectives"]:
-            before = design["objectives"][objective["name"]]["value"]
-            in_search = shown(before, ".3g", objective["scale"])
-            cells.append(f"{in_search}, {_worth(design, 'fresh', objective)}")
-        rows.append((f"{design['name']}{' *' if design['fresh_front'] else ''}", cells))
+    for design in result.designs:
+        if design.objectives and design.fresh:
+            cells = [
+                f"{shown(design.objectives[aim.name].value, '.3g', aim.scale)}, "
+                f"{_cell(design.fresh[aim.name], aim)}"
+                for aim in result.objectives
+            ]
+            rows.append((f"{design.name}{' *' if design.fresh_front else ''}", cells))
     note = (
         "Search, then fresh seeds by which nothing was chosen, with the 95 % interval.\n"
         "* is on the front of these designs on fresh seeds."
     )
-    return Table("On fresh seeds", [_title(o) for o in result["objectives"]], rows, note)
+    return Table("On fresh seeds", [_title(aim) for aim in result.objectives], rows, note)
 
 
-def _few(designs: Sequence[Entry], part: str) -> str:
+def _few(worths: Iterable[Worth]) -> str:
     """What is said where a design has few trials."""
-    return few(value["trials"] for design in designs for value in (design[part] or {}).values())
+    return few(value.trials for worth in worths for value in worth.values())
 
 
-def _title(objective: Entry) -> str:
+def _title(aim: Aim) -> str:
     """The label of an evaluation, and what is measured there with its unit."""
-    return f"{objective['name'].partition('.')[0]}: {objective['title']}"
+    label = f"{aim.name.partition('.')[0]}: "
+    return label + aim.title.removeprefix(label)
 
 
-def _worth(design: Entry, part: str, objective: Entry) -> str:
-    """A value of a design in the unit of the title, with its interval if it has one."""
-    value, scale = design[part][objective["name"]], objective["scale"]
-    ends = value["value95"]
-    text = shown(value["value"], ".3g", scale)
-    return f"{text} ({shown(ends, '.3g', scale)})" if ends else text
+def _cell(value: Value, aim: Aim) -> str:
+    """A value in the unit of the title, with its interval if it has one."""
+    text = shown(value.value, ".3g", aim.scale)
+    return f"{text} ({shown(value.value95, '.3g', aim.scale)})" if value.value95 else text
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: DesignResult) -> str:
     """How many designs were compared, and the best ones beside the first reference."""
-    designs = result["designs"]
-    proposed = [design for design in designs if not design["reference"]]
+    designs = result.designs
+    proposed = [design for design in designs if not design.reference]
     text = (
         f"Designs proposed: {len(proposed)}, references: {len(designs) - len(proposed)}, "
-        f"trials: {result['trials']}, on the front: {sum(design['front'] for design in designs)}"
+        f"trials: {result.trials}, on the front: {sum(design.front for design in designs)}"
     )
-    again = [design for design in designs if design["fresh"]]
-    part, known = ("fresh", again) if again else ("objectives", designs)
-    known = [design for design in known if design[part]]
-    first = next((design for design in known if design["reference"]), None)
+    again = [(design, design.fresh) for design in designs if design.fresh]
+    known = again or [(design, design.objectives) for design in designs if design.objectives]
     if known:
-        best = [_best(known, part, objective, first) for objective in result["objectives"]]
+        best = [_best(known, aim) for aim in result.objectives]
         seeds = "fresh seeds" if again else "the seeds of the search, which flatter"
         text += f". Best of each objective on {seeds} (95 % interval): {'; '.join(best)}"
-    if so_few := _few(known, part):
+    if so_few := _few(worth for _, worth in known):
         text += f". {so_few.removesuffix('.')}"
-    text += measures.silent(result["statuses"])
-    lost = sum(design["state"] in ("failed", "refused") for design in designs)
+    text += measures.silent(result.statuses)
+    lost = sum(design.state in ("failed", "refused") for design in designs)
     return text + (f". Designs that could not be judged: {lost}." if lost else ".")
 
 
-def _best(known: Sequence[Entry], part: str, objective: Entry, first: Entry | None) -> str:
+def _best(known: Sequence[tuple[Design, Worth]], aim: Aim) -> str:
     """The best design in an objective, beside the first reference."""
-    name = objective["name"]
-    chosen = min if objective["goal"] == "minimize" else max
-    valued = [design for design in known if design[part][name]["value"] is not None]
+    values = [(design, worth[aim.name]) for design, worth in known]
+    valued = [(design, value) for design, value in values if value.value is not None]
     if not valued:
-        return f"{_title(objective)}: none"
-    best = chosen(valued, key=lambda design: design[part][name]["value"])
-    label = best["name"] if best["reference"] else f"design {best['name']}"
-    text = f"{_title(objective)}: {label} {_worth(best, part, objective)}"
-    if first is not None and first is not best:
-        text += f", {first['name']} {_worth(first, part, objective)}"
+        return f"{_title(aim)}: none"
+    chosen = min if aim.goal == "minimize" else max
+    best, value = chosen(valued, key=lambda each: each[1].value or 0.0)
+    label = best.name if best.reference else f"design {best.name}"
+    text = f"{_title(aim)}: {label} {_cell(value, aim)}"
+    first = next((each for each in values if each[0].reference), None)
+    if first is not None and first[0] is not best:
+        text += f", {first[0].name} {_cell(first[1], aim)}"
     return text
 
 
-def figures(outcome: DesignOutcome) -> dict[str, Figure]:
+def figures(outcome: Done) -> dict[str, Figure]:
     """The trade-off; nothing where no design was judged."""
-    result = outcome.result()
-    return (
-        {"tradeoff": _draw_tradeoff(result)}
-        if any(d["objectives"] for d in result["designs"])
-        else {}
-    )
+    result: DesignResult = outcome.result()
+    judged = any(design.objectives for design in result.designs)
+    return {"tradeoff": _draw_tradeoff(result)} if judged else {}
 
 
 @style.styled
-def _draw_tradeoff(result: Mapping[str, Any]) -> Figure:
+def _draw_tradeoff(result: DesignResult) -> Figure:
     """All designs, the front, the references, and those that were run again with intervals."""
-    objectives = result["objectives"]
-    pairs = list(combinations(objectives, 2))[:_MOST_PANELS] or [(None, objectives[0])]
+    aims = result.objectives
+    pairs = list(combinations(aims, 2))[:_MOST_PANELS] or [(None, aims[0])]
     figure = style.canvas(style.WIDTH, 1.0 + 3.1 * len(pairs))
     panels = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for panel, (x, y) in zip(panels, pairs, strict=True):
-        _draw_pair(panel, result["designs"], x, y)
+        _draw_pair(panel, result.designs, x, y)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
 
-def _draw_pair(panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry) -> None:
-    judged = [design for design in designs if design["objectives"]]
-    proposed = [design for design in judged if not design["reference"]]
-    rest = [design for design in proposed if not design["front"]]
-    best = [design for design in proposed if design["front"]]
+def _draw_pair(panel: Axes, designs: Sequence[Design], x: Aim | None, y: Aim) -> None:
+    judged = [design for design in designs if design.objectives]
+    proposed = [design for design in judged if not design.reference]
+    rest = [design for design in proposed if not design.front]
+    best = [design for design in proposed if design.front]
     _draw_points(panel, rest, x, y, color=style.FAINT, marker="o", label="proposed")
     _draw_points(panel, best, x, y, color=style.SERIES[0], marker="o", label="front, in the search")
-    references = [design for design in judged if design["reference"]]
+    references = [design for design in judged if design.reference]
     looks = zip(style.series(len(references) + 1)[1:], _MARKERS * len(references), strict=False)
     for design, (colour, marker) in zip(references, looks, strict=False):
-        look = {"color": colour, "marker": marker, "label": design["name"], "zorder": 4}
+        look = {"color": colour, "marker": marker, "label": design.name, "zorder": 4}
         _draw_points(panel, [design], x, y, markersize=11 if marker == "*" else 7, **look)
         _draw_fresh(panel, [design], x, y, colour, marker)
-    again = [design for design in best if design["fresh"]]
-    _draw_fresh(panel, again, x, y, style.SERIES[0], "o", label="on fresh seeds, 95 %")
+    _draw_fresh(panel, best, x, y, style.SERIES[0], "o", label="on fresh seeds, 95 %")
     panel.set_xlabel("design" if x is None else _words(x))
     panel.set_ylabel(_words(y))
 
 
 def _draw_points(
-    panel: Axes, designs: Sequence[Entry], x: Entry | None, y: Entry, **look: Any
+    panel: Axes, designs: Sequence[Design], x: Aim | None, y: Aim, **look: Any
 ) -> None:
     if designs:
-        places = [_value(d, x, "objectives") for d in designs]
+        places = [[_value(each, aim, each.objectives) for each in designs] for aim in (x, y)]
         look = {"linestyle": "", "markersize": 5, **look}
-        panel.plot(places, [_value(d, y, "objectives") for d in designs], **look)
+        panel.plot(*places, **look)
 
 
 def _draw_fresh(
     panel: Axes,
-    designs: Sequence[Entry],
-    x: Entry | None,
-    y: Entry,
+    designs: Sequence[Design],
+    x: Aim | None,
+    y: Aim,
     colour: str,
     marker: str,
     **look: Any,
 ) -> None:
     """Open marks with intervals, each joined to its value in the search."""
     for design in designs:
-        if not design["fresh"]:
+        if not design.fresh:
             continue
-        ends = [[_value(design, axis, part) for part in ("objectives", "fresh")] for axis in (x, y)]
+        ends = [
+            [_value(design, aim, worth) for worth in (design.objectives, design.fresh)]
+            for aim in (x, y)
+        ]
         panel.plot(*ends, color=colour, linewidth=0.8, linestyle=(0, (2, 1.5)))
-        whiskers = {
-            "yerr": _whiskers(design, y),
-            "xerr": None if x is None else _whiskers(design, x),
-        }
         panel.errorbar(
             [ends[0][1]],
             [ends[1][1]],
-            **whiskers,
+            yerr=_whiskers(design.fresh[y.name], y),
+            xerr=None if x is None else _whiskers(design.fresh[x.name], x),
             color=colour,
             marker=marker,
             markerfacecolor="white",
@@ -228,29 +226,36 @@ def _draw_fresh(
         look = {}
 
 
-def _whiskers(design: Entry, objective: Entry) -> Any:
-    fresh = design["fresh"][objective["name"]]
-    known = fresh["value95"] if fresh["trials"] >= style.ENOUGH_TRIALS else None
-    value = _value(design, objective, "fresh")
-    low, high = np.array(known) * objective["scale"] if known else (value, value)
+def _whiskers(fresh: Value, aim: Aim) -> Any:
+    value = _scaled(fresh, aim)
+    low, high = value, value
+    if fresh.value95 and fresh.trials >= style.ENOUGH_TRIALS:
+        low, high = np.array(fresh.value95) * aim.scale
     return np.nan_to_num(np.maximum(0.0, [[value - low], [high - value]]))
 
 
-def _value(design: Entry, objective: Entry | None, part: str) -> float:
-    """A value as it is drawn, NaN if there is none."""
-    if objective is None:
-        return design["design"]
-    value = design[part][objective["name"]]["value"]
-    return math.nan if value is None else objective["scale"] * value
+def _value(design: Design, aim: Aim | None, worth: Worth | None) -> float:
+    """A value as it is drawn, NaN if there is none; without an objective the number of a design."""
+    if aim is None:
+        return design.design
+    return _scaled(worth[aim.name], aim) if worth else math.nan
 
 
-def _words(objective: Entry) -> str:
-    better = "small" if objective["goal"] == "minimize" else "large"
-    return f"{objective['title']}\n{better} is good"
+def _scaled(value: Value, aim: Aim) -> float:
+    return math.nan if value.value is None else aim.scale * value.value
+
+
+def _words(aim: Aim) -> str:
+    return f"{aim.title}\n{_GOOD[aim.goal]}"
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, DesignConfig, run, tables, sentence),
+    __name__,
+    DesignConfig,
+    run,
+    tables,
+    sentence,
+    result=DesignResult,
     check=check,
     continued=True,
     figures=figures,

@@ -12,10 +12,10 @@ from antennate.errors import BadInputError, ConfigError
 from antennate.experiments.design.config import Axis, DesignConfig, Goal
 from antennate.experiments.design.designs import (
     Design,
-    DesignOutcome,
     front_of,
     small,
     spread,
+    summarise,
     worth_of,
 )
 from antennate.experiments.design.evaluate import (
@@ -29,7 +29,7 @@ from antennate.experiments.design.evaluate import (
 from antennate.experiments.design.propose import Drawn, Proposal, package, point_of, propose
 from antennate.experiments.study.run import REASON, STATUS, aligned, cells
 from antennate.experiments.study.subject import columns_in
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, OnRow, OnStep, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, chunk_of, gather, workers_from
 from antennate.studies.work import Failure
@@ -86,7 +86,7 @@ def run(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
-) -> DesignOutcome:
+) -> Done:
     """Evaluate the references, search, and validate.
 
     Raises:
@@ -140,7 +140,7 @@ class Search:
         past: list[Proposal] = []
         for drawn, design in self.asked:
             worth = design.objectives
-            values = None if worth is None else [value["value"] for value in worth.values()]
+            values = None if worth is None else [each.value for each in worth.values()]
             past.append(Proposal(drawn, values))
         proposals = self._decided(
             f"proposals.{len(self.asked)}",
@@ -172,19 +172,32 @@ class Search:
         chosen = [self.designs[number] for number in self._decided("validated", choose)]
         self._evaluate(chosen, VALIDATION)
 
-    def outcome(self, interrupted: bool) -> DesignOutcome:
-        """All designs and rows so far."""
+    def outcome(self, interrupted: bool) -> Done:
+        """All rows so far, with the same keys, and what they come to."""
         self._find_front()
-        repeated = len(self.asked) - sum(not design.reference for design in self.designs)
-        counts = (len(self.asked), repeated)
-        version = package().__version__
-        return DesignOutcome(
-            self.config, self.designs, aligned(self.rows), *counts, version, interrupted
+        found = summarise(
+            self.config,
+            self.designs,
+            self.rows,
+            proposed=len(self.asked),
+            repeated=len(self.asked) - sum(not design.reference for design in self.designs),
+            optuna=package().__version__,
+            interrupted=interrupted,
         )
+        return Done(aligned(self.rows), found)
 
     def _design(self, point: Point, name: str, reference: bool) -> Design:
         design = Design(
-            design=len(self.designs), name=name, reference=reference, values=dict(point)
+            design=len(self.designs),
+            name=name,
+            reference=reference,
+            state="unfinished",
+            reason="",
+            values=dict(point),
+            front=False,
+            objectives=None,
+            fresh=None,
+            fresh_front=False,
         )
         self.designs.append(design)
         self.known.setdefault(_key(point), design)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from antennate.jackknife import ENOUGH, jackknife95
+from antennate.studies.columns import column, tabular
 from antennate.types import Floats, Ints
 
 
@@ -37,24 +41,25 @@ class Curve:
         return np.interp(x, self.x, self.y)
 
 
-@dataclass(frozen=True, slots=True)
-class Explained:
-    """How well a prediction serves.
+Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+"""A number that is NaN where it does not exist, which is `null` in result.json."""
 
-    Attributes:
-        n: Points predicted.
-        r2: 1 - sum (y - prediction)^2 / sum (y - mean y)^2: share of variance explained; below 0
-            the prediction is worse than the mean.
-        r2_95: Its 95 % interval over groups; NaN with fewer than `ENOUGH`.
-        rmse: Root mean square error, in the unit of y.
-        groups: How many groups the points are of.
-    """
+
+@tabular
+class Explained:
+    """How well a prediction serves; `null` where nothing is predicted."""
 
     n: int
-    r2: float
-    r2_95: tuple[float, float]
-    rmse: float
+    """Loads or samples predicted, none of which served to fit."""
+    r2: Number = column("R2", interval="r2_95")
+    """Share of the variance explained: 1 - sum (y - prediction)² / sum (y - mean y)², below 0 where
+    the mean predicts better. The interval is over groups, by jackknife and Student's t; both ends
+    are `null` with fewer than five."""
+    r2_95: tuple[Number, Number]
+    rmse: Number
+    """Root mean square error [N]."""
     groups: int
+    """Loads or traverses that these are of."""
 
 
 def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:
@@ -70,7 +75,7 @@ def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:
         groups: What errs as one: the trial of each point, shape (n,).
     """
     if len(truth) == 0:
-        return Explained(0, float("nan"), (float("nan"), float("nan")), float("nan"), 0)
+        return Explained(n=0, r2=math.nan, r2_95=(math.nan, math.nan), rmse=math.nan, groups=0)
     _, where = np.unique(groups, return_inverse=True)
     parts = (np.ones_like(truth), truth, truth**2, (truth - prediction) ** 2)
     sums = np.stack([np.bincount(where, weights=part) for part in parts], axis=1)
@@ -80,8 +85,13 @@ def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:
         low, high = 1.0 - np.exp(jackknife95(np.log(share), np.log(left))[::-1])
     if len(sums) < ENOUGH:
         low = high = np.nan
-    rmse = float(np.sqrt(parts[3].mean()))
-    return Explained(len(truth), float(1.0 - share), (float(low), float(high)), rmse, len(sums))
+    return Explained(
+        n=len(truth),
+        r2=float(1.0 - share),
+        r2_95=(float(low), float(high)),
+        rmse=float(np.sqrt(parts[3].mean())),
+        groups=len(sums),
+    )
 
 
 def _unexplained(sums: Floats) -> Floats:

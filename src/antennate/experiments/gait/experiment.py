@@ -7,29 +7,31 @@ drifts. FORWARD is walked again for numbers that are not known, drawn from their
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antennate.colours import called
 from antennate.experiments.gait.config import GaitStudyConfig, drawn
 from antennate.experiments.gait.optimise import optimise
-from antennate.experiments.gait.physics import (
-    Pace,
-    Walk,
-    measure,
-    rolling_speed,
-    walk_flat,
+from antennate.experiments.gait.physics import Walk, walk_flat
+from antennate.experiments.gait.result import (
+    MANEUVERS,
+    OPTIMISED,
+    WAVE_OFF,
+    GaitResult,
+    Optimised,
+    summarise,
 )
 from antennate.params.control import GaitParams
 from antennate.sim.world import World
-from antennate.studies.experiment import Experiment, OnRow, OnStep, Outcome, no_row, no_step
-from antennate.studies.measures import Measure, Table, shown
+from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, gather
+from antennate.studies.tables import Table
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Maneuver
 
@@ -37,122 +39,16 @@ if TYPE_CHECKING:
     from antennate.telemetry.film import Film
     from antennate.telemetry.view.simulation import SimulationView
 
-MANEUVERS = (Maneuver.FORWARD, Maneuver.TURN_L, Maneuver.TURN_R, Maneuver.REVERSE)
-WAVE_OFF, OPTIMISED = "wave_off", "optimised"
 
-
-@dataclass(frozen=True, slots=True)
-class GaitOutcome(Outcome):
-    """All walks: four maneuvers by name, one without body wave, and the sweep over its lead.
+@dataclass(frozen=True)
+class Walks(Done):
+    """All walks of a run, and what they come to.
 
     Attributes:
-        drawn: FORWARD for each draw of the unknown numbers.
-        ends: FORWARD with each of them alone at its lower and its upper end.
-        optimised: A gait that is best at something by the model, TURN_L where that is turning; None
-            unless asked for.
+        walks: Each walk by its name, the maneuvers first.
     """
 
-    config: GaitStudyConfig
-    maneuvers: dict[str, Walk]
-    wave_off: Walk
-    sweep: list[Walk]
-    drawn: list[Walk]
-    ends: dict[str, tuple[Walk, Walk]]
-    optimised: Walk | None
-
-    def pace(self, walk: Walk) -> Pace:
-        """What a walk of this study comes to."""
-        return measure(walk, self.config.settling_cycles, self.config.cycles)
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        rolling = None
-        if config.robot.legs.kind == "rolling":
-            rolling = rolling_speed(config.gait, config.robot)
-        straight = self.pace(self.wave_off).speed
-        chosen = self.pace(self.maneuvers["forward"]).speed
-        swept = [self.pace(walk) for walk in self.sweep]
-        speeds = [pace.speed for pace in swept]
-        best = max(speeds)
-        return {
-            "schema": 1,
-            "command": "gait",
-            "body_length_m": config.length,
-            "frequency_hz": config.gait.frequency,
-            "maneuvers": {name: self._row(walk) for name, walk in self.maneuvers.items()},
-            "wave_off": {
-                "speed_m_s": straight,
-                "expected_m_s": rolling,
-                "ratio": None if rolling is None else straight / rolling,
-            },
-            "phase_sweep": [
-                {
-                    "body_phase_rad": walk.gait.body_phase,
-                    "speed_m_s": pace.speed,
-                    "body_lengths_per_cycle": pace.body_lengths,
-                }
-                for walk, pace in zip(self.sweep, swept, strict=True)
-            ],
-            "chosen_body_phase_rad": config.gait.body_phase,
-            "best_body_phase_rad": self.sweep[speeds.index(best)].gait.body_phase,
-            "cost_of_phase": {
-                "chosen_over_best": chosen / best,
-                "worst_over_best": min(speeds) / best,
-            },
-            "measured_body_lengths_per_cycle": config.measured,
-            "unknown": self._unknown() if self.drawn else None,
-            "optimised": None if self.optimised is None else self._optimised(self.optimised),
-        }
-
-    def _optimised(self, walk: Walk) -> dict[str, Any]:
-        """The optimised gait beside the one it is compared with."""
-        goal = self.config.optimise
-        name = "turn_l" if goal == "turning" else "forward"
-        rows = {name: self.maneuvers[name], OPTIMISED: walk}
-        return {
-            "goal": goal,
-            "gaits": {
-                name: {
-                    "amplitude_rad": row.gait.amplitude,
-                    "wave_number": row.gait.wave_number,
-                    "body_phase_rad": row.gait.body_phase,
-                    "turn_offset_rad": row.gait.turn_offset if goal == "turning" else None,
-                    **self._row(row),
-                }
-                for name, row in rows.items()
-            },
-        }
-
-    def _unknown(self) -> dict[str, Any]:
-        """What the unknown numbers make of FORWARD, in body lengths a cycle."""
-        lengths = np.array([self.pace(walk).body_lengths for walk in self.drawn])
-        ends = {n: [self.pace(walk).body_lengths for walk in both] for n, both in self.ends.items()}
-        low, median, high = np.percentile(lengths, [2.5, 50.0, 97.5]).tolist()
-        return {
-            "draws": len(lengths),
-            "median": median,
-            "interval95": [low, high],
-            "range": [float(lengths.min()), float(lengths.max())],
-            "body_lengths_per_cycle": lengths.tolist(),
-            "parameters": {
-                one.name: {
-                    "range": [one.low, one.high],
-                    "body_lengths_per_cycle": ends[one.name],
-                    "change": ends[one.name][1] - ends[one.name][0],
-                }
-                for one in self.config.unknowns
-            },
-        }
-
-    def _row(self, walk: Walk) -> dict[str, Any]:
-        pace = self.pace(walk)
-        return {
-            "speed_m_s": pace.speed,
-            "body_lengths_per_cycle": pace.body_lengths,
-            "yaw_deg_per_cycle": math.degrees(pace.yaw),
-            "cost_of_transport": pace.cost_of_transport,
-        }
+    walks: dict[str, Walk]
 
 
 def check(config: GaitStudyConfig) -> None:
@@ -241,7 +137,7 @@ def run(
     on_row: OnRow = no_row,
     view: SimulationView | None = None,
     logs: Path | None = None,
-) -> GaitOutcome:
+) -> Walks:
     """Walk all maneuvers, the one without body wave, the sweep, and the unknown numbers.
 
     With a view they run in this process, one after the other, and give the same. The log of each
@@ -258,126 +154,96 @@ def run(
     else:
         walks = list(_show(tasks, on_step, view, logs))
     by_name = {walk.name: walk for walk in walks}
-    return GaitOutcome(
-        config=config,
-        maneuvers={m.name.lower(): by_name[m.name.lower()] for m in MANEUVERS},
-        wave_off=by_name[WAVE_OFF],
-        sweep=[by_name[f"sweep{i}"] for i in range(config.sweep_points)],
-        drawn=[by_name[f"draw{i}"] for i in range(config.draws) if config.unknown],
-        ends={
-            one.name: (by_name[f"{one.name}:low"], by_name[f"{one.name}:high"])
-            for one in config.unknowns
-        },
-        optimised=by_name.get(OPTIMISED),
-    )
+    return Walks(rows=(), found=summarise(config, by_name), walks=by_name)
 
 
-MANEUVER = (
-    Measure("speed_m_s", "speed", "m/s", form="+.3f"),
-    Measure("body_lengths_per_cycle", "body lengths a cycle", form="+.2f"),
-    Measure("yaw_deg_per_cycle", "yaw a cycle", "deg", form="+.1f"),
-    Measure("cost_of_transport", "cost of transport", form=".3f"),
-)
-
-
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: GaitResult) -> Sequence[Table]:
     """The maneuvers, and what the lead of the body wave is worth."""
-    cost, off = result["cost_of_phase"], result["wave_off"]
-    chosen, best = (math.degrees(result[f"{k}_body_phase_rad"]) for k in ("chosen", "best"))
-    share = "" if off["ratio"] is None else f", {100 * off['ratio']:.0f} % of legs that roll"
+    cost, off = result.cost_of_phase, result.wave_off
+    chosen, best = map(math.degrees, (result.chosen_body_phase_rad, result.best_body_phase_rad))
+    share = "" if off.ratio is None else f", {100 * off.ratio:.0f} % of legs that roll without slip"
     maneuvers = Table.of(
         "Maneuvers",
-        {name.upper(): row for name, row in result["maneuvers"].items()},
-        MANEUVER,
-        f"Body length {result['body_length_m']:g} m, {result['frequency_hz']:g} cycles a second.\n"
-        f"Without the body wave {off['speed_m_s']:z.3f} m/s{share and f'{share} without slip'}.\n"
+        {name.upper(): pace for name, pace in result.maneuvers.items()},
+        note=f"Body length {result.body_length_m:g} m, {result.frequency_hz:g} cycles a second.\n"
+        f"Without the body wave {off.speed_m_s:z.3f} m/s{share}.\n"
         f"The fastest lead tried is {best:.0f} deg. The chosen lead of {chosen:.0f} deg "
-        f"gives {100 * cost['chosen_over_best']:.0f} % of its speed;\n"
-        f"the slowest one gives {100 * cost['worst_over_best']:.0f} %.",
+        f"gives {100 * cost.chosen_over_best:.0f} % of its speed;\n"
+        f"the slowest one gives {100 * cost.worst_over_best:.0f} %.",
     )
-    return (maneuvers, *_optimised_tables(result), *_unknown_tables(result))
+    return (maneuvers, *_optimised_tables(result.optimised), *_unknown_tables(result))
 
 
-_OPTIMISED = (
-    Measure("amplitude_rad", "amplitude", "deg", form=".1f", scale=math.degrees(1.0)),
-    Measure("wave_number", "wave number"),
-    Measure("body_phase_rad", "lead", "deg", form=".0f", scale=math.degrees(1.0)),
-    Measure("turn_offset_rad", "yaw offset", "deg", form=".1f", scale=math.degrees(1.0)),
-    *MANEUVER,
-)
-
-
-def _optimised_tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def _optimised_tables(found: Optimised | None) -> Sequence[Table]:
     """The gait that is best at something by the model, beside the given one."""
-    if (found := result["optimised"]) is None:
+    if found is None:
         return ()
     note = "Chosen by the quasi-static model, walked in the engine; see docs/science/geometry.md."
-    return (Table.of(f"Best {found['goal']}", found["gaits"], _OPTIMISED, note),)
+    return (Table.of(f"Best {found.goal}", found.gaits, note=note),)
 
 
-def _unknown_tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def _unknown_tables(result: GaitResult) -> Sequence[Table]:
     """FORWARD with each unknown number at both ends of its range, and with all of them drawn."""
-    if (unknown := result["unknown"]) is None:
+    if (unknown := result.unknown) is None:
         return ()
     rows = [
         (
             name,
             [
-                *(f"{end:g}" for end in row["range"]),
-                *(f"{end:.2f}" for end in row["body_lengths_per_cycle"]),
+                *(f"{end:g}" for end in each.range),
+                *(f"{end:.2f}" for end in each.body_lengths_per_cycle),
             ],
         )
-        for name, row in unknown["parameters"].items()
+        for name, each in unknown.parameters.items()
     ]
     one = Table(
         "FORWARD with one number changed, body lengths a cycle",
         ("lower end", "upper end", "at the lower", "at the upper"),
         rows,
-        f"As configured {result['maneuvers']['forward']['body_lengths_per_cycle']:.2f}.",
+        f"As configured {result.maneuvers['forward'].body_lengths_per_cycle:.2f}.",
     )
-    every = [
-        ("median", [f"{unknown['median']:.2f}"]),
-        ("95 % of the draws", [shown(unknown["interval95"])]),
-        ("all draws", [shown(unknown["range"])]),
-    ]
-    if (measured := result["measured_body_lengths_per_cycle"]) is not None:
-        every += [("measured on a robot", [f"{measured:.2f}"])]
-        below = sum(value < measured for value in unknown["body_lengths_per_cycle"])
-        every += [("draws below that", [f"{below} of {unknown['draws']}"])]
-    return one, Table("All of them drawn", ("body lengths a cycle",), every)
+    every = Table.of("All of them drawn", {"body lengths a cycle": unknown})
+    if (measured := result.measured_body_lengths_per_cycle) is not None:
+        below = sum(value < measured for value in unknown.body_lengths_per_cycle)
+        more = [
+            ("measured on a robot", [f"{measured:.2f}"]),
+            ("draws below that", [f"{below} of {unknown.draws}"]),
+        ]
+        every = replace(every, rows=[*every.rows, *more])
+    return one, every
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: GaitResult) -> str:
     """Speed and turn of the gait."""
-    forward, left = result["maneuvers"]["forward"], result["maneuvers"]["turn_l"]
-    if (unknown := result["unknown"]) is not None:
-        measured = result["measured_body_lengths_per_cycle"]
-        low, high = unknown["interval95"]
+    forward, left = result.maneuvers["forward"], result.maneuvers["turn_l"]
+    if (unknown := result.unknown) is not None:
+        measured = result.measured_body_lengths_per_cycle
+        low, high = unknown.interval95
         place = ""
         if measured is not None:
             where = "inside" if low <= measured <= high else "outside"
             place = f"; the measured {measured:.2f} is {where}"
         return (
             f"FORWARD walks {low:.2f} to {high:.2f} body lengths a cycle in 95 % of "
-            f"{unknown['draws']} draws of {len(unknown['parameters'])} unknown numbers{place}."
+            f"{unknown.draws} draws of {len(unknown.parameters)} unknown numbers{place}."
         )
     return (
-        f"FORWARD walks at {forward['speed_m_s']:.3f} m/s and TURN_L turns by "
-        f"{left['yaw_deg_per_cycle']:.0f} deg a cycle in simulation{_best(result['optimised'])}. "
+        f"FORWARD walks at {forward.speed_m_s:.3f} m/s and TURN_L turns by "
+        f"{left.yaw_deg_per_cycle:.0f} deg a cycle in simulation{_best(result.optimised)}. "
         "A walk has no random part: a second run gives the same."
     )
 
 
-def _best(optimised: Mapping[str, Any] | None) -> str:
+def _best(found: Optimised | None) -> str:
     """What the optimised gait does, for the sentence; empty without one."""
-    if optimised is None:
+    if found is None:
         return ""
-    row = optimised["gaits"][OPTIMISED]
-    if optimised["goal"] == "turning":
-        return f"; optimised, {row['yaw_deg_per_cycle']:.1f} deg"
-    cost = row["cost_of_transport"]
+    best = found.gaits[OPTIMISED]
+    if found.goal == "turning":
+        return f"; optimised, {best.yaw_deg_per_cycle:.1f} deg"
+    cost = best.cost_of_transport
     at = "" if cost is None else f" at a cost of transport of {cost:.3f}"
-    return f"; optimised for {optimised['goal']}, {row['speed_m_s']:.3f} m/s{at}"
+    return f"; optimised for {found.goal}, {best.speed_m_s:.3f} m/s{at}"
 
 
 def films(config: GaitStudyConfig, trial: int) -> dict[str, Callable[[], Film]]:
@@ -408,7 +274,12 @@ def _record(config: GaitStudyConfig, maneuver: Maneuver) -> Film:
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, GaitStudyConfig, run, tables, sentence),
+    __name__,
+    GaitStudyConfig,
+    run,
+    tables,
+    sentence,
+    result=GaitResult,
     check=check,
     films=films,
     parts="walks",

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.gait.experiment import GaitOutcome
+from antennate.experiments.gait.experiment import Walks
 from antennate.experiments.gait.physics import Walk
+from antennate.experiments.gait.result import GaitResult, UnknownNumbers
 from antennate.types import Maneuver
 
 
-def figures(outcome: GaitOutcome) -> dict[str, Figure]:
+def figures(outcome: Walks) -> dict[str, Figure]:
     """The figures of a run."""
-    result = outcome.result()
-    drawn = {"gait": study(result, outcome.maneuvers)}
-    return drawn if result["unknown"] is None else drawn | {"unknown": unknown(result)}
+    result: GaitResult = outcome.result()
+    drawn = {"gait": study(result, outcome.walks)}
+    if result.unknown is not None:
+        configured = result.maneuvers["forward"].body_lengths_per_cycle
+        measured = result.measured_body_lengths_per_cycle
+        drawn["unknown"] = unknown(result.unknown, configured, measured)
+    return drawn
 
 
 @style.styled
-def study(result: Mapping[str, Any], walks: Mapping[str, Walk]) -> Figure:
+def study(result: GaitResult, walks: Mapping[str, Walk]) -> Figure:
     """The sweep over the lead of the body wave, and the maneuvers from above."""
     figure = style.canvas(style.WIDTH, 7.2)
     sweep, plan = figure.subplots(2, 1)
@@ -33,18 +37,17 @@ def study(result: Mapping[str, Any], walks: Mapping[str, Walk]) -> Figure:
     return figure
 
 
-def _draw_sweep(panel: Axes, result: Mapping[str, Any]) -> None:
-    points = result["phase_sweep"]
-    leads = [math.degrees(point["body_phase_rad"]) for point in points]
-    speeds = [point["speed_m_s"] for point in points]
+def _draw_sweep(panel: Axes, result: GaitResult) -> None:
+    leads = [math.degrees(point.body_phase_rad) for point in result.phase_sweep]
+    speeds = [point.speed_m_s for point in result.phase_sweep]
     colour = style.MANEUVER_COLOURS[Maneuver.FORWARD]
     panel.plot(leads, speeds, color=colour, marker="o", markersize=4, label="with the body wave")
-    off = result["wave_off"]["speed_m_s"]
+    off = result.wave_off.speed_m_s
     panel.axhline(off, color=style.MUTED, linewidth=1.2, linestyle=(0, (4, 2)), label="legs alone")
-    chosen = math.degrees(result["chosen_body_phase_rad"]) % 360.0
+    chosen = math.degrees(result.chosen_body_phase_rad) % 360.0
     panel.plot(
         chosen,
-        result["maneuvers"]["forward"]["speed_m_s"],
+        result.maneuvers["forward"].speed_m_s,
         color=style.INK,
         linestyle="",
         marker="D",
@@ -57,7 +60,7 @@ def _draw_sweep(panel: Axes, result: Mapping[str, Any]) -> None:
         xlim=(-5, 365),
         xlabel="lead of the body wave over the legs [deg]",
         ylabel="speed of FORWARD [m/s]",
-        title=f"Speed at {result['frequency_hz']:g} cycles a second",
+        title=f"Speed at {result.frequency_hz:g} cycles a second",
     )
     top = max([*speeds, off])
     panel.set_ylim(min([0.0, *speeds]) - 0.05 * top, 1.35 * top)
@@ -65,17 +68,17 @@ def _draw_sweep(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.legend(loc="upper left", ncols=2)
 
 
-def _draw_plan(panel: Axes, result: Mapping[str, Any], walks: Mapping[str, Walk]) -> None:
+def _draw_plan(panel: Axes, result: GaitResult, walks: Mapping[str, Walk]) -> None:
     for maneuver, colour in style.MANEUVER_COLOURS.items():
         name = maneuver.name.lower()
         if name not in walks:
             continue
-        row, points = result["maneuvers"][name], walks[name].centre
+        pace, points = result.maneuvers[name], walks[name].centre
         panel.plot(
             *points.T,
             color=colour,
-            label=f"{style.MANEUVER_NAMES[maneuver]}: {row['speed_m_s']:z.2f} m/s, "
-            f"{row['yaw_deg_per_cycle']:z.0f} deg a cycle".replace("-", "−"),
+            label=f"{style.MANEUVER_NAMES[maneuver]}: {pace.speed_m_s:z.2f} m/s, "
+            f"{pace.yaw_deg_per_cycle:z.0f} deg a cycle".replace("-", "−"),
         )
         panel.plot(*points[-1], color=colour, marker="o", markersize=6)
     panel.plot(*next(iter(walks.values())).centre[0], color=style.INK, marker="s", markersize=6)
@@ -88,15 +91,21 @@ def _draw_plan(panel: Axes, result: Mapping[str, Any], walks: Mapping[str, Walk]
 
 
 @style.styled
-def unknown(result: Mapping[str, Any]) -> Figure:
-    """FORWARD over all draws of the unknown numbers, and over each of them alone."""
-    heights = 2.8, 0.36 * len(result["unknown"]["parameters"]) + 1.2
+def unknown(numbers: UnknownNumbers, configured: float, measured: float | None) -> Figure:
+    """FORWARD over all draws of the unknown numbers, and over each of them alone.
+
+    Args:
+        numbers: What is drawn.
+        configured: Body lengths a cycle of the run as configured.
+        measured: Body lengths a cycle of a real robot; None if nobody measured them.
+    """
+    heights = 2.8, 0.36 * len(numbers.parameters) + 1.2
     figure = style.canvas(style.WIDTH, sum(heights))
     draws, alone = figure.subplots(2, 1, height_ratios=heights)
     alone.sharex(draws)
-    _draw_draws(draws, result)
-    _draw_alone(alone, result)
-    measured = result["measured_body_lengths_per_cycle"]
+    _draw_draws(draws, numbers)
+    _draw_alone(alone, numbers)
+    alone.axvline(configured, color=style.MUTED, linewidth=1.0, zorder=1)
     for panel in (draws, alone):
         if measured is not None:
             panel.axvline(measured, color=style.SERIES[4], linestyle=(0, (4, 2)), label="measured")
@@ -105,26 +114,22 @@ def unknown(result: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _draw_draws(panel: Axes, result: Mapping[str, Any]) -> None:
-    unknown_numbers = result["unknown"]
-    panel.hist(
-        unknown_numbers["body_lengths_per_cycle"], bins=20, color=style.SERIES[5], label="draws"
-    )
-    low, high = unknown_numbers["interval95"]
+def _draw_draws(panel: Axes, numbers: UnknownNumbers) -> None:
+    panel.hist(numbers.body_lengths_per_cycle, bins=20, color=style.SERIES[5], label="draws")
+    low, high = numbers.interval95
     panel.axvspan(low, high, color=style.FAINT, alpha=0.5, zorder=0, label="95 % of them")
     panel.set_ylim(0, 1.5 * panel.get_ylim()[1])
-    panel.set(ylabel="draws", title=f"{unknown_numbers['draws']} draws of all unknown numbers")
+    panel.set(ylabel="draws", title=f"{numbers.draws} draws of all unknown numbers")
 
 
-def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
-    rows = result["unknown"]["parameters"]
-    order = sorted(rows, key=lambda name: abs(rows[name]["change"]))
-    for i, name in enumerate(order):
-        low, high = rows[name]["body_lengths_per_cycle"]
+def _draw_alone(panel: Axes, numbers: UnknownNumbers) -> None:
+    order = sorted(numbers.parameters.items(), key=lambda item: abs(item[1].change))
+    for i, (name, each) in enumerate(order):
+        low, high = each.body_lengths_per_cycle
         panel.plot([low, high], [i, i], color=style.INK, linewidth=2.2, zorder=2)
         panel.plot(low, i, "o", color=style.SERIES[0], zorder=3, label="" if i else "lower end")
         panel.plot(high, i, "s", color=style.SERIES[1], zorder=3, label="" if i else "upper end")
-        ends = " to ".join(f"{end:g}" for end in rows[name]["range"])
+        ends = " to ".join(f"{end:g}" for end in each.range)
         panel.annotate(
             f"{name}: {ends}",
             (0.0, i),
@@ -134,8 +139,6 @@ def _draw_alone(panel: Axes, result: Mapping[str, Any]) -> None:
             fontsize=8,
             bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
         )
-    forward = result["maneuvers"]["forward"]["body_lengths_per_cycle"]
-    panel.axvline(forward, color=style.MUTED, linewidth=1.0, zorder=1)
     panel.set_yticks([])
     panel.set_ylim(-0.6, len(order) + 0.6)
     panel.set_title("Each alone;\nthe grey line is the run as configured")

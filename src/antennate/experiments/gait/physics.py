@@ -23,6 +23,7 @@ from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import place_at_start
 from antennate.sim.world import World, compile_world
+from antennate.studies.columns import column, tabular
 from antennate.telemetry.header import Header, log_name
 from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
@@ -86,22 +87,24 @@ class Walk:
     length: float
 
 
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """What a walk comes to over whole cycles.
+@tabular
+class Speed:
+    """How fast a walk is, over whole cycles."""
 
-    Attributes:
-        speed: Mean speed of the centre along the body's mean axis [m/s]; negative is backwards.
-        body_lengths: The same in body lengths per cycle.
-        yaw: Turn of the body per cycle [rad]; positive is to the left.
-        cost_of_transport: Positive mechanical work over weight times distance, or None if it
-            hardly moves.
-    """
+    speed_m_s: float = column("speed", "m/s", form="+.3f")
+    """Mean speed of the centre along the body's mean axis; negative is backwards."""
+    body_lengths_per_cycle: float = column("body lengths a cycle", form="+.2f")
+    """Distance along this axis in body lengths per gait cycle; negative is backwards."""
 
-    speed: float
-    body_lengths: float
-    yaw: float
-    cost_of_transport: float | None
+
+@tabular
+class Pace(Speed):
+    """What a walk comes to over whole cycles."""
+
+    yaw_deg_per_cycle: float = column("yaw a cycle", "deg", form="+.1f")
+    """Turn of the body per gait cycle; positive is to the left."""
+    cost_of_transport: float | None = column("cost of transport", form=".3f")
+    """Positive mechanical work of all servos over weight times distance; `null` near standstill."""
 
 
 def measure(walk: Walk, settling_cycles: int, cycles: int) -> Pace:
@@ -120,9 +123,9 @@ def measure(walk: Walk, settling_cycles: int, cycles: int) -> Pace:
     drag = float(work[1] - work[0]) / cycles / walk.weight
     moves = abs(step) > _STANDSTILL * walk.length
     return Pace(
-        speed=step / period,
-        body_lengths=step / walk.length,
-        yaw=yaw,
+        speed_m_s=step / period,
+        body_lengths_per_cycle=step / walk.length,
+        yaw_deg_per_cycle=math.degrees(yaw),
         cost_of_transport=drag / abs(step) if moves else None,
     )
 

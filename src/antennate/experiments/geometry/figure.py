@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,49 +13,57 @@ from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
 from antennate.experiments.geometry.experiment import GeometryOutcome
-from antennate.experiments.geometry.physics import Walked, columns
+from antennate.experiments.geometry.result import (
+    Agreement,
+    BestLead,
+    Gait,
+    GeometryResult,
+    NamedGait,
+    Turns,
+)
 from antennate.experiments.geometry.torus import Torus
 from antennate.experiments.swimmers import swimmer_figure
 from antennate.mechanics.chain import purcell
 from antennate.mechanics.maps import curvature_map
 from antennate.mechanics.twist import TwistMap
+from antennate.studies.columns import Frame, column_of, frame
 
 _DASHED = (0, (4, 2))
 
 
 def figures(outcome: GeometryOutcome) -> dict[str, Figure]:
     """The figures of a run, and the swimmer; torus and twist map only where legs roll."""
-    result = outcome.result()
+    result: GeometryResult = outcome.result()
     drawn = {
-        "agreement": agreement(outcome.part("random"), result["agreement"]),
-        "leads": leads(result["leads"]),
-        "front": front(outcome.part("front"), result["named"]),
+        "agreement": agreement(
+            frame(row for row in outcome.rows if row.part == "random"), result.agreement
+        ),
+        "leads": leads(result.leads),
+        "front": front(result.front, result.named),
     }
     if outcome.torus is not None:
         drawn["torus"] = torus(outcome.torus, outcome.config.gait.body_phase)
     if outcome.twists is not None:
-        drawn["twists"] = twists(outcome.twists, outcome.part("turn"))
+        drawn["twists"] = twists(outcome.twists, result.turns)
     drawn["swimmer"] = swimmer_figure(curvature_map(purcell()))
     return drawn
 
 
 @style.styled
-def agreement(rows: Sequence[Walked], entry: Mapping[str, Any]) -> Figure:
+def agreement(rows: Frame, found: Agreement) -> Figure:
     """Speed and yaw by the model against those by the engine."""
     figure = style.canvas(style.WIDTH, 8.2)
     speed, yaw = figure.subplots(2, 1)
-    x, y, a, b = columns(
-        rows, "model_speed_m_s", "speed_m_s", "model_yaw_deg_per_cycle", "yaw_deg_per_cycle"
-    )
-    _draw_pair(speed, x, y, "speed [m/s]", entry["speed_r"]["value"])
+    _draw_pair(speed, rows.model_speed_m_s, rows.speed_m_s, "speed [m/s]", found.speed_r.value)
     speed.axvline(
-        entry["rival_speed_m_s"],
+        found.rival_speed_m_s,
         color=style.SERIES[1],
         linestyle=_DASHED,
-        label=f"rival, {entry['rival_speed_m_s']:.3f} m/s for all",
+        label=f"rival, {found.rival_speed_m_s:.3f} m/s for all",
     )
     speed.legend(loc="upper left")
-    _draw_pair(yaw, a, b, "yaw [deg a cycle]", entry["yaw_r"]["value"])
+    turned = rows.model_yaw_deg_per_cycle, rows.yaw_deg_per_cycle
+    _draw_pair(yaw, *turned, "yaw [deg a cycle]", found.yaw_r.value)
     return figure
 
 
@@ -72,54 +80,63 @@ def _draw_pair(panel: Axes, model: Any, engine: Any, what: str, r: float) -> Non
 
 
 @style.styled
-def leads(entries: Sequence[Mapping[str, Any]]) -> Figure:
+def leads(found: Sequence[BestLead]) -> Figure:
     """The best lead over wave numbers."""
     figure = style.canvas(style.WIDTH, 3.8)
     panel = figure.subplots()
-    number = [entry["wave_number"] for entry in entries]
+    number = [lead.wave_number for lead in found]
     looks = {
-        "law_deg": ("law of stiff servos", style.MUTED, "", _DASHED),
-        "model_deg": ("model", style.SERIES[0], "o", "solid"),
-        "engine_deg": ("engine", style.SERIES[1], "s", ""),
+        "law_deg": (style.MUTED, "", _DASHED),
+        "model_deg": (style.SERIES[0], "o", "solid"),
+        "engine_deg": (style.SERIES[1], "s", ""),
     }
-    for name, (label, colour, marker, line) in looks.items():
-        if name in entries[0]:
-            angles = np.degrees(np.unwrap(np.radians([entry[name] for entry in entries])))
+    for name, (colour, marker, line) in looks.items():
+        column = column_of(BestLead, name)
+        degrees = np.array([column.value(lead) for lead in found], float)
+        if np.isfinite(degrees).all():  # lifting legs know no law
+            angles = np.degrees(np.unwrap(np.radians(degrees)))
             mark = marker or ("_" if len(number) == 1 else "")  # one number makes no line
-            panel.plot(number, angles, color=colour, marker=mark, linestyle=line, label=label)
+            look = {"color": colour, "marker": mark, "linestyle": line}
+            panel.plot(number, angles, label=column.label, **look)
     panel.set(xlabel="wave number", ylabel="best lead [deg]", title="Lead that walks fastest")
     panel.legend()
     return figure
 
 
 @style.styled
-def front(rows: Sequence[Walked], named: Sequence[Mapping[str, Any]]) -> Figure:
+def front(gaits: Sequence[Gait], named: Sequence[NamedGait]) -> Figure:
     """Speed and cost of transport of the gaits that may be fast or cheap."""
     figure = style.canvas(style.WIDTH, 5.0)
     panel = figure.subplots()
-    speed, cost, number = columns(rows, "speed_m_s", "cost_of_transport", "wave_number")
+    speed, number = [gait.speed_m_s for gait in gaits], [gait.wave_number for gait in gaits]
+    cost, own = (
+        np.array([gait.cost_of_transport for gait in some], float) for some in (gaits, named)
+    )
     dots = panel.scatter(speed, cost, c=number, cmap="viridis", s=18, label="largest amplitude")
-    for row, colour, marker in zip(
-        named, ("#D55E00", "#CC79A7", "#222222", "#E69F00") * 9, "*D^vPX", strict=False
+    for gait, height, colour, marker in zip(
+        named, own, ("#D55E00", "#CC79A7", "#222222", "#E69F00") * 9, "*D^vPX", strict=False
     ):
         panel.plot(
-            *(row["speed_m_s"], row["cost_of_transport"]),
+            gait.speed_m_s,
+            height,
             color=colour,
             marker=marker,
             markersize=11 if marker == "*" else 7,
             linestyle="",
-            label=row["name"],
+            label=gait.name,
             markeredgecolor="white",
         )
-    panel.axhline(named[0]["cost_of_transport"], color=style.MUTED, linewidth=0.8)
-    panel.axvline(named[0]["speed_m_s"], color=style.MUTED, linewidth=0.8)
+    panel.axhline(own[0], color=style.MUTED, linewidth=0.8)
+    panel.axvline(named[0].speed_m_s, color=style.MUTED, linewidth=0.8)
     panel.set(
-        xlabel="speed [m/s]", ylabel="cost of transport", title="Engine; right and low is good"
+        xlabel=column_of(Gait, "speed_m_s").title,
+        ylabel=column_of(Gait, "cost_of_transport").title,
+        title="Engine; right and low is good",
     )
-    own = [row["cost_of_transport"] or math.nan for row in named]
     low, high = np.nanmin([*cost, *own]), np.nanmax([np.nanpercentile(cost, 75), *own])
     panel.set_ylim(0.9 * low, 1.25 * high)
-    figure.colorbar(dots, ax=panel, label="wave number", location="bottom", shrink=0.7)
+    waves = column_of(Gait, "wave_number").title
+    figure.colorbar(dots, ax=panel, label=waves, location="bottom", shrink=0.7)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return figure
 
@@ -165,7 +182,7 @@ def torus(motion: Torus, lead: float) -> Figure:
 
 
 @style.styled
-def twists(table: TwistMap, rows: Sequence[Walked]) -> Figure:
+def twists(table: TwistMap, turns: Turns | None) -> Figure:
     """The twist map, and wanted twists as the engine walked them."""
     figure = style.canvas(style.WIDTH, 8.4)
     panel, walked = figure.subplots(2, 1)
@@ -183,10 +200,9 @@ def twists(table: TwistMap, rows: Sequence[Walked]) -> Figure:
         ylabel="forward speed [m/s]",
         title="Amplitudes (at the left) and offsets (below) of the map",
     )
-    if rows:
-        bend, speed = columns(rows, "wanted_per_m", "speed_m_s")
-        (wanted,) = columns(rows, "wanted_m_s")
-        curvature = np.array([row.curvature for row in rows])
+    if turns is not None:
+        bend, wanted = turns.wanted_per_m, turns.wanted_m_s
+        curvature, speed = turns.curvature_per_m, turns.speed_m_s
         for ends in zip(bend, curvature, wanted, speed, strict=True):
             walked.plot(ends[:2], ends[2:], color=style.MUTED, linewidth=1.0)
         walked.plot(bend, wanted, "o", color="none", markeredgecolor=style.INK, label="wanted")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.physics import measure, walk_flat
+from antennate.experiments.geometry.result import Walked
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.gaits import GAITS, GaitParams
@@ -111,45 +112,6 @@ class GeometryConfig(Params):
         widest = self.gait.model_copy(update={"amplitude": self.largest})
         require_wave(self.robot, widest)
         return self
-
-
-@dataclass(frozen=True, slots=True)
-class Walked:
-    """One gait by model and engine.
-
-    Attributes:
-        part: Why it was walked: random, lead, front, named or turn.
-        trial: Its number within the part.
-        name: Of a gait that is known by name, else empty.
-        model_yaw_deg_per_cycle: Positive to the left, as `yaw_deg_per_cycle`.
-        model_cost: Work against friction over weight and distance.
-        cost_of_transport: Positive work of all servos over weight and distance, None if the robot
-            hardly moves.
-        wanted_m_s: Speed that the map was asked for, None without one; `wanted_per_m` likewise.
-    """
-
-    part: str
-    trial: int
-    name: str
-    amplitude_rad: float
-    wave_number: float
-    lead_rad: float
-    offset_rad: float
-    frequency_hz: float
-    model_speed_m_s: float
-    model_yaw_deg_per_cycle: float
-    model_cost: float
-    model_torque_n_m: float
-    speed_m_s: float
-    yaw_deg_per_cycle: float
-    cost_of_transport: float | None
-    wanted_m_s: float | None = None
-    wanted_per_m: float | None = None
-
-    @property
-    def curvature(self) -> float:
-        """Yaw over distance as walked [1/m]."""
-        return math.radians(self.yaw_deg_per_cycle) * self.frequency_hz / self.speed_m_s
 
 
 def random_waves(config: GeometryConfig) -> Wave:
@@ -278,9 +240,6 @@ def _modelled(
             model_yaw_deg_per_cycle=yaw[i],
             model_cost=float(walked.cost[i]),
             model_torque_n_m=float(walked.torque[i]),
-            speed_m_s=math.nan,
-            yaw_deg_per_cycle=math.nan,
-            cost_of_transport=None,
         )
         for i in range(len(yaw))
     ]
@@ -320,12 +279,7 @@ def walk(config: GeometryConfig, row: Walked) -> Walked:
     )
     return replace(
         row,
-        speed_m_s=pace.speed,
-        yaw_deg_per_cycle=math.degrees(pace.yaw),
+        speed_m_s=pace.speed_m_s,
+        yaw_deg_per_cycle=pace.yaw_deg_per_cycle,
         cost_of_transport=pace.cost_of_transport,
     )
-
-
-def columns(rows: Sequence[Walked], *names: str) -> Any:
-    """Columns of rows as arrays, NaN for None."""
-    return [np.array([getattr(row, name) for row in rows], float) for name in names]

@@ -20,7 +20,7 @@ from antennate.experiments.reproduce.verdict import (
     lead,
     share_of,
 )
-from antennate.studies.measures import shown
+from antennate.studies.columns import shown
 
 _ROUNDING = 0.0005
 """Half of the last digit of the paper's stiffnesses [N·mm/deg]."""

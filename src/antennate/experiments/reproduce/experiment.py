@@ -8,11 +8,9 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from typing import Any, Literal
 
 from antennate import experiments
 from antennate.experiments import FITTED, fitted
@@ -25,17 +23,14 @@ from antennate.experiments.reproduce.verdict import (
     Finding,
     Row,
 )
-from antennate.figures import INK, SERIES, canvas, styled
 from antennate.messages import command_words
 from antennate.params.base import Params, number, put_over, read_file
 from antennate.params.control import ConditioningParams
+from antennate.studies.columns import content, tabular
 from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
-from antennate.studies.measures import Table
 from antennate.studies.pool import Workers, workers_from
 from antennate.studies.run_files import REPORT
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from antennate.studies.tables import Table
 
 CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)
 """All claims, in the order of the page."""
@@ -76,8 +71,9 @@ _LOOK = {
     "not_reproduced": "bad",
     "undecided": "muted",
 }
-_WIDE = 100.0
-"""Numbers that span more than this are drawn on a logarithmic axis."""
+
+
+Setting = Literal["default", "fitted"]
 
 
 class ReproduceConfig(Params):
@@ -85,10 +81,31 @@ class ReproduceConfig(Params):
 
     quick: bool = number(False, "1", "assumed: all trials")
     """Few trials: minutes in place of half an hour, and wider intervals."""
-    setting: Literal["default", "fitted"] = number("default", "1", "assumed: as anybody runs them")
+    setting: Setting = number("default", "1", "assumed: as anybody runs them")
     """Numbers that the paper does not give: our defaults, or fitted to it where a part has some."""
     seed: int = number(7, "1", "assumed: any; nothing was chosen on it", ge=0)
     """Seed of all chance, in every experiment."""
+
+
+@tabular
+class ReproduceResult:
+    """What a run comes to."""
+
+    schema: int = 1
+    command: str = "reproduce"
+    quick: bool
+    """Whether there were few trials."""
+    setting: Setting
+    """Numbers that the paper does not give: `default`, or `fitted` to it where a part has some."""
+    seed: int
+    """Seed of all chance."""
+    interrupted: bool
+    """Whether claims are missing because it was stopped."""
+    verdicts: dict[str, int]
+    """Claims with each verdict: `reproduced`, `conditional`, `fitted`, `not_reproduced` and
+    `undecided`."""
+    claims: list[Row]
+    """Each claim that was judged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,25 +121,29 @@ class ReproduceOutcome:
         """One row a claim."""
         return [
             Row(
-                *(c.claim, c.criterion, c.rival, c.paper, f.ours, c.verdict(f)),
-                *(c.reason(f), command(c.experiment, self.config)),
+                claim=claim.claim,
+                criterion=claim.criterion,
+                rival=claim.rival,
+                paper=claim.paper,
+                ours=finding.ours,
+                verdict=claim.verdict(finding),
+                reason=claim.reason(finding),
+                command=command(claim.experiment, self.config),
             )
-            for c, f in self.judged
+            for claim, finding in self.judged
         ]
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+    def result(self) -> ReproduceResult:
+        """What they come to."""
         counts = Counter(row.verdict for row in self.rows)
-        return {
-            "schema": 1,
-            "command": "reproduce",
-            "quick": self.config.quick,
-            "setting": self.config.setting,
-            "seed": self.config.seed,
-            "interrupted": self.interrupted,
-            "verdicts": {name: counts[name] for name in VERDICTS},
-            "claims": [asdict(row) for row in self.rows],
-        }
+        return ReproduceResult(
+            quick=self.config.quick,
+            setting=self.config.setting,
+            seed=self.config.seed,
+            interrupted=self.interrupted,
+            verdicts={name: counts[name] for name in VERDICTS},
+            claims=self.rows,
+        )
 
 
 def claims(config: ReproduceConfig) -> tuple[Claim, ...]:
@@ -205,7 +226,8 @@ def run(
 
         setting = configured(name, config)
         try:
-            result = experiment.run(setting, workers_from(workers), step, no_row).result()
+            outcome = experiment.run(setting, workers_from(workers), step, no_row)
+            result = content(outcome.result())
         except KeyboardInterrupt:
             result = {"interrupted": True}
         if result.get("interrupted"):
@@ -220,45 +242,42 @@ def run(
     return ReproduceOutcome(config, tuple(judged), interrupted=False)
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: ReproduceResult) -> Sequence[Table]:
     """All claims with their verdicts."""
     rows = [
-        (
-            row["claim"],
-            [row.get("criterion", ""), row["paper"], row["ours"], VERDICTS[row["verdict"]]],
-        )
-        for row in result["claims"]
+        (row.claim, [row.criterion, row.paper, row.ours, VERDICTS[row.verdict]])
+        for row in result.claims
     ]
-    note = f"Reasons and figures: {REPORT}. Seed {result['seed']}{_with(result)}."
+    note = f"Reasons and figures: {REPORT}. Seed {result.seed}{_with(result)}."
     return (Table("Claims", ["criterion", "paper", "ours", "verdict"], rows, note),)
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: ReproduceResult) -> str:
     """How many claims hold."""
-    few = " With --quick the intervals are wide." if result["quick"] else ""
-    unjudged = len(CLAIMS) - len(result["claims"])
+    few = " With --quick the intervals are wide." if result.quick else ""
+    unjudged = len(CLAIMS) - len(result.claims)
     left = f", {unjudged} not judged" if unjudged else ""
     return f"Of {len(CLAIMS)} claims{_with(result)}: {_counts(result)}{left}.{few}"
 
 
-def _with(result: Mapping[str, Any]) -> str:
+def _with(result: ReproduceResult) -> str:
     """With which numbers, if these are not our defaults."""
-    fits = result.get("setting") == FITTED
+    fits = result.setting == FITTED
     return ", with numbers fitted to the paper where a part has some" if fits else ""
 
 
-def _counts(result: Mapping[str, Any]) -> str:
+def _counts(result: ReproduceResult) -> str:
     """How many claims have each verdict."""
-    return ", ".join(f"{result['verdicts'].get(n, 0)} {text}" for n, text in VERDICTS.items())
+    return ", ".join(f"{result.verdicts.get(name, 0)} {text}" for name, text in VERDICTS.items())
 
 
-def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
+def body(result: ReproduceResult, figures: Mapping[str, str]) -> str:
     """HTML of a result, with the figure of each claim by its name."""
     summary = _counts(result)
-    how = "few trials (--quick)" if result["quick"] else "all trials"
+    how = "few trials (--quick)" if result.quick else "all trials"
     names = {claim.claim: claim for claim in CLAIMS}
     words = "".join(f"<dt>{VERDICTS[name]}</dt><dd>{MEANINGS[name]}</dd>" for name in VERDICTS)
-    rows = [(row, names.get(row["claim"])) for row in result["claims"]]
+    rows = [(row, names.get(row.claim)) for row in result.claims]
     index = "".join(_line(row, claim.name if claim else "") for row, claim in rows)
     sections = "".join(
         _section(row, claim.name, _as_judged(claim, row).rule, figures.get(claim.name, ""))
@@ -270,7 +289,7 @@ def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
         "<p>A Robust Antenna Provides Tactile Feedback in a Multi-legged Robot, "
         "arXiv:2603.07795, beside what antennate finds in simulation. Claims are in our words.</p>"
         f"<p><strong>{summary}.</strong></p>"
-        f'<p class="muted">{how}, seed {result["seed"]}{_with(result)}. '
+        f'<p class="muted">{how}, seed {result.seed}{_with(result)}. '
         f"Intervals are 95 %.</p><dl>{words}</dl>"
         "<table><thead><tr><th>claim</th><th class=wide>criterion</th><th class=wide>paper</th>"
         "<th class=wide>ours</th>"
@@ -278,79 +297,41 @@ def body(result: Mapping[str, Any], figures: Mapping[str, str]) -> str:
     )
 
 
-def _as_judged(claim: Claim, row: Mapping[str, Any]) -> Claim:
+def _as_judged(claim: Claim, row: Row) -> Claim:
     """The claim with what it could be at best in a row of a result."""
-    return claim.when_fitted() if f"--config {FITTED}" in row["command"] else claim
+    return claim.when_fitted() if f"--config {FITTED}" in row.command else claim
 
 
-def _verdict(row: Mapping[str, Any]) -> str:
+def _verdict(row: Row) -> str:
     """A verdict in its colour."""
-    verdict = row["verdict"]
-    return f'<span class="{_LOOK[verdict]}">{VERDICTS[verdict]}</span>'
+    return f'<span class="{_LOOK[row.verdict]}">{VERDICTS[row.verdict]}</span>'
 
 
-def _line(row: Mapping[str, Any], name: str) -> str:
+def _line(row: Row, name: str) -> str:
     """A line of the table, which leads to the claim's section."""
     return (
-        f'<tr><td><a href="#{name}">{escape(row["claim"])}</a></td>'
-        f"<td class=wide>{escape(row.get('criterion', ''))}</td>"
-        f"<td class=wide>{escape(row['paper'])}</td><td class=wide>{escape(row['ours'])}</td>"
+        f'<tr><td><a href="#{name}">{escape(row.claim)}</a></td>'
+        f"<td class=wide>{escape(row.criterion)}</td>"
+        f"<td class=wide>{escape(row.paper)}</td><td class=wide>{escape(row.ours)}</td>"
         f"<td>{_verdict(row)}</td></tr>"
     )
 
 
-def _section(row: Mapping[str, Any], name: str, rule: str, figure: str) -> str:
+def _section(row: Row, name: str, rule: str, figure: str) -> str:
     """All that is said of a claim, with its figure."""
     facts = {
         "criterion": escape(rule),
-        "paper": escape(row["paper"]),
-        "ours": escape(row["ours"]),
+        "paper": escape(row.paper),
+        "ours": escape(row.ours),
         "verdict": _verdict(row),
-        "why": escape(row["reason"]),
+        "why": escape(row.reason),
     }
     words = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in facts.items())
     return (
-        f'<section id="{name}"><h2>{escape(row["claim"])}</h2>'
+        f'<section id="{name}"><h2>{escape(row.claim)}</h2>'
         f"<dl>{words}</dl>"
-        f"<div>{figure}<p><code>{escape(row['command'])}</code></p></div></section>"
+        f"<div>{figure}<p><code>{escape(row.command)}</code></p></div></section>"
     )
-
-
-def figures(outcome: ReproduceOutcome) -> Mapping[str, Figure]:
-    """One figure a claim, by its name."""
-    return {claim.name: draw(claim, finding) for claim, finding in outcome.judged}
-
-
-@styled
-def draw(claim: Claim, finding: Finding) -> Figure:
-    """Dots with their intervals, the first at the top; the paper's are drawn hollow."""
-    bars = finding.bars
-    figure = canvas(5.2, 0.65 + 0.28 * len(bars))
-    panel = figure.subplots()
-    for place, bar in enumerate(bars):
-        colour = INK if bar.label.startswith("paper") else SERIES[0]
-        if bar.interval is not None:
-            panel.plot(bar.interval, (place, place), color=colour, linewidth=1.4)
-        face = "white" if bar.label.startswith("paper") else colour
-        panel.plot(bar.value, place, "o", color=colour, markerfacecolor=face, markersize=6)
-        panel.annotate(
-            f"{bar.value:,.0f}" if bar.value >= 1000 else f"{bar.value:.3g}",
-            (bar.value, place),
-            (0, 5),
-            textcoords="offset points",
-            ha="center",
-        )
-    values = np.array([bar.value for bar in bars])
-    if len(values) and (values > 0).all() and values.max() > _WIDE * values.min():
-        panel.set_xscale("log")
-    elif (values >= 0).all():
-        panel.set_xlim(left=min(0.0, *panel.get_xlim()))
-    panel.margins(x=0.08)
-    panel.set_yticks(range(len(bars)), [bar.label for bar in bars])
-    panel.set_ylim(len(bars) - 0.4, -0.75)
-    panel.set_xlabel(claim.unit)
-    panel.grid(visible=False, axis="y")
-    return figure
 
 
 EXPERIMENT = Experiment.of_folder(
@@ -359,7 +340,8 @@ EXPERIMENT = Experiment.of_folder(
     run,
     tables,
     sentence,
-    figures=figures,
+    result=ReproduceResult,
+    row=Row,
     body=body,
     captions={claim.name: f"{claim.claim}." for claim in CLAIMS},
     parts="% of 9 experiments",

@@ -26,7 +26,7 @@ from antennate.experiments.reproduce.verdict import (
     share_of,
 )
 from antennate.params.spring import SpringParams
-from antennate.studies.measures import shown
+from antennate.studies.columns import shown
 from antennate.studies.statistics import wilson95
 
 _OPEN = "open"

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
+from antennate.studies.columns import Ends, tabular
 from antennate.studies.statistics import wilson95
 
 Verdict = Literal["reproduced", "conditional", "fitted", "not_reproduced", "undecided"]
@@ -28,8 +29,6 @@ ENOUGH_TO_STAY = 20
 """Trials from which a largest value that stays below a limit says something: the paper's number."""
 _Z95 = 1.959963984540054
 """The 97.5 % quantile of the normal distribution."""
-Ends = tuple[float, float]
-"""Lower and upper end of a 95 % interval."""
 
 
 def above(interval: Ends | None, limit: float) -> bool | None:
@@ -216,15 +215,24 @@ def claim(
     return made
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Row:
-    """A judged claim: a row of claims.csv and of `claims` in result.json."""
+    """A judged claim, all text."""
 
     claim: str
+    """What is claimed, in our words."""
     criterion: str
+    """What has to hold, stated before the result."""
     rival: str
+    """What would meet the claim without its being true, stated before the result."""
     paper: str
+    """Numbers of the paper."""
     ours: str
+    """Our numbers."""
     verdict: Verdict
+    """One of the five verdicts."""
     reason: str
+    """Why it is this one."""
     command: str
+    """Command that runs the experiment behind it alone; with `--config fitted` where numbers that
+    the paper does not give were fitted to it."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -14,78 +14,36 @@ from pydantic import Field
 from antennate import figures as style
 from antennate.antenna.dynamics import LinearChain, Mode, cone_ratio, fitted_mode, least_damping
 from antennate.experiments.bench import bench_films
+from antennate.experiments.ringdown.result import (
+    ANIMAL_CYCLE,
+    ANIMALS,
+    REJECTED,
+    Animal,
+    Cone,
+    Difference,
+    EngineSwing,
+    OtherSwing,
+    RingdownResult,
+    Swing,
+)
 from antennate.params.base import Params, number, paths_of, read_file
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import MOST_HINGES, AntennaSpec, SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
+from antennate.studies.columns import columns, content
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.measures import Measure, Table, shown
+from antennate.studies.tables import Table
 from antennate.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-REJECTED = 0.9
-"""Share of a deflection that a cockroach's antenna has lost after one cycle (Mongeau 2014)."""
-ANIMAL_CYCLE = 0.05
-"""How long that cycle takes [s]; same source."""
 _Hinges = Annotated[int, Field(ge=2, le=1000)]
 _OF_THE_SENSOR = tuple(
     path for path in paths_of(SensorParams, "antenna.sensor") if "active_length" not in path
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Animal:
-    """What was measured on an animal's antenna or whisker.
-
-    Attributes:
-        source: Where it was read.
-        natural_hz: Lowest and highest frequency [Hz], None where no number was published.
-        damping: Lowest and highest damping ratio, None where no number was published.
-        finding: What was found, in words.
-    """
-
-    name: str
-    source: str
-    natural_hz: tuple[float, float] | None
-    damping: tuple[float, float] | None
-    finding: str
-
-
-ANIMALS = (
-    Animal(
-        "rat whisker",
-        "Hartmann 2003, PMC6740620",
-        (27.0, 260.0),
-        (0.11, 0.17),
-        "first mode, the faster the shorter",
-    ),
-    Animal(
-        "cockroach antenna",
-        "Mongeau 2014, J. Exp. Biol. 217:3333",
-        (1 / ANIMAL_CYCLE, 1 / ANIMAL_CYCLE),
-        (least_damping(1 - REJECTED), 1.0),
-        "over 90 % rejected in the first cycle of about 50 ms; so damping is .34 or more",
-    ),
-    Animal(
-        "cricket antenna",
-        "J. Exp. Biol. 228(9), jeb249243",
-        (11.0, 30.0),
-        (1.0, 1.0),
-        "about 11 Hz bent, resonance at 30 Hz, near critical damping",
-    ),
-    Animal(
-        "stick insect antenna",
-        "rian.ie/94390",
-        None,
-        None,
-        "does not swing; slower at the base",
-    ),
-)
-"""Facts of other people's measurements, from their abstracts."""
 
 
 class RingdownConfig(Params):
@@ -119,52 +77,16 @@ class RingdownOutcome(Outcome):
     Attributes:
         t: Times [s], shape (m,).
         tip: Sideways place of the tip over that at the start, shape (m,).
-        engine: First mode fitted to the engine's ring-down.
-        first: The same of the chain.
-        modes: All modes of the chain, the slowest first.
-        beside: First modes of the chains of other antennae, by the names of their files.
+        found: The result.
     """
 
-    config: RingdownConfig
     t: Floats
     tip: Floats
-    engine: Mode
-    first: Mode
-    modes: list[Mode]
-    beside: dict[str, Mode]
+    found: RingdownResult
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        chain, engine = self.first, self.engine
-        return {
-            "schema": 1,
-            "command": "ringdown",
-            "engine": _mode(engine) | {"rejected": self.rejected(engine.cycle)},
-            "chain": _mode(chain),
-            "difference": {
-                "natural_hz": engine.natural_hz / chain.natural_hz - 1,
-                "damping": engine.damping / chain.damping - 1,
-            },
-            "rejected_in_animal_cycle": self.rejected(ANIMAL_CYCLE),
-            "animal_damping": least_damping(1 - REJECTED),
-            "modes": [_mode(mode) for mode in self.modes],
-            "beside": [{"name": name, **_mode(mode)} for name, mode in self.beside.items()],
-            "cones": [{"hinges": n, "ratio": cone_ratio(n)} for n in self.config.cone_hinges],
-            "animals": [asdict(animal) for animal in ANIMALS],
-        }
-
-    def rejected(self, since: float) -> float:
-        """Share of the deflection that the tip has lost for good after a time [s]."""
-        return float(1.0 - abs(self.tip[self.t >= since]).max())
-
-
-def _mode(mode: Mode) -> dict[str, float]:
-    return {
-        "natural_hz": mode.natural_hz,
-        "swing_hz": mode.swing_hz,
-        "damping": mode.damping,
-        "cycle_s": mode.cycle,
-    }
+    def result(self) -> RingdownResult:
+        """The modes, and what is compared with them."""
+        return self.found
 
 
 def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
@@ -178,9 +100,34 @@ def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
         Path(name).stem.replace("_", " "): read_file(Path(name), RobotSpec).antenna
         for name in config.beside
     }
-    antenna, timestep = config.antenna, config.physics.timestep
-    chain = LinearChain.of(antenna)
+    chain = LinearChain.of(config.antenna)
     mode = chain.first_mode()
+    t, tip, engine = _let_go(config, chain, mode, watch)
+    found = RingdownResult(
+        engine=EngineSwing.of(engine, rejected=_rejected(t, tip, engine.cycle)),
+        chain=Swing.of(mode),
+        difference=Difference(
+            natural_hz=engine.natural_hz / mode.natural_hz - 1,
+            damping=engine.damping / mode.damping - 1,
+        ),
+        rejected_in_animal_cycle=_rejected(t, tip, ANIMAL_CYCLE),
+        animal_damping=least_damping(1 - REJECTED),
+        modes=[Swing.of(each) for each in chain.modes()],
+        beside=[
+            OtherSwing.of(LinearChain.of(other).first_mode(), name=name)
+            for name, other in others.items()
+        ],
+        cones=[Cone(hinges=n, ratio=cone_ratio(n)) for n in config.cone_hinges],
+        animals=list(ANIMALS),
+    )
+    return RingdownOutcome(t, tip, found)
+
+
+def _let_go(
+    config: RingdownConfig, chain: LinearChain, mode: Mode, watch: Watch
+) -> tuple[Floats, Floats, Mode]:
+    """Times [s], places of the tip, both shape (m,), and the first mode, all in the engine."""
+    antenna, timestep = config.antenna, config.physics.timestep
     bench = Bench(compile_bench(config.physics, antenna), antenna)
     bench.place(0.0, 0.0, 0.0)
     bench.bend(config.deflection * chain.pushed_at_tip())
@@ -192,69 +139,54 @@ def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
         angles[tick], speeds[tick] = bench.chain()
         tip[tick] = bench.tip()[1]
         bench.step(1)
-    beside = {name: LinearChain.of(other).first_mode() for name, other in others.items()}
     t = np.linspace(0.0, ticks * timestep, ticks + 1)
-    engine = fitted_mode(mode, t, angles, speeds)
-    return RingdownOutcome(config, t, tip / tip[0], engine, mode, chain.modes(), beside)
+    return t, tip / tip[0], fitted_mode(mode, t, angles, speeds)
 
 
-MODE = (
-    Measure("natural_hz", "frequency without damping", "Hz", form=".3f"),
-    Measure("swing_hz", "frequency of the swing", "Hz", form=".3f"),
-    Measure("damping", "damping ratio", form=".3f"),
-    Measure("cycle_s", "one cycle", "ms", form=".0f", scale=1e3),
-    Measure("rejected", "rejected in the first cycle", "%", form=".1f", scale=100.0),
-)
-ANIMAL = (
-    Measure("natural_hz", "frequency", "Hz", form=".0f"),
-    Measure("damping", "damping ratio"),
-)
+def _rejected(t: Floats, tip: Floats, since: float) -> float:
+    """Share of the deflection that the tip has lost for good after a time [s]."""
+    return float(1.0 - abs(tip[t >= since]).max())
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: RingdownResult) -> Sequence[Table]:
     """The first mode twice, chains beside a cone, and animals."""
-    difference = result["difference"]
-    swings = {"engine": result["engine"], "chain": result["chain"]}
-    swings |= {f"chain of {row['name']}": row for row in result.get("beside", ())}
+    swings = {"engine": result.engine, "chain": result.chain}
+    swings |= {f"chain of {other.name}": other for other in result.beside}
     note = (
-        f"Engine over chain: frequency {100 * difference['natural_hz']:+.2f} %, damping "
-        f"{100 * difference['damping']:+.2f} %.\nRejected within the {1e3 * ANIMAL_CYCLE:.0f} ms "
-        f"of a cockroach's cycle: {100 * result['rejected_in_animal_cycle']:.0f} %."
+        f"Engine over chain: frequency {100 * result.difference.natural_hz:+.2f} %, damping "
+        f"{100 * result.difference.damping:+.2f} %.\nRejected within the "
+        f"{1e3 * ANIMAL_CYCLE:.0f} ms of a cockroach's cycle: "
+        f"{100 * result.rejected_in_animal_cycle:.0f} %."
     )
-    cones = Table(
-        "First frequency of a cone as a chain",
-        ["over the closed form"],
-        [(f"{row['hinges']} hinges", [shown(row["ratio"], ".4f")]) for row in result["cones"]],
-    )
-    animals = {row["name"]: _without_equal_ends(row) for row in result["animals"]}
-    findings = "\n".join(
-        f"{row['name']}: {row['finding']} ({row['source']})" for row in animals.values()
-    )
+    cones = {f"{cone.hinges} hinges": cone for cone in result.cones}
+    animals = {animal.name: _without_equal_ends(animal) for animal in result.animals}
+    findings = (f"{each.name}: {each.finding} ({each.source})" for each in result.animals)
     return (
-        Table.of("First mode", swings, MODE, note),
-        cones,
-        Table.of("What animals do", animals, ANIMAL, findings),
+        Table.of("First mode", swings, columns(EngineSwing), note),
+        Table.lines("First frequency of a cone as a chain", cones),
+        Table.of("What animals do", animals, columns(Animal), "\n".join(findings)),
     )
 
 
-def _without_equal_ends(row: Mapping[str, Any]) -> dict[str, Any]:
+def _without_equal_ends(animal: Animal) -> dict[str, Any]:
     """An animal with one number in place of an interval whose ends are equal."""
-    keys = ("natural_hz", "damping")
-    single = {key: row[key][0] for key in keys if row[key] and row[key][0] == row[key][1]}
-    return {**row, **single}
+    return {
+        key: value[0] if isinstance(value, tuple) and value[0] == value[1] else value
+        for key, value in content(animal).items()
+    }
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: RingdownResult) -> str:
     """How the antenna recovers, beside an animal."""
-    engine = result["engine"]
-    enough = engine["rejected"] > REJECTED and engine["cycle_s"] <= 1.2 * ANIMAL_CYCLE
-    times = engine["cycle_s"] / ANIMAL_CYCLE
+    engine = result.engine
+    enough = engine.rejected > REJECTED and engine.cycle_s <= 1.2 * ANIMAL_CYCLE
+    times = engine.cycle_s / ANIMAL_CYCLE
     beside = "as fast as a cockroach's" if enough else f"{times:.1f} times a cockroach's"
-    if engine["rejected"] <= REJECTED:
+    if engine.rejected <= REJECTED:
         beside += f", which rejects over {100 * REJECTED:.0f} %"
     return (
-        f"The tip rejects {100 * engine['rejected']:.0f} % of a deflection in its first cycle of "
-        f"{1e3 * engine['cycle_s']:.0f} ms, {beside}; simulated, not measured."
+        f"The tip rejects {100 * engine.rejected:.0f} % of a deflection in its first cycle of "
+        f"{1e3 * engine.cycle_s:.0f} ms, {beside}; simulated, not measured."
     )
 
 
@@ -265,14 +197,14 @@ def figures(outcome: RingdownOutcome) -> dict[str, Figure]:
     swing, beside, cones = figure.subplots(3, 1)
     _draw_swing(swing, result, outcome.t, outcome.tip)
     _draw_animals(beside, result)
-    _draw_cones(cones, result)
+    _draw_cones(cones, result.cones)
     return {"ringdown": figure}
 
 
-def _draw_swing(panel: Axes, result: Mapping[str, Any], t: Floats, tip: Floats) -> None:
+def _draw_swing(panel: Axes, result: RingdownResult, t: Floats, tip: Floats) -> None:
     first, second, _ = style.series(3)
-    cycle, chain = 1e3 * result["engine"]["cycle_s"], result["chain"]
-    decay = np.exp(-chain["damping"] * 2 * np.pi * chain["natural_hz"] * t)
+    cycle, chain = 1e3 * result.engine.cycle_s, result.chain
+    decay = np.exp(-chain.damping * 2 * np.pi * chain.natural_hz * t)
     panel.axhspan(REJECTED - 1, 1 - REJECTED, color=style.FAINT, zorder=0, linewidth=0)
     panel.plot(1e3 * t, tip, color=first, label="tip in the engine")
     panel.plot(1e3 * t, decay, color=second, linestyle=(0, (4, 1.5)), label="decay of the chain")
@@ -280,37 +212,40 @@ def _draw_swing(panel: Axes, result: Mapping[str, Any], t: Floats, tip: Floats) 
     panel.axvline(1e3 * ANIMAL_CYCLE, color=style.MUTED, linewidth=0.8, linestyle=":")
     panel.set(xlabel="time [ms]", ylabel="deflection, 1 at the start")
     panel.set_title(
-        f"Let go: {100 * result['engine']['rejected']:.0f} % rejected in {cycle:.0f} ms (line);\n"
+        f"Let go: {100 * result.engine.rejected:.0f} % rejected in {cycle:.0f} ms (line);\n"
         f"cockroach {1e3 * ANIMAL_CYCLE:.0f} ms (dots), grey: 90 % rejected"
     )
     panel.legend()
 
 
-def _draw_animals(panel: Axes, result: Mapping[str, Any]) -> None:
-    rows = [row for row in result["animals"] if row["natural_hz"]]
-    for row, colour in zip(rows, style.series(len(rows)), strict=True):
-        (left, right), (low, high) = row["natural_hz"], row["damping"]
+def _draw_animals(panel: Axes, result: RingdownResult) -> None:
+    animals = [
+        (each.name, each.natural_hz, each.damping)
+        for each in result.animals
+        if each.natural_hz and each.damping
+    ]
+    colours = style.series(len(animals))
+    for (name, (left, right), (low, high)), colour in zip(animals, colours, strict=True):
         middle, centre = (low + high) / 2, (left * right) ** 0.5
         bars: dict[str, Any] = {"color": colour, "linewidth": 3.0, "solid_capstyle": "butt"}
         panel.plot([left, right], [middle, middle], **bars)
         panel.plot([centre, centre], [low, high], **bars)
-        panel.text(right * 1.15, middle, row["name"].split()[0], va="center", fontsize=8)
-    engine = result["engine"]
-    for row in [{"name": "this antenna", **engine}, *result["beside"]]:
-        at = row["natural_hz"], row["damping"]
+        panel.text(right * 1.15, middle, name.split()[0], va="center", fontsize=8)
+    others = ((other.name, other) for other in result.beside)
+    for name, swing in (("this antenna", result.engine), *others):
+        at = swing.natural_hz, swing.damping
         panel.scatter(*at, color=style.INK, zorder=3)
-        panel.annotate(row["name"], at, (6, -1), textcoords="offset points", va="top", fontsize=8)
-    panel.axhline(result["animal_damping"], color=style.MUTED, linewidth=0.8)
+        panel.annotate(name, at, (6, -1), textcoords="offset points", va="top", fontsize=8)
+    panel.axhline(result.animal_damping, color=style.MUTED, linewidth=0.8)
     panel.set_xscale("log")
-    panel.set_xlim(min(1.0, engine["natural_hz"] / 2), 1000)
+    panel.set_xlim(min(1.0, result.engine.natural_hz / 2), 1000)
     panel.set_ylim(0, 1.05)
     panel.set(xlabel="frequency [Hz]", ylabel="damping ratio")
     panel.set_title("Animals; above the line 90 % are\nrejected in one cycle")
 
 
-def _draw_cones(panel: Axes, result: Mapping[str, Any]) -> None:
-    rows = result["cones"]
-    hinges, error = [r["hinges"] for r in rows], [100 * abs(1 - r["ratio"]) for r in rows]
+def _draw_cones(panel: Axes, cones: Sequence[Cone]) -> None:
+    hinges, error = [c.hinges for c in cones], [100 * abs(1 - c.ratio) for c in cones]
     panel.plot(hinges, error, color=style.series(1)[0], marker="o")
     panel.set_xscale("log")
     panel.set_yscale("log")
@@ -330,7 +265,12 @@ def _film(config: RingdownConfig, condition: str, trial: int, watch: Watch) -> s
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, RingdownConfig, lambda config, *_: run(config), tables, sentence),
+    __name__,
+    RingdownConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    result=RingdownResult,
     figures=figures,
     films=bench_films(lambda config: ["antenna"], _film, None, _SPEED, ".1f"),
     captions={

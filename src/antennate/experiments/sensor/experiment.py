@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from antennate.antenna import sensor
 from antennate.errors import ConfigError
 from antennate.params.base import Params, number
 from antennate.robots.antenna import SensorParams
+from antennate.studies.columns import column, columns, tabular
 from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.measures import Measure, Table
+from antennate.studies.tables import Table
 from antennate.types import Floats
 
 if TYPE_CHECKING:
@@ -50,80 +51,121 @@ class SensorConfig(Params):
     sensor: SensorParams = SensorParams()
 
 
+@tabular
+class Point:
+    """The sensor at one bend, without memory and noise."""
+
+    flex_deg: float
+    """Flex."""
+    resistance_ohm: float = column("R", "kOhm", scale=1e-3)
+    """Resistance of the flex sensor."""
+    voltage_v: float = column("V", form=".3f")
+    """Voltage at the converter."""
+    counts: float = column("counts", form=".0f")
+    """Reading [counts]."""
+
+
+@tabular
+class SensorResult:
+    """What a run comes to."""
+
+    schema: int = 1
+    command: str = "sensor"
+    seed: int
+    """Seed of the noise."""
+    kind: str
+    """Kind of flex sensor."""
+    polarity: int
+    """1 if readings rise with bending, -1 if they fall."""
+    curve: list[Point]
+    """Static curve, from straight to the largest bend."""
+    counts_span: float
+    """Reading at the largest bend against the straight one."""
+    loop_width_share: float
+    """Gap between loading and unloading at half the bend, over the span of readings."""
+    creep_counts: float
+    """Drift of the reading under a held bend."""
+    noise_sd_counts: float
+    """Standard deviation of the noise."""
+    divider_ohm: float
+    """Fixed resistor in use."""
+    best_divider_ohm: float
+    """Fixed resistor of series E24 that spreads readings farthest."""
+    best_counts_span: float
+    """Spread of readings with the best resistor [counts]."""
+    clipped: bool
+    """Whether a bend lies outside what the converter can tell."""
+
+
 @dataclass(frozen=True)
 class SensorOutcome(Outcome):
     """What the sensor says.
 
     Attributes:
-        flex: Bends of the static curve [rad], shape (n,).
+        found: The result.
         loop: Bend [rad] and reading without noise [counts] over one loop after one, shape (k, 2).
         hold: Time [s], reading [counts] with noise and without, bend held from 0 on, shape (m, 3).
         resistors: Resistors tried [Ohm], shape (r,), and the `spread` of each [counts].
-        best: The best of them [Ohm].
     """
 
-    config: SensorConfig
-    flex: Floats
+    found: SensorResult
     loop: Floats
     hold: Floats
     resistors: Floats
     spread: Floats
-    best: float
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        params = self.config.sensor
-        ohms = sensor.resistance(params, sensor.sensed_flex(params, self.flex))
-        volts = sensor.divider(params, ohms)
-        readings = sensor.counts(params, self.flex)
-        return {
-            "schema": 1,
-            "command": "sensor",
-            "seed": self.config.seed,
-            "kind": params.kind,
-            "polarity": 1 if readings[-1] > readings[0] else -1,
-            "curve": [
-                {"flex_deg": math.degrees(f), "resistance_ohm": r, "voltage_v": v, "counts": c}
-                for f, r, v, c in zip(
-                    *(a.tolist() for a in (self.flex, ohms, volts, readings)), strict=True
-                )
-            ],
-            "counts_span": float(abs(readings[-1] - readings[0])),
-            "loop_width_share": self._loop_width(),
-            "creep_counts": float(abs(self.hold[-1, 2] - self.hold[0, 2])),
-            "noise_sd_counts": float(np.std(self.hold[:, 1] - self.hold[:, 2])),
-            "divider_ohm": params.divider_resistance,
-            "best_divider_ohm": self.best,
-            "best_counts_span": float(self.spread.max()),
-            "clipped": bool((volts < sensor.transfer_curve(params)[0][0]).any())
-            or bool((readings >= sensor.FULL_SCALE).any()),
-        }
-
-    def _loop_width(self) -> float:
-        """Gap of the loop at half the bend over the span of readings."""
-        half = len(self.loop) // 2
-        there, back = self.loop[:half], self.loop[half:][::-1]
-        middle = self.config.largest_flex / 2
-        gap = np.interp(middle, *there.T) - np.interp(middle, *back.T)
-        return float(abs(gap) / np.ptp(self.loop[:, 1]))
+    def result(self) -> SensorResult:
+        """The static curve, and what disturbs it."""
+        return self.found
 
 
 def run(config: SensorConfig) -> SensorOutcome:
-    """Measure the sensor.
+    """Try the sensor.
 
     Raises:
         ConfigError: No reading changes over the whole range of bends.
     """
     params = config.sensor
     flex = np.linspace(0.0, config.largest_flex, config.points)
-    if np.ptp(sensor.counts(params, flex)) == 0:
+    readings = sensor.counts(params, flex)
+    if np.ptp(readings) == 0:
         raise ConfigError(
             "sensor: expected readings that change with bending, found "
-            f"{sensor.counts(params, flex)[0]:g} counts at every bend; choose another divider"
+            f"{readings[0]:g} counts at every bend; choose another divider"
         )
     resistors = np.array([base * 10.0**d for d in range(2, 7) for base in E24])
     best, spread = sensor.best_divider(params, config.largest_flex, resistors)
-    return SensorOutcome(config, flex, _loop(config), _hold(config), resistors, spread, best)
+    loop, hold = _loop(config), _hold(config)
+    ohms = sensor.resistance(params, sensor.sensed_flex(params, flex))
+    volts = sensor.divider(params, ohms)
+    table = np.stack([np.degrees(flex), ohms, volts, readings], axis=1).tolist()
+    found = SensorResult(
+        seed=config.seed,
+        kind=params.kind,
+        polarity=1 if readings[-1] > readings[0] else -1,
+        curve=[
+            Point(flex_deg=deg, resistance_ohm=ohm, voltage_v=volt, counts=counts)
+            for deg, ohm, volt, counts in table
+        ],
+        counts_span=float(abs(readings[-1] - readings[0])),
+        loop_width_share=_width(loop, config.largest_flex / 2),
+        creep_counts=float(abs(hold[-1, 2] - hold[0, 2])),
+        noise_sd_counts=float(np.std(hold[:, 1] - hold[:, 2])),
+        divider_ohm=params.divider_resistance,
+        best_divider_ohm=best,
+        best_counts_span=float(spread.max()),
+        clipped=bool((volts < sensor.transfer_curve(params)[0][0]).any())
+        or bool((readings >= sensor.FULL_SCALE).any()),
+    )
+    return SensorOutcome(found=found, loop=loop, hold=hold, resistors=resistors, spread=spread)
+
+
+def _width(loop: Floats, middle: float) -> float:
+    """Gap of a loop at a bend [rad] over its span of readings."""
+    half = len(loop) // 2
+    there, back = loop[:half], loop[half:][::-1]
+    gap = np.interp(middle, *there.T) - np.interp(middle, *back.T)
+    return float(abs(gap) / np.ptp(loop[:, 1]))
 
 
 def _loop(config: SensorConfig) -> Floats:
@@ -152,38 +194,31 @@ def _hold(config: SensorConfig) -> Floats:
 
 _ROWS = 10
 """Most lines of the table."""
-CURVE = (
-    Measure("resistance_ohm", "R", "kOhm", scale=1e-3),
-    Measure("voltage_v", "V", form=".3f"),
-    Measure("counts", "counts", form=".0f"),
-)
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: SensorResult) -> Sequence[Table]:
     """The static curve, and what disturbs it."""
-    rows = result["curve"]
-    step = -(-(len(rows) - 1) // (_ROWS - 1))
-    way = "rise" if result["polarity"] > 0 else "fall"
-    clipped = "\nThe range is clipped by the converter." if result["clipped"] else ""
+    step = -(-(len(result.curve) - 1) // (_ROWS - 1))
+    way = "rise" if result.polarity > 0 else "fall"
+    clipped = "\nThe range is clipped by the converter." if result.clipped else ""
+    measures = columns(Point)
     curve = Table(
         "Static curve",
-        [measure.title for measure in CURVE],
-        [(f"{row['flex_deg']:.0f} deg", [m.cell(row) for m in CURVE]) for row in rows[::step]],
-        f"A {result['kind']} flex sensor: counts {way} with flex, over "
-        f"{result['counts_span']:.0f} counts.\n"
-        f"Loop: {100 * result['loop_width_share']:.0f} % of the span wide. Creep: "
-        f"{result['creep_counts']:.0f} counts. Noise: {result['noise_sd_counts']:.1f} counts."
-        f"{clipped}",
+        [measure.title for measure in measures],
+        [(f"{p.flex_deg:.0f} deg", [m.cell(p) for m in measures]) for p in result.curve[::step]],
+        f"A {result.kind} flex sensor: counts {way} with flex, over {result.counts_span:.0f} "
+        f"counts.\nLoop: {100 * result.loop_width_share:.0f} % of the span wide. Creep: "
+        f"{result.creep_counts:.0f} counts. Noise: {result.noise_sd_counts:.1f} counts.{clipped}",
     )
     return (curve,)
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: SensorResult) -> str:
     """How much of the converter's range the divider uses."""
-    used, best = 1e-3 * result["divider_ohm"], 1e-3 * result["best_divider_ohm"]
+    used, best = 1e-3 * result.divider_ohm, 1e-3 * result.best_divider_ohm
     return (
-        f"A divider of {used:g} kOhm spreads readings over {result['counts_span']:.0f} counts, the "
-        f"best of E24, {best:g} kOhm, over {result['best_counts_span']:.0f}; computed from the "
+        f"A divider of {used:g} kOhm spreads readings over {result.counts_span:.0f} counts, the "
+        f"best of E24, {best:g} kOhm, over {result.best_counts_span:.0f}; computed from the "
         "model of the flex sensor."
     )
 
@@ -193,19 +228,18 @@ def figures(outcome: SensorOutcome) -> dict[str, Figure]:
     """Three panels of one sensor."""
     figure, result = style.canvas(style.WIDTH, 8.7), outcome.result()
     curve, held, choice = figure.subplots(3, 1)
-    _draw_curve(curve, result, outcome.loop)
+    _draw_curve(curve, result.curve, outcome.loop)
     _draw_hold(held, outcome.hold)
     _draw_choice(choice, result, outcome.resistors, outcome.spread)
     return {"sensor": figure}
 
 
-def _draw_curve(panel: Axes, result: Mapping[str, Any], loop: Floats) -> None:
+def _draw_curve(panel: Axes, points: Sequence[Point], loop: Floats) -> None:
     first, second, _ = style.series(3)
-    rows = result["curve"]
     panel.plot(np.degrees(loop[:, 0]), loop[:, 1], color=second, label="loop")
     panel.plot(
-        [row["flex_deg"] for row in rows],
-        [row["counts"] for row in rows],
+        [point.flex_deg for point in points],
+        [point.counts for point in points],
         color=first,
         linestyle=(0, (4, 1.5)),
         label="static",
@@ -221,13 +255,12 @@ def _draw_hold(panel: Axes, hold: Floats) -> None:
     panel.legend()
 
 
-def _draw_choice(panel: Axes, result: Mapping[str, Any], resistors: Floats, spread: Floats) -> None:
+def _draw_choice(panel: Axes, result: SensorResult, resistors: Floats, spread: Floats) -> None:
     panel.plot(1e-3 * resistors, spread, color=style.series(3)[0])
-    for key, marker, label in (
-        ("divider_ohm", "s", "in use"),
-        ("best_divider_ohm", "D", "best of E24"),
+    for ohm, marker, label in (
+        (result.divider_ohm, "s", "in use"),
+        (result.best_divider_ohm, "D", "best of E24"),
     ):
-        ohm = result[key]
         panel.plot(
             1e-3 * ohm,
             np.interp(ohm, resistors, spread),
@@ -243,7 +276,12 @@ def _draw_choice(panel: Axes, result: Mapping[str, Any], resistors: Floats, spre
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, SensorConfig, lambda config, *_: run(config), tables, sentence),
+    __name__,
+    SensorConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    result=SensorResult,
     figures=figures,
     captions={
         "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "

@@ -8,9 +8,8 @@ more than the others.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,12 @@ from antennate.experiments.servo.recording import (
     check_supply,
     check_torque,
     read,
+)
+from antennate.experiments.servo.result import (
+    ModelSummary,
+    RecordingRow,
+    RecordingSummary,
+    ServoResult,
 )
 from antennate.robots import servos
 from antennate.robots.servos import MODEL_NUMBERS, STEP
@@ -44,38 +49,6 @@ _BELOW = 0.9
 """Share of full drive under which a weight is held with drive to spare."""
 SEEN = 0.02
 """A recording that stalls for this share of its time with torque, or longer, is named."""
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingRow:
-    """One recording, a row of trials.csv.
-
-    Attributes:
-        name: Name of the recording.
-        p_gain: Gain of the position loop.
-        error_deg: Mean error of position of the last model while torque is on [deg].
-        error_max_deg: The largest.
-        full_drive: Share of that time at full drive; NaN where the recording tells no drive.
-        stalled: Share of that time at full drive in which the shaft rests, likewise.
-        error_stalled_deg: Mean error while it stalls [deg], NaN if it never does.
-        error_else_deg: Mean error in the rest of the time [deg].
-        supply_stalled_v: Mean supply while it stalls [V].
-        weight_stalled_n_m: Mean torque of the weight while it stalls [N·m].
-        lifted_n_m: Largest torque of the weight [N·m] that the servo held at rest with drive to
-            spare, in any recording.
-    """
-
-    name: str
-    p_gain: float
-    error_deg: float
-    error_max_deg: float
-    full_drive: float
-    stalled: float
-    error_stalled_deg: float
-    error_else_deg: float
-    supply_stalled_v: float
-    weight_stalled_n_m: float
-    lifted_n_m: float
 
 
 @dataclass(frozen=True)
@@ -109,58 +82,51 @@ class ServoOutcome:
         """Place of the model of a figure: as given, or with the data sheet's line."""
         return len(self.models) - (_JUDGED if self.config.fit else 1)
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+    def result(self) -> ServoResult:
+        """What the run comes to."""
         by_file = _by_file(self.recordings)
         count = len(fitting.left_out(self.data.parts(), by_file))
-        return {
-            "schema": 1,
-            "command": "servo",
-            "servo": self.config.servo,
-            "fitted": self.config.fit,
-            "recordings": [
-                _about(recording) | asdict(row)
-                for recording, row in zip(self.recordings, self.rows, strict=True)
-            ],
-            "interval_over": f"{count} {'' if by_file else 'stretches of the '}recordings",
-            "models": [self._model(i, model) for i, model in enumerate(self.models)],
-        }
+        return ServoResult(
+            servo=self.config.servo,
+            fitted=self.config.fit,
+            recordings=list(map(_summary, self.recordings, self.rows)),
+            interval_over=f"{count} {'' if by_file else 'stretches of the '}recordings",
+            models=[self._model(i, model) for i, model in enumerate(self.models)],
+        )
 
-    def _model(self, i: int, model: fitting.Model) -> dict[str, Any]:
-        """What result.json says of a model."""
-        ends = dict(zip(MODEL_NUMBERS, np.moveaxis(self.interval[i], 1, 0), strict=True))
+    def _model(self, i: int, model: fitting.Model) -> ModelSummary:
         names = [name for name, _ in self.held]
-        return {
-            "name": model.name,
-            "free": list(model.free),
+        held = map(_known, np.degrees(self.held_errors[i]).tolist())
+        ends = dict(zip(MODEL_NUMBERS, self.interval[i].T, strict=True))
+        return ModelSummary(
             **dict(zip(MODEL_NUMBERS, self.fitted[i].tolist(), strict=True)),
-            "error_deg": float(np.degrees(self.errors[i])),
-            "held_out_deg": dict(zip(names, np.degrees(self.held_errors[i]).tolist(), strict=True)),
-            "interval_95": {
-                name: pair.tolist()
-                for name, pair in ends.items()
-                if name in model.free and np.isfinite(pair).all()
+            name=model.name,
+            free=list(model.free),
+            error_deg=_known(float(np.degrees(self.errors[i]))),
+            held_out_deg=dict(zip(names, held, strict=True)),
+            interval_95={
+                name: (float(ends[name][0]), float(ends[name][1]))
+                for name in model.free
+                if np.isfinite(ends[name]).all()
             },
-        }
+        )
 
     def traces(self) -> Floats:
         """Positions that each model gives [rad], shape (T / 10, M, F)."""
         return servos.replay(self.fitted, self.data.course, SHOWN)
 
 
-def _about(recording: Recording) -> dict[str, Any]:
-    """What result.json says of a recording itself."""
-    supply = recording.supply
-    return {
-        "name": recording.name,
-        "sha256": recording.sha256,
-        "p_gain": recording.p_gain,
-        "gain_divisor": recording.divisor(),
-        "seconds": float(recording.t[-1]),
-        "samples": len(recording.t),
-        "torque_share": float(recording.torque.mean()),
-        "supply_v": float(np.mean(supply)) if np.isfinite(supply).all() else None,
-    }
+def _summary(recording: Recording, row: RecordingRow) -> RecordingSummary:
+    """A recording, and its row."""
+    return RecordingSummary(
+        **vars(row),
+        sha256=recording.sha256,
+        gain_divisor=recording.divisor(),
+        seconds=float(recording.t[-1]),
+        samples=len(recording.t),
+        torque_share=float(recording.torque.mean()),
+        supply_v=_known(float(np.mean(recording.supply))),
+    )
 
 
 def _by_file(recordings: list[Recording]) -> bool:
@@ -306,9 +272,9 @@ def _row(
         name=recording.name,
         p_gain=recording.p_gain,
         error_deg=_mean(away[counts]),
-        error_max_deg=float(away[counts].max()) if time else math.nan,
-        full_drive=float(full.sum() / time) if has_drive and time else math.nan,
-        stalled=float(stalls.sum() / time) if has_drive and time else math.nan,
+        error_max_deg=float(away[counts].max()) if time else None,
+        full_drive=float(full.sum() / time) if has_drive and time else None,
+        stalled=float(stalls.sum() / time) if has_drive and time else None,
         error_stalled_deg=_mean(away[stalls]),
         error_else_deg=_mean(away[counts & ~stalls]),
         supply_stalled_v=_mean(recording.supply[held][stalls]),
@@ -339,6 +305,10 @@ def _weight(recording: Recording) -> Floats:
     return recording.mass * GRAVITY * recording.length * np.sin(recording.position)
 
 
-def _mean(values: Floats) -> float:
-    """Mean, NaN of nothing."""
-    return float(values.mean()) if len(values) else math.nan
+def _mean(values: Floats) -> float | None:
+    """Mean; None of nothing, and of what is not known."""
+    return _known(float(values.mean())) if len(values) else None
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +14,9 @@ from antennate.antenna.springs import Winding
 from antennate.errors import ConfigError
 from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
-from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.measures import Measure, Table
+from antennate.studies.columns import column, tabular
+from antennate.studies.experiment import Done, Experiment
+from antennate.studies.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,68 +26,83 @@ PAPER_TABLE = {3.0: 0.274, 6.0: 0.137, 9.0: 0.091}
 """Stiffness by active coils as printed in the paper [N·mm/deg]."""
 PAPER_DIGITS = 3
 """Decimals of that table."""
+_TABLED, _DRAWN = 6, 5
+"""Sets of springs in the table, and in the figure."""
 
 
-@dataclass(frozen=True)
-class SpringsOutcome(Outcome):
-    """The springs as they are, and sets that could be wound.
+@tabular
+class Spring:
+    """A spring of the wire and the coil as they are."""
 
-    Attributes:
-        windings: The best set of each stock wire, the smallest error first.
-    """
-
-    config: SpringParams
-    windings: list[Winding]
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        return {
-            "schema": 1,
-            "command": "springs",
-            "wire": config.wire,
-            "modulus_pa": springs.modulus_of(config),
-            "wire_mm": config.wire_mm,
-            "coil_mm": config.coil_mm,
-            "spring_index": (1e-3 * config.coil_mm) / (1e-3 * config.wire_mm),
-            "springs": [self._spring(coils) for coils in config.active_coils],
-            "wanted_n_mm_per_deg": list(config.wanted_n_mm_per_deg),
-            "windings": [_winding(winding) for winding in self.windings],
-        }
-
-    def _spring(self, coils: float) -> dict[str, Any]:
-        config = self.config
-        wire, coil = 1e-3 * config.wire_mm, 1e-3 * config.coil_mm
-        k = springs.spring_stiffness(springs.modulus_of(config), wire, coil, coils)
-        printed = PAPER_TABLE.get(coils)
-        return {
-            "active_coils": coils,
-            "stiffness_n_mm_per_deg": k / N_MM_PER_DEG,
-            "stiffness_n_m_per_rad": k,
-            "paper_n_mm_per_deg": printed,
-            "paper_exact_n_mm_per_deg": None if printed is None else 3 * PAPER_TABLE[3.0] / coils,
-            "angle_deg": config.angle_deg,
-            "torque_at_angle_n_mm": 1e3 * k * math.radians(config.angle_deg),
-            "yield_angle_deg": math.degrees(springs.yield_angle(config, wire, coil, coils)),
-        }
+    active_coils: float
+    """Active coils."""
+    stiffness_n_mm_per_deg: float = column("stiffness", "N·mm/deg", form=".4f")
+    """Torque over angle."""
+    paper_n_mm_per_deg: float | None = column("  the paper prints", form=".3f")
+    """Stiffness that the paper prints for so many coils; `null` if it prints none."""
+    paper_exact_n_mm_per_deg: float | None
+    """Stiffness that follows from the paper's entry of three coils, before it is rounded; `null`
+    where the paper prints none."""
+    stiffness_n_m_per_rad: float = column("stiffness", "N·m/rad", form=".5f")
+    """Torque over angle, in SI units."""
+    angle_deg: float = column("angle to bear", "deg", form="g")
+    """Angle that the spring must bear."""
+    torque_at_angle_n_mm: float = column("  torque at it", "N·mm")
+    """Torque at that angle."""
+    yield_angle_deg: float = column("yields at", "deg", form=".0f")
+    """Angle at which the wire begins to yield."""
 
 
-def _winding(winding: Winding) -> dict[str, Any]:
-    return {
-        "wire_mm": 1e3 * winding.wire,
-        "coil_mm": 1e3 * winding.coil,
-        "mandrel_mm": 1e3 * (winding.coil - winding.wire),
-        "spring_index": winding.index,
-        "active_coils": list(winding.coils),
-        "stiffness_n_mm_per_deg": [k / N_MM_PER_DEG for k in winding.stiffness],
-        "largest_error": winding.error,
-        "yield_angle_deg": math.degrees(winding.yield_angle),
-        "body_length_mm": 1e3 * winding.length,
-    }
+@tabular
+class WoundSet:
+    """A set of springs that could be wound of a stock wire."""
+
+    wire_mm: float
+    """Diameter of the wire."""
+    coil_mm: float
+    """Mean diameter of the coils."""
+    mandrel_mm: float = column("mandrel", "mm", form=".1f")
+    """Diameter of the mandrel, the inner one of the coils."""
+    spring_index: float = column("spring index", form=".1f")
+    """Mean diameter of the coils over that of the wire."""
+    active_coils: list[float] = column("active coils", form="g", join=" ")
+    """Active coils of each spring, in steps that can be wound."""
+    stiffness_n_mm_per_deg: list[float]
+    """Stiffness of each spring."""
+    largest_error: float = column("largest error", "%", form=".1f", scale=100.0)
+    """Largest distance of a stiffness from the wanted one, over the wanted one."""
+    yield_angle_deg: float = column("yields at", "deg", form=".0f")
+    """Smallest angle at which one of the springs yields."""
+    body_length_mm: float = column("longest body", "mm", form=".1f")
+    """Length of the longest coil body, closely wound."""
 
 
-def run(config: SpringParams) -> SpringsOutcome:
-    """Work out the springs.
+@tabular
+class SpringsResult:
+    """What a run comes to."""
+
+    schema: int = 1
+    command: str = "springs"
+    wire: str
+    """Kind of wire."""
+    modulus_pa: float
+    """Young's modulus of the wire."""
+    wire_mm: float
+    """Diameter of the wire."""
+    coil_mm: float
+    """Mean diameter of the coils."""
+    spring_index: float
+    """Mean diameter of the coils over that of the wire."""
+    springs: list[Spring]
+    """Springs, one for each count of active coils."""
+    wanted_n_mm_per_deg: list[float]
+    """Stiffnesses that new sets are wound for."""
+    windings: list[WoundSet]
+    """Sets that could be wound, the best of each stock wire, the smallest error first."""
+
+
+def run(config: SpringParams) -> Done:
+    """Work out the springs as they are, and sets that could be wound.
 
     Raises:
         ConfigError: The spring index lies outside its limits, where the law does not hold, or
@@ -104,125 +119,133 @@ def run(config: SpringParams) -> SpringsOutcome:
             f"{low * wire:.3g} to {high * wire:.3g} mm, found {config.coil_mm:g}"
         )
     wanted = tuple(k * N_MM_PER_DEG for k in config.wanted_n_mm_per_deg)
-    return SpringsOutcome(config, springs.windings(config, wanted))
+    result = SpringsResult(
+        wire=config.wire,
+        modulus_pa=springs.modulus_of(config),
+        wire_mm=wire,
+        coil_mm=config.coil_mm,
+        spring_index=(1e-3 * config.coil_mm) / (1e-3 * wire),
+        springs=[_spring(config, coils) for coils in config.active_coils],
+        wanted_n_mm_per_deg=list(config.wanted_n_mm_per_deg),
+        windings=[_wound(winding) for winding in springs.windings(config, wanted)],
+    )
+    return Done(rows=(), found=result)
 
 
-_TABLED, _DRAWN = 6, 5
-"""Sets of springs in the table, and in the figure."""
-
-SPRING = (
-    Measure("stiffness_n_mm_per_deg", "stiffness", "N·mm/deg", form=".4f"),
-    Measure("paper_n_mm_per_deg", "  the paper prints", form=".3f"),
-    Measure("stiffness_n_m_per_rad", "stiffness", "N·m/rad", form=".5f"),
-    Measure("angle_deg", "angle to bear", "deg", form="g"),
-    Measure("torque_at_angle_n_mm", "  torque at it", "N·mm"),
-    Measure("yield_angle_deg", "yields at", "deg", form=".0f"),
-)
-WINDING = (
-    Measure("mandrel_mm", "mandrel", "mm", form=".1f"),
-    Measure("spring_index", "spring index", form=".1f"),
-    Measure("coils", "active coils"),
-    Measure("largest_error", "largest error", "%", form=".1f", scale=100.0),
-    Measure("yield_angle_deg", "yields at", "deg", form=".0f"),
-    Measure("body_length_mm", "longest body", "mm", form=".1f"),
-)
+def _spring(config: SpringParams, coils: float) -> Spring:
+    wire, coil = 1e-3 * config.wire_mm, 1e-3 * config.coil_mm
+    k = springs.spring_stiffness(springs.modulus_of(config), wire, coil, coils)
+    printed = PAPER_TABLE.get(coils)
+    return Spring(
+        active_coils=coils,
+        stiffness_n_mm_per_deg=k / N_MM_PER_DEG,
+        stiffness_n_m_per_rad=k,
+        paper_n_mm_per_deg=printed,
+        paper_exact_n_mm_per_deg=None if printed is None else 3 * PAPER_TABLE[3.0] / coils,
+        angle_deg=config.angle_deg,
+        torque_at_angle_n_mm=1e3 * k * math.radians(config.angle_deg),
+        yield_angle_deg=math.degrees(springs.yield_angle(config, wire, coil, coils)),
+    )
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def _wound(winding: Winding) -> WoundSet:
+    return WoundSet(
+        wire_mm=1e3 * winding.wire,
+        coil_mm=1e3 * winding.coil,
+        mandrel_mm=1e3 * (winding.coil - winding.wire),
+        spring_index=winding.index,
+        active_coils=list(winding.coils),
+        stiffness_n_mm_per_deg=[k / N_MM_PER_DEG for k in winding.stiffness],
+        largest_error=winding.error,
+        yield_angle_deg=math.degrees(winding.yield_angle),
+        body_length_mm=1e3 * winding.length,
+    )
+
+
+def tables(result: SpringsResult) -> Sequence[Table]:
     """The springs, and the sets that could be wound."""
-    wire = f"{result['wire']}, wire {result['wire_mm']:g} mm, coil {result['coil_mm']:g} mm"
+    wire = f"{result.wire}, wire {result.wire_mm:g} mm, coil {result.coil_mm:g} mm"
     asked = Table.of(
         "Springs",
-        {f"{row['active_coils']:g} coils": row for row in result["springs"]},
-        SPRING,
-        f"{wire}, index {result['spring_index']:.1f}, E {result['modulus_pa'] / 1e9:g} GPa.\n"
-        f"{_rounding(result)}",
+        {f"{spring.active_coils:g} coils": spring for spring in result.springs},
+        note=f"{wire}, index {result.spring_index:.1f}, E {result.modulus_pa / 1e9:g} GPa.\n"
+        f"{_rounding(result.springs)}",
     )
     wound = Table.of(
         "Sets to wind",
-        {
-            f"{row['wire_mm']:.2f} mm": {
-                **row,
-                "coils": " ".join(f"{n:g}" for n in row["active_coils"]),
-            }
-            for row in result["windings"][:_TABLED]
-        },
-        WINDING if result["windings"] else (),
-        "The best mandrel of each stock wire, nearest first.\n" if result["windings"] else "",
+        {f"{each.wire_mm:.2f} mm": each for each in result.windings[:_TABLED]},
+        note="The best mandrel of each stock wire, nearest first.\n" if result.windings else "",
     )
     return asked, wound
 
 
-def _rounding(result: Mapping[str, Any]) -> str:
+def _rounding(found: Sequence[Spring]) -> str:
     """Where the paper's table is rounded."""
     rounded = [
-        f"{row['active_coils']:g} coils {row['paper_exact_n_mm_per_deg']:.4f}, printed "
-        f"{row['paper_n_mm_per_deg']:.{PAPER_DIGITS}f}"
-        for row in result["springs"]
-        if row["paper_n_mm_per_deg"] is not None
-        and abs(row["paper_exact_n_mm_per_deg"] - row["paper_n_mm_per_deg"]) > 1e-9
+        f"{spring.active_coils:g} coils {exact:.4f}, printed {printed:.{PAPER_DIGITS}f}"
+        for spring in found
+        if (exact := spring.paper_exact_n_mm_per_deg) is not None
+        and (printed := spring.paper_n_mm_per_deg) is not None
+        and abs(exact - printed) > 1e-9
     ]
-    exact = "Stiffness goes with 1 / coils"
-    return (
-        f"{exact}; the paper rounds: {'; '.join(rounded)} N·mm/deg.\n" if rounded else f"{exact}.\n"
-    )
+    law = "Stiffness goes with 1 / coils"
+    return f"{law}; the paper rounds: {'; '.join(rounded)} N·mm/deg.\n" if rounded else f"{law}.\n"
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: SpringsResult) -> str:
     """How near the wanted stiffnesses can be wound."""
-    wanted = ", ".join(f"{k:g}" for k in result["wanted_n_mm_per_deg"])
-    if not result["windings"]:
+    wanted = ", ".join(f"{k:g}" for k in result.wanted_n_mm_per_deg)
+    if not result.windings:
         return f"No stock wire gives {wanted} N·mm/deg within the limits."
-    best = result["windings"][0]
+    best = result.windings[0]
     return (
-        f"Wire of {best['wire_mm']:.2f} mm on a mandrel of {best['mandrel_mm']:.1f} mm comes "
-        f"within {100 * best['largest_error']:.1f} % of {wanted} N·mm/deg; computed, not measured."
+        f"Wire of {best.wire_mm:.2f} mm on a mandrel of {best.mandrel_mm:.1f} mm comes "
+        f"within {100 * best.largest_error:.1f} % of {wanted} N·mm/deg; computed, not measured."
     )
 
 
 @style.styled
-def figures(outcome: SpringsOutcome) -> dict[str, Figure]:
+def figures(outcome: Done) -> dict[str, Figure]:
     """Torque of each spring up to its yield, and the errors of what could be wound instead."""
-    figure, result = style.canvas(style.WIDTH, 7.4), outcome.result()
+    figure = style.canvas(style.WIDTH, 7.4)
     torque, wound = figure.subplots(2, 1)
-    _draw_torque(torque, result)
-    _draw_windings(wound, result)
+    _draw_torque(torque, outcome.found)
+    _draw_windings(wound, outcome.found)
     return {"springs": figure}
 
 
-def _draw_torque(panel: Axes, result: Mapping[str, Any]) -> None:
-    rows = result["springs"]
-    end = 1.15 * min(360.0, max(row["yield_angle_deg"] for row in rows))
-    for row, colour in zip(rows, style.series(len(rows)), strict=True):
-        k, limit = row["stiffness_n_mm_per_deg"], row["yield_angle_deg"]
-        angle = np.array([0.0, min(limit, end)])
-        panel.plot(angle, k * angle, color=colour, label=f"{row['active_coils']:g} coils, {k:.3f}")
+def _draw_torque(panel: Axes, result: SpringsResult) -> None:
+    found = result.springs
+    end = 1.15 * min(360.0, max(spring.yield_angle_deg for spring in found))
+    for spring, colour in zip(found, style.series(len(found)), strict=True):
+        k, limit = spring.stiffness_n_mm_per_deg, spring.yield_angle_deg
+        angle, label = np.array([0.0, min(limit, end)]), f"{spring.active_coils:g} coils, {k:.3f}"
+        panel.plot(angle, k * angle, color=colour, label=label)
         if limit <= end:
             panel.plot(limit, k * limit, color=colour, marker="x", markersize=7)
     panel.set(
         xlabel="angle [deg]",
         ylabel="torque [N·mm]",
-        title=f"{result['wire']}, wire {result['wire_mm']:g} mm, \ncoil {result['coil_mm']:g} mm; "
-        "× yields",
+        title=f"{result.wire}, wire {result.wire_mm:g} mm, \ncoil {result.coil_mm:g} mm; × yields",
     )
     panel.set_xlim(0, end)
     panel.set_ylim(0)
     panel.legend(title="stiffness [N·mm/deg]", loc="lower right")
 
 
-def _draw_windings(panel: Axes, result: Mapping[str, Any]) -> None:
-    wanted = np.array(result["wanted_n_mm_per_deg"])
-    shown = result["windings"][:_DRAWN]
+def _draw_windings(panel: Axes, result: SpringsResult) -> None:
+    wanted = np.array(result.wanted_n_mm_per_deg)
+    drawn = result.windings[:_DRAWN]
     places = np.arange(len(wanted))
-    for i, (row, colour) in enumerate(zip(shown, style.series(len(shown)), strict=True)):
-        error = 100 * (np.array(row["stiffness_n_mm_per_deg"]) / wanted - 1)
+    for i, (each, colour) in enumerate(zip(drawn, style.series(len(drawn)), strict=True)):
+        error = 100 * (np.array(each.stiffness_n_mm_per_deg) / wanted - 1)
         panel.plot(
-            places + 0.08 * (i - (len(shown) - 1) / 2),
+            places + 0.08 * (i - (len(drawn) - 1) / 2),
             error,
             color=colour,
             marker="o",
             linestyle="",
-            label=f"wire {row['wire_mm']:.2f}, mandrel {row['mandrel_mm']:.1f} mm",
+            label=f"wire {each.wire_mm:.2f}, mandrel {each.mandrel_mm:.1f} mm",
         )
     panel.axhline(0.0, color=style.MUTED, linewidth=0.8)
     panel.set_xticks(places, [f"{k:g}" for k in wanted])
@@ -234,12 +257,17 @@ def _draw_windings(panel: Axes, result: Mapping[str, Any]) -> None:
     panel.set_xlim(-0.5, len(wanted) - 0.5)
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.75 * (high - low))
-    if shown:
+    if drawn:
         panel.legend(loc="upper left", fontsize=8)
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, SpringParams, lambda config, *_: run(config), tables, sentence),
+    __name__,
+    SpringParams,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    result=SpringsResult,
     figures=figures,
     captions={
         "springs": "Torque of each spring up to its yield, and the errors of what could "

@@ -18,6 +18,7 @@ import numpy as np
 from antennate.experiments.study.config import StudyConfig
 from antennate.jackknife import student95
 from antennate.studies import statistics
+from antennate.studies.columns import Ends, column, tabular
 from antennate.studies.plan import Axes, Point, Range, elementary_effects
 from antennate.types import Floats
 
@@ -31,6 +32,57 @@ _AT_ONCE = 2_000_000
 """Trials shuffled, or signs drawn, at once, to bound the memory."""
 _ROUNDING = 1e-9
 Row = Mapping[str, Any]
+
+
+@tabular
+class Effect:
+    """An effect of a parameter on the response."""
+
+    of: str
+    """Condition whose response it is, or two as `second minus first`; empty without conditions."""
+    parameter: str
+    """Name of the parameter; `name = choice` for each choice of a list but the first."""
+
+
+@tabular
+class Elementary(Effect):
+    """Elementary effects of a parameter, each over its whole range, in a Morris plan."""
+
+    mu_star: float | None = column(interval="mu_star95")
+    """Mean size of the effects, and its interval over trajectories; `null` without any."""
+    mu_star95: Ends | None
+    noise: float | None
+    """Noise limit of the sizes, one for all parameters; `null` of one trial a point."""
+    above_noise: bool | None
+    """Whether the mean size exceeds it; `null` where either is not known."""
+    mu: float | None
+    """Mean of the effects."""
+    sigma: float | None
+    """Standard deviation of the effects; `null` of fewer than two."""
+
+    @property
+    def size(self) -> tuple[float | None, Ends | None]:
+        """How large it is, with its interval."""
+        return self.mu_star, self.mu_star95
+
+
+@tabular
+class Slope(Effect):
+    """Slope of the response over the range of a parameter, in a random or a Sobol plan."""
+
+    slope: float | None = column(interval="slope95")
+    """Change of the response over the whole range, or from the first choice to this one, and its
+    interval; `null` where the points do not tell it."""
+    slope95: Ends | None
+    noise: float | None
+    """Noise limit of this slope; `null` as the slope."""
+    above_noise: bool | None
+    """Whether the slope exceeds it in size; `null` as the slope."""
+
+    @property
+    def size(self) -> tuple[float | None, Ends | None]:
+        """How large it is, with its interval."""
+        return self.slope, self.slope95
 
 
 def value(row: Row, response: str | None) -> float:
@@ -50,7 +102,7 @@ def effects(
     points: Sequence[Point],
     names: Sequence[str],
     response: str | None,
-) -> list[dict[str, Any]]:
+) -> Sequence[Elementary | Slope]:
     """The effects of each parameter, on conditions, which are `names`, and on their differences.
 
     Of a random and a Sobol plan they are those of `slopes`, of a grid and a list there are none.
@@ -72,16 +124,10 @@ def effects(
     plan = (len(axes), config.points, config.seed)
     noise = _noise(values, names, plan)
     return [
-        {"of": target, "parameter": name, **_spread(sizes, noise[target])}
+        _spread(target, name, sizes, noise[target])
         for target, means in _targets(_mean(values), names).items()
         for name, sizes in zip(axes, elementary_effects(*plan, means), strict=True)
     ]
-
-
-def size(effect: Row) -> tuple[float | None, tuple[float, float] | None]:
-    """How large an effect is, with its interval: a slope, or Morris's mu*."""
-    name = "slope" if "slope" in effect else "mu_star"
-    return effect[name], effect[f"{name}95"]
 
 
 def _values(
@@ -143,26 +189,24 @@ def _noise(
     return {name: float(np.quantile(v, share, method="higher")) for name, v in largest.items()}
 
 
-def _spread(effects: Floats, noise: float | None) -> dict[str, Any]:
+def _spread(target: str, name: str, effects: Floats, noise: float | None) -> Elementary:
     """Morris's measures: mean size of the effects, their mean and their standard deviation."""
     known = effects[np.isfinite(effects)]
-    if not len(known):
-        empty = ("mu_star", "mu_star95", "noise", "above_noise", "mu", "sigma")
-        return {**dict.fromkeys(empty), "noise": noise}
+    count = len(known)
     size, ends = statistics.mean95(np.abs(known), least=0.0)
-    return {
-        "mu_star": size,
-        "mu_star95": ends,
-        "noise": noise,
-        "above_noise": None if noise is None else size > noise * (1.0 + _ROUNDING),
-        "mu": float(known.mean()),
-        "sigma": float(known.std(ddof=1)) if len(known) > 1 else None,
-    }
+    return Elementary(
+        of=target,
+        parameter=name,
+        mu_star=size if count else None,
+        mu_star95=ends,
+        noise=noise,
+        above_noise=size > noise * (1.0 + _ROUNDING) if count and noise is not None else None,
+        mu=float(known.mean()) if count else None,
+        sigma=float(known.std(ddof=1)) if count > 1 else None,
+    )
 
 
-def slopes(
-    axes: Axes, points: Sequence[Point], targets: Mapping[str, Floats]
-) -> list[dict[str, Any]]:
+def slopes(axes: Axes, points: Sequence[Point], targets: Mapping[str, Floats]) -> list[Slope]:
     """Least squares over all parameters at once: the change of each target over a whole range.
 
     A choice is compared with the first one of its list. The interval holds also where the spread
@@ -180,16 +224,14 @@ def slopes(
         targets: A response of each point, by name; NaN where it is missing.
 
     Returns:
-        An entry for each target and parameter; numbers are None where the points do not tell them.
+        A slope for each target and parameter; numbers are None where the points do not tell them.
     """
     columns = dict(_columns(axes, points))
-    effects: list[dict[str, Any]] = []
+    effects: list[Slope] = []
     for target, response in targets.items():
         known = np.isfinite(response)
         design = np.column_stack([np.ones(len(points)), *columns.values()])[known]
-        fit = _fit(design, response[known], CHANCE / len(targets))
-        for number, name in enumerate(columns):
-            effects.append({"of": target, "parameter": name, **fit[number]})
+        effects += _fit(target, list(columns), design, response[known], CHANCE / len(targets))
     return effects
 
 
@@ -211,30 +253,37 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value, default=str)
 
 
-def _fit(design: Floats, response: Floats, chance: float) -> list[dict[str, Any]]:
-    """Slope, interval and noise of each column behind the constant one."""
+def _fit(
+    target: str, names: Sequence[str], design: Floats, response: Floats, chance: float
+) -> list[Slope]:
+    """The slope of each column behind the constant one, by these names."""
     count, width = design.shape
-    unknown = dict.fromkeys(("slope", "slope95", "noise", "above_noise"))
+    nothing = dict.fromkeys(("slope", "slope95", "noise", "above_noise"))
+    unknown = [Slope(of=target, parameter=name, **nothing) for name in names]
     if count <= width or np.linalg.matrix_rank(design) < width:
-        return [unknown] * (width - 1)
+        return unknown
     solve: Floats = np.linalg.pinv(design).astype(float)
     fitted = solve @ response
     leverage = np.einsum("ij,ji->i", design, solve)
     if (leverage > 1.0 - _ROUNDING).any():  # one point alone decides a slope: no spread is known
-        return [unknown] * (width - 1)
+        return unknown
     errors = (response - design @ fitted) / (1.0 - leverage)
     error = np.sqrt((solve**2) @ errors**2)
     half = student95(count - width) * error
     noise = _largest(solve[1:], errors, error[1:], chance) * error
     least = np.maximum(noise, np.abs(response).max() * _ROUNDING)
     return [
-        {
-            "slope": float(slope),
-            "slope95": (float(slope - h), float(slope + h)),
-            "noise": float(n),
-            "above_noise": bool(abs(slope) > at_least),
-        }
-        for slope, h, n, at_least in zip(fitted[1:], half[1:], noise[1:], least[1:], strict=True)
+        Slope(
+            of=target,
+            parameter=name,
+            slope=float(slope),
+            slope95=(float(slope - h), float(slope + h)),
+            noise=float(n),
+            above_noise=bool(abs(slope) > at_least),
+        )
+        for name, slope, h, n, at_least in zip(
+            names, fitted[1:], half[1:], noise[1:], least[1:], strict=True
+        )
     ]
 
 

@@ -1,143 +1,65 @@
-"""What is told of the trials at each point, with labels and units of response and parameters."""
+"""Labels, units and bounds: of what an experiment measures, and of its parameters."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass, replace
+from typing import Any, get_args, get_type_hints
 
 from antennate import experiments
-from antennate.experiments.study.config import StudyConfig
-from antennate.experiments.study.effects import SUCCESS, effects, value
+from antennate.experiments.study.effects import SUCCESS
 from antennate.params.base import Params
 from antennate.sim.scenes.registry import TUNNEL, shared_limit
-from antennate.studies import statistics
-from antennate.studies.measures import Measure, shown
-from antennate.studies.plan import Axes, Point
+from antennate.studies.columns import Column, columns, named, shown
+from antennate.studies.experiment import Experiment
 
-_SHARE = Measure(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
-_UNITS = {
-    "s": "s",
-    "ms": "ms",
-    "m": "m",
-    "mm": "mm",
-    "m_s": "m/s",
-    "deg": "deg",
-    "n": "N",
-    "n_mm": "N·mm",
-    "n_mm_per_deg": "N·mm/deg",
-    "n_m_per_rad": "N·m/rad",
-    "pa": "Pa",
-}
-"""Ends of the names of columns, and the unit that each says."""
-_NO_MEASURE = ("point", "trial", "seed", "schema")
+_SHARE = Column(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
 NO_RESULT = frozenset({"failed", "crashed", "hung"})
 """Statuses of trials that gave no row."""
-Row = Mapping[str, Any]
 
 
-def summary(
-    config: StudyConfig,
-    points: Sequence[Point],
-    axes: Axes,
-    condition: str,
-    rows: Sequence[Row],
-) -> dict[str, Any]:
-    """The part of result.json that follows from the rows."""
-    response = config.response or _default_response(rows, axes)
-    names = list(dict.fromkeys(str(row[condition]) for row in rows)) if condition else [""]
-    by_cell: dict[tuple[int, str], list[Row]] = {}
-    for row in rows:
-        by_cell.setdefault((row["point"], str(row[condition]) if condition else ""), []).append(row)
-    cells = [
-        _cell(number, values, name, by_cell.get((number, name), []), response, config)
-        for number, values in enumerate(points)
-        for name in names
-    ]
-    statuses = [row["status"] for row in rows]
-    return {
-        "statuses": {name: statuses.count(name) for name in sorted(set(statuses))},
-        "response": response,
-        "conditions": {
-            name: _whole([r for n in by_cell if n[1] == name for r in by_cell[n]]) for name in names
-        },
-        "points": cells,
-        "effects": effects(config, axes, by_cell, points, names, response),
-    }
+def measure_of(experiment: str, name: str) -> Column:
+    """The column of this name: as the experiment declares it, or else known by its name alone.
 
-
-def _default_response(rows: Sequence[Row], axes: Iterable[str]) -> str | None:
-    """Share of successes, or else the first number of the rows."""
-    if not rows or "outcome" in rows[0]:
-        return SUCCESS if rows else None
-    known = [*_NO_MEASURE, *axes]
-    cells = (cell for row in rows for cell in row.items())  # the first one may have failed
-    numbers = (n for n, v in cells if isinstance(v, float | int) and n not in known)
-    return next(numbers, None)
-
-
-def _whole(rows: Sequence[Row]) -> dict[str, Any]:
-    """Counts of one condition, over all that it holds."""
-    valid = [row for row in rows if row["status"] == "ok"]
-    if not any("outcome" in row for row in rows):
-        return {"trials": len(rows), "invalid": len(rows) - len(valid)}
-    won = sum(row["outcome"] == "success" for row in valid)
-    return {
-        "trials": len(rows),
-        "invalid": len(rows) - len(valid),
-        "successes": won,
-        SUCCESS: won / len(valid) if valid else None,
-        "wilson95": statistics.wilson95(won, len(valid)) if valid else None,
-    }
-
-
-def _cell(
-    number: int,
-    values: Point,
-    condition: str,
-    rows: Sequence[Row],
-    response: str | None,
-    config: StudyConfig,
-) -> dict[str, Any]:
-    """One point under one condition."""
-    counts = _whole(rows)
-    mean, interval = counts.get(SUCCESS), counts.get("wilson95")
-    if response is not None and response != SUCCESS:
-        responses = np.array([value(row, response) for row in rows])
-        of = measure_of(config.experiment, response)
-        limits = bounds(of, config.experiment, {**config.settings, **values})
-        mean, interval = statistics.mean95(responses[np.isfinite(responses)], *limits)
-    return {
-        "point": number,
-        "values": dict(values),
-        "condition": condition,
-        **counts,
-        "response": mean,
-        "response95": interval,
-    }
-
-
-def measure(result: Mapping[str, Any]) -> Measure:
-    """The response of a study."""
-    return measure_of(result["experiment"], result["response"] or "response")
-
-
-def measure_of(experiment: str, column: str) -> Measure:
-    """The measure of an experiment that is kept in a column, or the column in words."""
-    if column == SUCCESS:
+    Args:
+        experiment: Name of the experiment, or of a function.
+        name: A column of its rows, or a number of its result by its dotted path.
+    """
+    if name == SUCCESS:
         return _SHARE
-    known = _experiment(experiment)
-    for known_measure in known.measures if known else ():
-        if known_measure.name.replace(".", "_") == column and known_measure.label:
-            return known_measure
-    end = next((e for e in sorted(_UNITS, key=len)[::-1] if column.endswith(f"_{e}")), "")
-    words = column.removesuffix(f"_{end}").replace("_", " ")
-    return Measure(column, words, _UNITS.get(end, ""), form=".3g")
+    known, plain = _experiment(experiment), named(name)
+    for each in _declared(known) if known else ():
+        if name == each.name.replace(".", "_"):
+            label = each.label
+        elif name.endswith(f".{each.name}"):
+            label = f"{each.label} ({name.removesuffix(f'.{each.name}')})"
+        else:
+            continue
+        if label.startswith(" "):  # it says something only below the line before it
+            label = plain.label
+        return replace(each, label=label, form=each.form.replace("d", plain.form))  # of a mean
+    return plain
 
 
-def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[float, float, bool]:
+def _declared(experiment: Experiment[Any, Any]) -> Iterator[Column]:
+    """Columns that have a label: of the rows, then of the result and its parts."""
+    for kind in (experiment.row, *_parts(experiment.result)):
+        yield from (each for each in columns(kind) if each.label) if kind else ()
+
+
+@functools.cache
+def _parts(kind: type | None) -> tuple[type, ...]:
+    """The dataclasses that a type is made of, those nearest to it first."""
+    seen: list[Any] = [kind]
+    for each in seen:
+        inner = get_type_hints(each).values() if is_dataclass(each) else get_args(each)
+        seen += [hint for hint in inner if hint not in seen]
+    return tuple(each for each in seen if isinstance(each, type) and is_dataclass(each))
+
+
+def bounds(of: Column, experiment: str, values: Mapping[str, Any]) -> tuple[float, float, bool]:
     """What no value of a measure lies below, what none exceeds, and whether that is a failure.
 
     A measure that ends at a parameter, as a time at its limit, is that limit where a trial fails.
@@ -157,25 +79,16 @@ def bounds(of: Measure, experiment: str, values: Mapping[str, Any]) -> tuple[flo
     return of.least, float(most), True
 
 
-def cell(of: Measure, number: Any, interval: Any = None) -> str:
+def cell(of: Column, number: Any, interval: Any = None) -> str:
     """A value of a measure as shown, with its interval if it has one."""
     text = shown(number, of.form, of.scale)
     return text if interval is None else f"{text} ({shown(interval, of.form, of.scale)})"
 
 
-def sample(result: Mapping[str, Any]) -> str:
-    """What the noise of the effects is of: trials a point, or points."""
-    if result["plan"] != "morris":
-        known = {cell["point"] for cell in result["points"] if cell["response"] is not None}
-        return f"{len(known)} points"
-    most = max(cell["trials"] for cell in result["points"])
-    return f"{most} trial{'s' if most != 1 else ''} a point"
-
-
-def axis(result: Mapping[str, Any], path: str) -> str:
+def axis(experiment: str, path: str) -> str:
     """A parameter: the last part of its dotted name in words, with its unit."""
     name, unit = path.rpartition(".")[2], ""
-    known = _experiment(result["experiment"])
+    known = _experiment(experiment)
     model: Any = known.config if known else None
     for part in path.split("."):
         is_group = isinstance(model, type) and issubclass(model, Params)
@@ -202,6 +115,6 @@ def silent(statuses: Mapping[str, int]) -> str:
     return f". Trials that say nothing: {counts}; trials.csv has why" if counts else ""
 
 
-def _experiment(name: str) -> Any:
+def _experiment(name: str) -> Experiment[Any, Any] | None:
     """The experiment of this name, None of a function."""
     return experiments.load(name) if name in experiments.names() else None

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 from antennate.errors import ConfigError, SceneError, SimulationError
-from antennate.experiments.study import measures
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.result import summarise
 from antennate.experiments.study.subject import (
     OF_STUDY,
     EmitRows,
     Rows,
     Subject,
     columns_in,
-    columns_of,
     configurations,
     find,
 )
 from antennate.messages import shortened
-from antennate.studies.experiment import OnRow, OnStep, Trial, no_row, no_step
-from antennate.studies.plan import Axes, Point
+from antennate.studies.experiment import Done, OnRow, OnStep, Trial, no_row, no_step
+from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, chunk_of, gather
 from antennate.studies.work import Fail, Failure
 
@@ -46,43 +44,6 @@ class _Task(NamedTuple):
         return self.point, *self.trial
 
 
-@dataclass(frozen=True)
-class StudyOutcome:
-    """All rows, point by point.
-
-    Attributes:
-        points: The points of the plan.
-        condition: Column that tells the condition of a row; empty without.
-        rows: One for each trial, all with the same keys.
-        total: Trials of the whole plan.
-        ended: Those of them that have ended.
-        interrupted: Whether some are missing.
-    """
-
-    config: StudyConfig
-    points: Sequence[Point]
-    condition: str
-    axes: Axes
-    rows: Rows
-    total: int
-    ended: int
-    interrupted: bool = False
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return {
-            "schema": 1,
-            "command": "study",
-            "experiment": self.config.experiment,
-            "plan": self.config.plan,
-            "axes": list(self.axes),
-            "trials": self.total,
-            "ended": self.ended,
-            "interrupted": self.interrupted,
-            **measures.summary(self.config, self.points, self.axes, self.condition, self.rows),
-        }
-
-
 def check(config: StudyConfig) -> None:
     """Find what cannot be run before anything is.
 
@@ -98,9 +59,8 @@ def check(config: StudyConfig) -> None:
         subject.check(first)
     except ConfigError as error:
         raise ConfigError(f"{config.experiment}: {error}") from None
-    columns = columns_of(config.experiment)
-    if columns is not None and config.response is not None:
-        columns.require(config.response, "response", config.experiment)
+    if subject.columns is not None and config.response is not None:
+        subject.columns.require(config.response, "response", config.experiment)
 
 
 def _require_names(config: StudyConfig, subject: Subject) -> None:
@@ -179,8 +139,8 @@ def run(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
-) -> StudyOutcome:
-    """Run all trials of all points.
+) -> Done:
+    """Run all trials of all points; the rows come point by point, all with the same keys.
 
     Raises:
         BadInputError: As for `check`.
@@ -214,7 +174,11 @@ def run(
     interrupted = False
     try:
         gather(
-            *(_run, tasks, workers, on_step, take),
+            _run,
+            tasks,
+            workers,
+            on_step,
+            take,
             chunk=chunk,
             together=True,
             lost=lost,
@@ -222,15 +186,24 @@ def run(
         )
     except KeyboardInterrupt:
         interrupted = True
-    rows = [  # in the order of the plan
-        {"point": task.point, **cells(points[task.point][0]), **row}
-        for task in tasks
-        for row in ended.get(task.key, ())
-    ]
-    return StudyOutcome(
-        *(config, [point for point, _ in points], subject.condition, axes, aligned(rows)),
-        *(len(tasks), len(ended), interrupted),
+    rows = aligned(
+        [  # in the order of the plan
+            {"point": task.point, **cells(points[task.point][0]), **row}
+            for task in tasks
+            for row in ended.get(task.key, ())
+        ]
     )
+    found = summarise(
+        config,
+        points=[point for point, _ in points],
+        axes=axes,
+        condition=subject.condition,
+        rows=rows,
+        total=len(tasks),
+        ended=len(ended),
+        interrupted=interrupted,
+    )
+    return Done(rows, found)
 
 
 def _run(tasks: Sequence[_Task], emit: _Emit) -> None:

@@ -21,6 +21,7 @@ from antennate.lookup import Registry
 from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
+from antennate.studies.columns import content
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment, Trial, no_row, no_step
 from antennate.studies.plan import Point
@@ -139,13 +140,10 @@ class Columns:
             )
 
 
-def columns_of(name: str) -> Columns | None:
-    """The columns of an experiment, None if they are not known before it is run."""
-    trials = experiments.load(name).trials if name in experiments.names() else None
-    if trials is None or trials.row is None:
-        return None
+def columns_of(row: type) -> Columns:
+    """The columns of rows of a class."""
     kinds: dict[str, str] = {}
-    for field in fields(trials.row):
+    for field in fields(row):
         text = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
         kinds[field.name] = text.partition(" ")[0]
     numbers = [n for n, k in kinds.items() if k in ("float", "int") and n not in OF_TRIALS]
@@ -176,6 +174,7 @@ class _ExperimentSubject:
         condition: Column of its rows that tells the condition; empty without.
         most: Trials that may be run at once.
         whole: Whether it has no trials of its own.
+        columns: Those of its rows; None if they are not known before it is run.
     """
 
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
@@ -184,6 +183,8 @@ class _ExperimentSubject:
         self.condition = self._trials.condition if self._trials else ""
         self.most = self._trials.most if self._trials else 1
         self.whole = self._trials is None
+        row = self._trials.row if self._trials else experiment.row
+        self.columns = columns_of(row) if row else None
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
         """Its configuration from nested values; `allowed` may differ though nothing reads them."""
@@ -213,7 +214,7 @@ class _ExperimentSubject:
             self._trials.run(config, trials, lambda i, row: emit(i, [asdict(row)]))
             return
         outcome = self._experiment.run(config, Workers(1), no_step, no_row)
-        emit(0, [asdict(row) for row in outcome.rows] or [numbers(outcome.result())])
+        emit(0, [asdict(row) for row in outcome.rows] or [numbers(content(outcome.result()))])
 
     def run_on_device(
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
@@ -231,6 +232,7 @@ class _FunctionSubject:
     condition = ""
     most = 1
     whole = False
+    columns: Columns | None = None
 
     def __init__(self, name: str, axes: Collection[str]) -> None:
         self._function, self._axes = FUNCTIONS.find(name), axes

@@ -15,10 +15,10 @@ touches at each base angle and flex, and takes the median.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement, product
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from antennate.antenna.sensor import reading_noise
 from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
 from antennate.experiments.bench import averaged, between, flex_of, recorded
 from antennate.experiments.sweep.physics import SweepConfig, Trace, Wall, record
+from antennate.experiments.sweep.result import ByNoise, CueErrors, Estimates
 from antennate.params.bench import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.studies.statistics import mean95
@@ -255,45 +256,44 @@ def run_trial(config: SweepConfig, condition: str, split: str, number: int, side
     return Trial(condition, split, number, side, distance, sweep, exact, noisy)
 
 
-def summarise(trials: list[Trial], spacing: float) -> dict[str, Any]:
+def errors_by_condition(trials: list[Trial], spacing: float) -> dict[str, ByNoise]:
     """Errors of every condition, with and without sensor noise, by quantity and cue."""
+    some = {name: [t for t in trials if t.condition == name] for name in CONDITIONS}
     return {
-        condition: {
-            noise: _errors([t for t in trials if t.condition == condition], noise, spacing)
-            for noise in ("noisy", "exact")
-        }
-        for condition in CONDITIONS
+        name: ByNoise(
+            noisy=_estimates(of, [t.noisy for t in of], spacing),
+            exact=_estimates(of, [t.exact for t in of], spacing),
+        )
+        for name, of in some.items()
     }
 
 
-def _errors(trials: list[Trial], noise: str, spacing: float) -> dict[str, Any]:
-    by_split = {split: [t for t in trials if t.split == split] for split in SPLITS}
-    felt = {
-        split: [(t, getattr(t, noise)) for t in some if getattr(t, noise) is not None]
-        for split, some in by_split.items()
-    }
-    summary: dict[str, Any] = {
-        "sweeps": len(by_split["test"]),
-        "missed": sum(not t.reason for t in by_split["test"]) - len(felt["test"]),
-        "invalid": sum(bool(t.reason) for t in trials),
-        "distance": {},
-        "gap": {},
-        "base_to_tip": {},
-    }
+def _estimates(trials: list[Trial], told: Sequence[Felt | None], spacing: float) -> Estimates:
+    felt: dict[str, list[tuple[Trial, Felt]]] = {split: [] for split in SPLITS}
+    for trial, of in zip(trials, told, strict=True):
+        if of is not None:
+            felt[trial.split].append((trial, of))
+    sweeps = [trial for trial in trials if trial.split == "test"]
     known, asked = ([f for _, f in felt[split]] for split in SPLITS)
     test = [t for t, _ in felt["test"]]
     truth, real = (np.array([t.distance for t, _ in felt[split]]) for split in SPLITS)
     left = np.array([t.side == "l" for t in test], bool)
     enough = [cue for cue in CUES if len(known) >= coefficients(cue)]
-    for cue in enough:
-        guess = calibrate_and_guess(cue, known, truth, asked)
-        summary["distance"][cue] = errors(guess[left], real[left])
-        summary["gap"][cue] = errors(*gaps(test, guess, spacing))
-    truth, real = (np.array([f.reach for f in group]) for group in (known, asked))
-    for cue in [cue for cue in TIP_CUES if cue in enough]:
-        guess = calibrate_and_guess(cue, known, truth, asked, tip=True)
-        summary["base_to_tip"][cue] = errors(guess, real)
-    return summary
+    guesses = {cue: calibrate_and_guess(cue, known, truth, asked) for cue in enough}
+    reached, reach = (np.array([f.reach for f in group]) for group in (known, asked))
+    tips = {
+        cue: calibrate_and_guess(cue, known, reached, asked, tip=True)
+        for cue in TIP_CUES
+        if cue in enough
+    }
+    return Estimates(
+        sweeps=len(sweeps),
+        missed=sum(not trial.reason for trial in sweeps) - len(test),
+        invalid=sum(bool(trial.reason) for trial in trials),
+        distance={cue: errors(guess[left], real[left]) for cue, guess in guesses.items()},
+        gap={cue: errors(*gaps(test, guess, spacing)) for cue, guess in guesses.items()},
+        base_to_tip={cue: errors(guess, reach) for cue, guess in tips.items()},
+    )
 
 
 def gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floats]:
@@ -306,24 +306,19 @@ def gaps(test: list[Trial], guess: Floats, spacing: float) -> tuple[Floats, Floa
     return guess[left] + guess[right] + spacing, truth[left] + truth[right] + spacing
 
 
-def errors(guess: Floats, truth: Floats) -> dict[str, Any]:
-    """Errors of estimates, in % of the truth; what cannot be told (NaN) is counted apart.
-
-    Returns:
-        `n`, `untold`, mean absolute percentage error `mape_percent`, root mean square
-        `rmse_percent`, and the mean `bias_percent`; the first two with 95 % intervals (Student),
-        which begin at 0 at the least; None of few estimates.
-    """
+def errors(guess: Floats, truth: Floats) -> CueErrors:
+    """Errors of estimates, in % of the truth; what cannot be told (NaN) is counted apart."""
     known = np.isfinite(guess)
     share = 100.0 * (guess[known] / truth[known] - 1.0)
     mean, ends = mean95(abs(share), least=0.0)
     square, square_ends = mean95(share**2, least=0.0)
-    return {
-        "n": int(known.sum()),
-        "untold": int((~known).sum()),
-        "mape_percent": mean,
-        "mape_95": ends,
-        "rmse_percent": math.sqrt(square) if known.any() else float("nan"),
-        "rmse_95": square_ends and tuple(map(math.sqrt, square_ends)),
-        "bias_percent": float(share.mean()) if known.any() else float("nan"),
-    }
+    some = bool(known.any())
+    return CueErrors(
+        n=int(known.sum()),
+        untold=int((~known).sum()),
+        mape_percent=mean if some else None,
+        mape_95=ends,
+        rmse_percent=math.sqrt(square) if some else None,
+        rmse_95=square_ends and (math.sqrt(square_ends[0]), math.sqrt(square_ends[1])),
+        bias_percent=float(share.mean()) if some else None,
+    )

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from antennate.antenna.statics import Profile, with_profile
 from antennate.experiments.bench import bench_films
-from antennate.experiments.sweep.estimates import CUES, Trial, plan, run_trial, summarise
+from antennate.experiments.sweep.estimates import (
+    CUES,
+    Trial,
+    errors_by_condition,
+    plan,
+    run_trial,
+)
 from antennate.experiments.sweep.physics import (
     Outlines,
-    Shape,
     SweepConfig,
     Wall,
     outlines_csv,
@@ -23,108 +28,76 @@ from antennate.experiments.sweep.physics import (
     record,
     shares,
 )
+from antennate.experiments.sweep.result import (
+    ERROR,
+    Cell,
+    CueErrors,
+    Estimates,
+    ShapeMap,
+    Spread,
+    SweepResult,
+    SweepRow,
+    Swept,
+)
 from antennate.params.bench import SweepParams
 from antennate.sim.bench import Watch
-from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
-from antennate.studies.measures import Table, shown
+from antennate.studies.columns import columns, shown
+from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers, gather
 from antennate.studies.statistics import mean95
+from antennate.studies.tables import Table
 
 MOTIONS = ("fixed", "moving")
-SHAPES = tuple(shape.name.lower() for shape in Shape)
 _TASK = 12
 """Sweeps handed to a process at once."""
 
 
-@dataclass(frozen=True, slots=True)
-class SweepRow:
-    """One sweep, a row of trials.csv: a cell of the map, or a trial of the estimates.
-
-    Columns that do not apply are empty.
-    """
-
-    seed: int
-    trial: int
-    kind: Literal["map", "estimate"]
-    profile: str
-    condition: str
-    side: str
-    status: str
-    distance_m: float
-    centre_rad: float
-    amplitude_rad: float
-    forward: float | None = None
-    backward: float | None = None
-    straight: float | None = None
-    transition: float | None = None
-    free: float | None = None
-    peak_flex_rad: float | None = None
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class SweepOutcome:
-    """The map and the estimates.
+@dataclass(frozen=True)
+class Sweeps(Done):
+    """The sweeps of the map and of the estimates, and what they come to.
 
     Attributes:
-        cells: Rows of the map in the order of profile, motion, distance, centre and amplitude.
-        trials: Sweeps of the estimates in the order of condition, split, trial and side.
         outlines: Points of the antenna in each cell of `profile`, if they were to be saved.
     """
 
-    config: SweepConfig
-    cells: list[SweepRow]
-    trials: list[Trial]
-    outlines: list[Outlines] = field(default_factory=list[Outlines])
-
-    @property
-    def rows(self) -> list[SweepRow]:
-        """Every sweep."""
-        return [*self.cells, *(_row(self.config, trial) for trial in self.trials)]
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        return {
-            "schema": 1,
-            "command": "sweep",
-            "seed": config.seed,
-            "length_m": config.antenna.length,
-            "frequency_hz": config.sweep.frequency,
-            "profile": config.profile,
-            "shapes": {
-                profile: {motion: self._shapes(profile, motion) for motion in MOTIONS}
-                for profile in config.profiles
-            },
-            "estimates": summarise(self.trials, config.antenna.base_spacing),
-            "published_percent": {"base_to_tip": 7.75, "gap": 6.73},
-        }
-
-    def _shapes(self, profile: str, motion: str) -> dict[str, Any]:
-        rows = [r for r in self.cells if (r.profile, r.condition) == (profile, motion)]
-        valid = [row for row in rows if row.status == "valid"]
-        names = [*SHAPES, "free"]
-        return {
-            "cells": len(rows),
-            "invalid": len(rows) - len(valid),
-            "share": {name: _spread([getattr(r, name) for r in valid]) for name in names},
-            "map": [
-                {
-                    "distance": row.distance_m / self.config.antenna.length,
-                    "centre_rad": row.centre_rad,
-                    "amplitude_rad": row.amplitude_rad,
-                    **{name: getattr(row, name) for name in names},
-                }
-                for row in valid
-            ],
-        }
+    outlines: Sequence[Outlines]
 
 
-def _spread(shares: Sequence[float]) -> tuple[float, float | None, float | None]:
+def summarise(config: SweepConfig, cells: Sequence[SweepRow], trials: list[Trial]) -> SweepResult:
+    """The result of the cells of the map, and of the trials of the estimates."""
+    shapes: dict[str, dict[str, ShapeMap]] = {profile: {} for profile in config.profiles}
+    for profile, motion in product(config.profiles, MOTIONS):
+        rows = [row for row in cells if (row.profile, row.condition) == (profile, motion)]
+        shapes[profile][motion] = _shape_map(rows, config.antenna.length)
+    return SweepResult(
+        seed=config.seed,
+        length_m=config.antenna.length,
+        frequency_hz=config.sweep.frequency,
+        profile=config.profile,
+        shapes=shapes,
+        estimates=errors_by_condition(trials, config.antenna.base_spacing),
+    )
+
+
+def _shape_map(rows: Sequence[SweepRow], length: float) -> ShapeMap:
+    valid = [row for row in rows if row.status == "valid"]
+    names = [each.name for each in fields(Swept)]
+    return ShapeMap(
+        cells=len(rows),
+        invalid=len(rows) - len(valid),
+        share={c.name: _spread([c.value(row) for row in valid]) for c in columns(Swept)},
+        map=[
+            Cell(distance=row.distance_m / length, **{name: getattr(row, name) for name in names})
+            for row in valid
+        ],
+    )
+
+
+def _spread(shares: Sequence[float]) -> Spread:
     """Mean of shares over the cells of the map, and how far it spreads."""
     mean, ends = mean95(np.array(shares), 0.0, 1.0)
     low, high = ends or (None, None)
-    return mean, low, high
+    return mean if shares else None, low, high
 
 
 def _row(config: SweepConfig, trial: Trial) -> SweepRow:
@@ -199,7 +172,7 @@ def run(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
-) -> SweepOutcome:
+) -> Sweeps:
     """Sweep in every cell of the map and in every trial of the estimates.
 
     Raises:
@@ -218,73 +191,69 @@ def run(
 
     items: list[Any] = gather(_sweep, [*cells, *trials], workers, on_step, keep, _TASK)
     mapped, tried = items[: len(cells)], items[len(cells) :]
-    outlines = [points for _, points in mapped if points is not None]
-    return SweepOutcome(config, [row for row, _ in mapped], tried, outlines)
+    rows = [row for row, _ in mapped]
+    return Sweeps(
+        rows=[*rows, *(_row(config, trial) for trial in tried)],
+        found=summarise(config, rows, tried),
+        outlines=[points for _, points in mapped if points is not None],
+    )
 
 
-QUANTITIES = ("distance", "gap", "base_to_tip")
-
-
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: SweepResult) -> Sequence[Table]:
     """The shares of the shapes, and the errors of the estimates."""
-    columns = {
-        f"{profile}, {motion}": row
-        for profile, motions in result["shapes"].items()
-        for motion, row in motions.items()
-        if profile == result["profile"] or result["profile"] not in result["shapes"]
+    maps = {
+        f"{profile}, {motion}": each
+        for profile, motions in result.shapes.items()
+        for motion, each in motions.items()
+        if profile == result.profile or result.profile not in result.shapes
     }
     shapes = Table(
         "Share of time of each shape, mean over the map (spread over cells)",
-        list(columns),
+        list(maps),
         [
-            (name, [_with_interval(*row["share"][name]) for row in columns.values()])
-            for name in (*SHAPES, "free")
+            (shape.label, [_with_interval(*each.share[shape.name]) for each in maps.values()])
+            for shape in columns(Swept)
         ],
         "The map is a grid that was chosen. The spread over its cells, Student's t of their mean, "
         "is no interval of chance.",
     )
-    return shapes, *(_errors(name, noise) for name, noise in result["estimates"].items())
+    return shapes, *(_errors(name, each.noisy) for name, each in result.estimates.items())
 
 
-def _errors(condition: str, by_noise: Mapping[str, Any]) -> Table:
-    noisy = by_noise["noisy"]
+def _errors(condition: str, noisy: Estimates) -> Table:
+    quantities = {"distance": noisy.distance, "gap": noisy.gap, "base_to_tip": noisy.base_to_tip}
     return Table(
-        f"Mean absolute error [%] (95 %), sweep {condition}, with sensor noise",
-        QUANTITIES,
+        f"{ERROR.title.capitalize()} (95 %), sweep {condition}, with sensor noise",
+        list(quantities),
         [
-            (cue.replace("_", " "), [_error(noisy[quantity], cue) for quantity in QUANTITIES])
+            (cue.replace("_", " "), [_error(cues.get(cue)) for cues in quantities.values()])
             for cue in CUES
         ],
-        f"{noisy['sweeps']} test sweeps, {noisy['missed']} felt nothing, "
-        f"{noisy['invalid']} invalid.",
+        f"{noisy.sweeps} test sweeps, {noisy.missed} felt nothing, {noisy.invalid} invalid.",
     )
 
 
-def _error(cues: Mapping[str, Any], cue: str) -> str:
-    if cue not in cues:
+def _error(found: CueErrors | None) -> str:
+    if found is None:
         return shown(None)
-    return _with_interval(cues[cue]["mape_percent"], *(cues[cue]["mape_95"] or (None, None)))
+    return _with_interval(found.mape_percent, *(found.mape_95 or (None, None)))
 
 
 def _with_interval(mean: float | None, low: float | None, high: float | None) -> str:
     return shown(mean) if low is None else f"{shown(mean)} ({shown(low)}–{shown(high)})"
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: SweepResult) -> str:
     """How well active touch tells distances, beside the published figures."""
-    noisy = result["estimates"]["same"]["noisy"]
-    published = result["published_percent"]
+    noisy, published = result.estimates["same"].noisy, result.published_percent
+    distance, tip, gap = (
+        _error(cues.get("flex_and_base")) for cues in (noisy.distance, noisy.base_to_tip, noisy.gap)
+    )
     return (
         "Flex and base angle together tell the distance of a wall with an error of "
-        f"{_error(noisy['distance'], 'flex_and_base')} % (95 % interval), that of the tip "
-        f"{_error(noisy['base_to_tip'], 'flex_and_base')} % and a gap "
-        f"{_error(noisy['gap'], 'flex_and_base')} %; published for CITRAS: "
-        f"{published['base_to_tip']:g} % and {published['gap']:g} %."
+        f"{distance} % (95 % interval), that of the tip {tip} % and a gap {gap} %; published for "
+        f"CITRAS: {published.base_to_tip:g} % and {published.gap:g} %."
     )
-
-
-def _files(outcome: SweepOutcome) -> Mapping[str, str]:
-    return {"points.csv": outlines_csv(outcome.outlines)} if outcome.outlines else {}
 
 
 def _film(config: SweepConfig, profile: Profile, trial: int, watch: Watch) -> str:
@@ -298,9 +267,17 @@ def _film(config: SweepConfig, profile: Profile, trial: int, watch: Watch) -> st
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, SweepConfig, run, tables, sentence),
+    __name__,
+    SweepConfig,
+    run,
+    tables,
+    sentence,
+    result=SweepResult,
+    row=SweepRow,
     films=bench_films(lambda config: config.profiles, _film, "wall"),
-    files=_files,
+    files=lambda outcome: (
+        {"points.csv": outlines_csv(outcome.outlines)} if outcome.outlines else {}
+    ),
     parts="sweeps",
     captions={
         "sweep": "Shares of the time in each shape, with the base fixed and moving, and "

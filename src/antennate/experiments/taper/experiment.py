@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +10,15 @@ import numpy as np
 
 from antennate import figures as style
 from antennate.antenna import springs
-from antennate.csv_files import column, csv_rows, number_of
+from antennate.csv_files import column as column_named
+from antennate.csv_files import csv_rows, number_of
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import read_limited
 from antennate.params.base import number
 from antennate.params.spring import TaperParams
-from antennate.studies.experiment import Experiment, Outcome
-from antennate.studies.measures import Table, shown
+from antennate.studies.columns import column, shown, tabular
+from antennate.studies.experiment import Done, Experiment
+from antennate.studies.tables import Table
 from antennate.types import Floats
 
 if TYPE_CHECKING:
@@ -37,58 +38,60 @@ class TaperConfig(TaperParams):
     """CSV file with a column diameter_mm, base first; replaces segments, ends and law."""
 
 
-@dataclass(frozen=True)
-class TaperOutcome(Outcome):
-    """A taper and two ladders.
+@tabular
+class Segment:
+    """A segment of the animal's antenna."""
 
-    Attributes:
-        diameter: Diameters base to tip [m], shape (n,).
-        proxy: Stiffness of each segment over that of the base, shape (n,).
-        stretches: The same for one stretch for each spring of the ladder, shape (m,).
-        ladder: Stiffness of the ladder's springs over its first, shape (m,).
-        suggested: Coils of the ladder that follows the taper best within limits, shape (m,).
-    """
-
-    config: TaperConfig
-    diameter: Floats
-    proxy: Floats
-    stretches: Floats
-    ladder: Floats
-    suggested: Floats
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        suggested = springs.ladder_proxy(self.suggested)
-        return {
-            "schema": 1,
-            "command": "taper",
-            "segments": [
-                {"diameter_mm": 1e3 * d, "second_moment_mm4": 1e12 * i, "proxy": k}
-                for d, i, k in zip(
-                    self.diameter.tolist(),
-                    springs.second_moment(self.diameter).tolist(),
-                    self.proxy.tolist(),
-                    strict=True,
-                )
-            ],
-            "base_over_tip": float(1.0 / self.proxy[-1]),
-            "stretches": (self.stretches / self.stretches[0]).tolist(),
-            "stretch_ratio": float(self.stretches[0] / self.stretches[-1]),
-            "ladder": _ladder(np.array(self.config.ladder), self.ladder, self.stretches),
-            "suggested": _ladder(self.suggested, suggested, self.stretches),
-        }
+    diameter_mm: float = column("d", "mm", form=".3g")
+    """Diameter."""
+    second_moment_mm4: float = column("I", "mm⁴", form=".3g")
+    """Second moment of area of the round section [mm⁴]."""
+    proxy: float = column("proxy", form=".3g")
+    """Stiffness over that of the base."""
 
 
-def _ladder(coils: Floats, proxy: Floats, stretches: Floats) -> dict[str, Any]:
-    return {
-        "active_coils": coils.tolist(),
-        "proxy": proxy.tolist(),
-        "base_over_tip": float(proxy[0] / proxy[-1]),
-        "distance_decades": springs.distance_decades(proxy, stretches / stretches[0]),
-    }
+@tabular
+class Ladder:
+    """Springs in a row, base first."""
+
+    active_coils: list[float]
+    """Active coils of each spring."""
+    proxy: list[float]
+    """Stiffness of each spring over that of the first."""
+    base_over_tip: float
+    """Stiffness of the first spring over that of the last."""
+    distance_decades: float
+    """Root mean square distance of the stiffnesses from those of the stretches, in powers of
+    ten."""
+
+    @property
+    def name(self) -> str:
+        """Coils as tables and figures name them."""
+        return "-".join(f"{n:g}" for n in self.active_coils)
 
 
-def run(config: TaperConfig) -> TaperOutcome:
+@tabular
+class TaperResult:
+    """What a run comes to."""
+
+    schema: int = 1
+    command: str = "taper"
+    segments: list[Segment]
+    """Segments of the animal, base first."""
+    base_over_tip: float
+    """Stiffness of the base over that of the tip."""
+    stretches: list[float]
+    """Stiffness of the animal in as many stretches as the ladder has springs, over that of the
+    first; of each stretch the harmonic mean."""
+    stretch_ratio: float
+    """Stiffness of the first stretch over that of the last."""
+    ladder: Ladder
+    """Springs of the robot, or those that were given."""
+    suggested: Ladder
+    """Springs that follow the stretches best within the limits of coils."""
+
+
+def run(config: TaperConfig) -> Done:
     """Work out the taper, its distance from the ladder, and a ladder that follows it better.
 
     Raises:
@@ -103,13 +106,36 @@ def run(config: TaperConfig) -> TaperOutcome:
         diameter = read_diameters(Path(config.diameters))
     proxy = springs.proxy(diameter)
     stretches = springs.binned(proxy, len(config.ladder))
-    return TaperOutcome(
-        config=config,
-        diameter=diameter,
-        proxy=proxy,
-        stretches=stretches,
-        ladder=springs.ladder_proxy(np.array(config.ladder)),
-        suggested=springs.follow(stretches / stretches[0], fewest, most),
+    animal = stretches / stretches[0]
+    result = TaperResult(
+        segments=_segments(diameter, proxy),
+        base_over_tip=float(1.0 / proxy[-1]),
+        stretches=animal.tolist(),
+        stretch_ratio=float(stretches[0] / stretches[-1]),
+        ladder=_ladder(np.array(config.ladder), animal),
+        suggested=_ladder(springs.follow(animal, fewest, most), animal),
+    )
+    return Done(rows=(), found=result)
+
+
+def _segments(diameter: Floats, proxy: Floats) -> list[Segment]:
+    """Segments of these diameters [m] and stiffnesses, both of shape (n,)."""
+    moments = springs.second_moment(diameter)
+    values = zip(diameter.tolist(), moments.tolist(), proxy.tolist(), strict=True)
+    return [
+        Segment(diameter_mm=1e3 * d, second_moment_mm4=1e12 * moment, proxy=stiffness)
+        for d, moment, stiffness in values
+    ]
+
+
+def _ladder(coils: Floats, animal: Floats) -> Ladder:
+    """Springs of these coils beside the stretches of the animal, both of shape (m,)."""
+    proxy = springs.ladder_proxy(coils)
+    return Ladder(
+        active_coils=coils.tolist(),
+        proxy=proxy.tolist(),
+        base_over_tip=float(proxy[0] / proxy[-1]),
+        distance_decades=springs.distance_decades(proxy, animal),
     )
 
 
@@ -120,7 +146,7 @@ def read_diameters(path: Path) -> Floats:
         BadInputError: The file cannot be read, or a row holds no diameter.
     """
     rows = csv_rows(path, read_limited(path, _LARGEST_FILE), [COLUMN], BadInputError)
-    place = column(next(rows)[1], COLUMN) or 0
+    place = column_named(next(rows)[1], COLUMN) or 0
     diameters = [_diameter(path, line, "".join(cells[place : place + 1])) for line, cells in rows]
     if len(diameters) < 2:
         raise BadInputError(
@@ -141,47 +167,39 @@ def _diameter(path: Path, line: int, cell: str) -> float:
 
 _SEGMENTS = 20
 """Most lines of the table."""
-_COLUMNS = {"d [mm]": "diameter_mm", "I [mm⁴]": "second_moment_mm4", "proxy": "proxy"}
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: TaperResult) -> Sequence[Table]:
     """Segments of the animal, and ladders of springs."""
-    rows = result["segments"]
-    step = -(-len(rows) // _SEGMENTS)
-    animal = [
-        (f"segment {i + 1}", [shown(row[key], ".3g") for key in _COLUMNS.values()])
-        for i, row in enumerate(rows)
-        if i % step == 0
-    ]
-    ladder, suggested = result["ladder"], result["suggested"]
-    springs = zip(result["stretches"], ladder["proxy"], suggested["proxy"], strict=True)
+    every = -(-len(result.segments) // _SEGMENTS)
+    numbered = {f"segment {i + 1}": segment for i, segment in enumerate(result.segments)}
+    ladder, suggested = result.ladder, result.suggested
+    springs = zip(result.stretches, ladder.proxy, suggested.proxy, strict=True)
     return (
-        Table(
-            "Animal", list(_COLUMNS), animal, f"Base over tip {result['base_over_tip']:.0f} : 1."
+        Table.lines(
+            "Animal",
+            dict(list(numbered.items())[::every]),
+            note=f"Base over tip {result.base_over_tip:.0f} : 1.",
         ),
         Table(
             "One spring a stretch, over the first",
             ("animal", "ladder", "suggested"),
             [(f"spring {i + 1}", [shown(v, ".3g") for v in row]) for i, row in enumerate(springs)],
-            f"Stretches of the animal fall {result['stretch_ratio']:.0f} : 1, the ladder "
-            f"{ladder['base_over_tip']:.3g} : 1, the suggested one "
-            f"{suggested['base_over_tip']:.3g} : 1.",
+            f"Stretches of the animal fall {result.stretch_ratio:.0f} : 1, the ladder "
+            f"{ladder.base_over_tip:.3g} : 1, the suggested one "
+            f"{suggested.base_over_tip:.3g} : 1.",
         ),
     )
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: TaperResult) -> str:
     """How far the ladders are from the animal."""
-    ladder, suggested = result["ladder"], result["suggested"]
+    ladder, suggested = result.ladder, result.suggested
     return (
-        f"The ladder {_coils(ladder)} is {ladder['distance_decades']:.2f} decades from the animal "
-        f"(root mean square), {_coils(suggested)} would be {suggested['distance_decades']:.2f}; "
+        f"The ladder {ladder.name} is {ladder.distance_decades:.2f} decades from the animal "
+        f"(root mean square), {suggested.name} would be {suggested.distance_decades:.2f}; "
         "computed from diameters, nothing was measured."
     )
-
-
-def _coils(row: Mapping[str, Any]) -> str:
-    return "-".join(f"{n:g}" for n in row["active_coils"])
 
 
 _ANIMAL, _STRETCHES = style.INK, style.MUTED
@@ -190,11 +208,12 @@ _LADDER, _SUGGESTED = style.PROFILE_LOOKS["descending"][0], "#56B4E9"
 
 
 @style.styled
-def figures(outcome: TaperOutcome) -> dict[str, Figure]:
+def figures(outcome: Done) -> dict[str, Figure]:
     """The proxy of the animal, its stretches, the ladder, and the ladder that follows it best."""
-    figure, result = style.canvas(style.WIDTH, 3.8), outcome.result()
+    result: TaperResult = outcome.result()
+    figure = style.canvas(style.WIDTH, 3.8)
     panel = figure.subplots()
-    segments = np.array([row["proxy"] for row in result["segments"]])
+    segments = np.array([segment.proxy for segment in result.segments])
     places = (np.arange(len(segments)) + 0.5) / len(segments)
     panel.plot(
         places,
@@ -202,13 +221,13 @@ def figures(outcome: TaperOutcome) -> dict[str, Figure]:
         color=_ANIMAL,
         marker="o",
         markersize=4,
-        label=f"animal, {len(segments)} segments: {result['base_over_tip']:.0f} : 1",
+        label=f"animal, {len(segments)} segments: {result.base_over_tip:.0f} : 1",
     )
-    _steps(panel, result["stretches"], _STRETCHES, (0, (2, 1.5)), "animal, one stretch a spring")
-    for name, colour in (("ladder", _LADDER), ("suggested", _SUGGESTED)):
-        row = result[name]
-        label = f"{name} {_coils(row)}: {row['base_over_tip']:.3g} : 1"
-        _steps(panel, row["proxy"], colour, "solid", label)
+    _steps(panel, result.stretches, _STRETCHES, (0, (2, 1.5)), "animal, one stretch a spring")
+    ladders = ("ladder", result.ladder, _LADDER), ("suggested", result.suggested, _SUGGESTED)
+    for name, ladder, colour in ladders:
+        label = f"{name} {ladder.name}: {ladder.base_over_tip:.3g} : 1"
+        _steps(panel, ladder.proxy, colour, "solid", label)
     panel.set_yscale("log")
     panel.set(
         xlim=(0, 1),
@@ -227,7 +246,12 @@ def _steps(panel: Axes, values: list[float], colour: Any, line: Any, label: str)
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, TaperConfig, lambda config, *_: run(config), tables, sentence),
+    __name__,
+    TaperConfig,
+    lambda config, *_: run(config),
+    tables,
+    sentence,
+    result=TaperResult,
     figures=figures,
     captions={
         "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,11 +16,25 @@ from antennate.control.conditioning import bending_level
 from antennate.errors import BadInputError
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.physics import TouchConfig, Traverse, run_traverse
+from antennate.experiments.touch.result import (
+    Answers,
+    Averaged,
+    Cell,
+    Measures,
+    Needed,
+    ProfileMeasures,
+    SpeedMeasures,
+    TouchResult,
+    TouchRow,
+    Truth,
+    WallMeasures,
+)
 from antennate.experiments.touch.sensing import Comparison, compare, readings
 from antennate.sim.bench import Bench
+from antennate.studies.columns import column_of, shown
 from antennate.studies.experiment import Experiment, OnStep, no_step
-from antennate.studies.measures import Measure, Table, few, shown
 from antennate.studies.pool import Workers, gather
+from antennate.studies.tables import Table, few
 from antennate.types import Floats
 
 if TYPE_CHECKING:
@@ -29,30 +43,17 @@ if TYPE_CHECKING:
 _FLEX = np.linspace(0.0, 2.0 * np.pi, 20001)
 _STRONGEST = 1.0
 """Largest force tried at the tip [N]."""
-_SHORT = ("f1", "f1_95", "precision", "recall", "contacts", "missed", "false_per_m")
-_AVERAGED = (*_SHORT, "onset", "release", "auc", "auc_95")
-
-
-@dataclass(frozen=True, slots=True)
-class TouchRow:
-    """One traverse in the table; empty cells where the physics is invalid."""
-
-    seed: int
-    trial: int
-    wall: str
-    speed_m_s: float
-    profile: str
-    status: str
-    overlap_m: float
-    contact_share: float | None = None
-    f1: float | None = None
-    contacts: int | None = None
-    missed: int | None = None
-    alarms: int | None = None
-    false: int | None = None
-    largest_flex_rad: float | None = None
-    largest_force_n: float | None = None
-    reason: str = ""
+F1 = column_of(Measures, "f1")
+_AVERAGED = {
+    "f1": ".3f",
+    "recall": ".3f",
+    "false_per_m": ".2f",
+    "onset.median_ms": ".0f",
+    "release.median_ms": ".0f",
+    "auc": ".3f",
+}
+"""Columns of the table of T_avg, without intervals, and their formats: they differ by little."""
+Part = TypeVar("Part", bound=Answers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +67,11 @@ class TouchOutcome:
     config: TouchConfig
     traverses: list[Traverse]
     comparisons: list[Comparison | None]
-    summary: dict[str, Any]
+    found: TouchResult
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return self.summary
+    def result(self) -> TouchResult:
+        """What they come to."""
+        return self.found
 
     @property
     def rows(self) -> list[TouchRow]:
@@ -91,13 +92,20 @@ class TouchOutcome:
 
 def _row(traverse: Traverse, comparison: Comparison | None) -> TouchRow:
     plan = traverse.plan
-    key = (plan.config.seed, plan.trial, plan.wall, plan.speed, plan.profile)
+    known: dict[str, Any] = {
+        "seed": plan.config.seed,
+        "trial": plan.trial,
+        "wall": plan.wall,
+        "speed_m_s": plan.speed,
+        "profile": plan.profile,
+        "overlap_m": plan.overlap,
+    }
     if comparison is None:
-        return TouchRow(*key, "invalid", plan.overlap, reason=traverse.reason)
+        return TouchRow(status="invalid", reason=traverse.reason, **known)
     truth, alarm, matches = comparison.truth, comparison.alarm, comparison.matches
     whole = int(truth.sum() + alarm.sum())
     return TouchRow(
-        *(*key, "valid", plan.overlap),
+        status="valid",
         contact_share=float(truth.mean()),
         f1=2.0 * int((truth & alarm).sum()) / whole if whole else None,
         contacts=len(matches.contacts),
@@ -106,6 +114,7 @@ def _row(traverse: Traverse, comparison: Comparison | None) -> TouchRow:
         false=matches.false,
         largest_flex_rad=float(abs(traverse.flex).max()),
         largest_force_n=float(abs(traverse.force).max()),
+        **known,
     )
 
 
@@ -119,55 +128,56 @@ def run(config: TouchConfig, workers: int | Workers = 1, on_step: OnStep = no_st
     tasks = list(product([config], config.walls, config.speeds, config.profiles, trials))
     traverses = gather(run_traverse, tasks, workers, on_step)
     comparisons = compare(config, traverses)
-    return TouchOutcome(config, traverses, comparisons, _summary(config, traverses, comparisons))
+    return TouchOutcome(config, traverses, comparisons, _result(config, traverses, comparisons))
 
 
-def _summary(
+def _result(
     config: TouchConfig, traverses: Sequence[Traverse], comparisons: Sequence[Comparison | None]
-) -> dict[str, Any]:
-    """The content of result.json."""
+) -> TouchResult:
+    """What all traverses come to."""
     valid = [c for c in comparisons if c is not None]
     pool = Pool(valid, config.trials, config.antenna.sensor.rate)
 
-    def of(**wanted: Any) -> dict[str, Any]:
+    def of(kind: type[Part], **wanted: Any) -> Part:
         group = [v for v in valid if all(getattr(v, k) == w for k, w in wanted.items())]
         names = {"speed_m_s" if k == "speed" else k: w for k, w in wanted.items()}
-        return {**names, **pool.measure(group)}
+        return kind(**names, **vars(pool.measure(group)))
 
     walls, speeds, profiles = config.walls, config.speeds, config.profiles
     mine = {p: [v for v in valid if v.profile == p] for p in profiles}
-    return {
-        "schema": 1,
-        "command": "touch",
-        "seed": config.seed,
-        "trials": config.trials,
-        "invalid": len(traverses) - len(valid),
-        "rate_hz": config.antenna.sensor.rate,
-        "travel_m": config.travel,
-        "contact_force_n": config.contact_force,
-        "merge_time_s": config.merge_time,
-        "averaging_time_s": config.conditioning.averaging_time,
-        "threshold": config.rule.threshold,
-        "hysteresis": config.rule.hysteresis,
-        "needed": _needed(config),
-        "profiles": {p: of(profile=p) for p in profiles},
-        "by_speed": [of(profile=p, speed=s) for p in profiles for s in speeds],
-        "by_wall": [of(profile=p, wall=w) for p in profiles for w in walls],
-        "cells": [of(wall=w, speed=s, profile=p) for w in walls for s in speeds for p in profiles],
-        "pairs": {
+    threshold, flex_at = config.rule.threshold, partial(_flex_at, config)
+    return TouchResult(
+        seed=config.seed,
+        trials=config.trials,
+        invalid=len(traverses) - len(valid),
+        rate_hz=config.antenna.sensor.rate,
+        travel_m=config.travel,
+        contact_force_n=config.contact_force,
+        merge_time_s=config.merge_time,
+        averaging_time_s=config.conditioning.averaging_time,
+        threshold=threshold,
+        hysteresis=config.rule.hysteresis,
+        needed=_needed(config),
+        profiles={p: of(ProfileMeasures, profile=p) for p in profiles},
+        by_speed=[of(SpeedMeasures, profile=p, speed=s) for p in profiles for s in speeds],
+        by_wall=[of(WallMeasures, profile=p, wall=w) for p in profiles for w in walls],
+        cells=[
+            of(Cell, wall=w, speed=s, profile=p) for w in walls for s in speeds for p in profiles
+        ],
+        pairs={
             f"{a}-{b}": pool.f1_difference(mine[a], mine[b]) for a, b in combinations(profiles, 2)
         },
-        "roc": {p: _with_flex(config, roc(mine[p], config.rule.threshold)) for p in profiles},
-        "averaging": [_averaged(config, traverses, time) for time in config.averaging_times],
-        "truths": [_with_truth(config, traverses, *way) for way in _truths(config)],
-    }
+        roc={p: roc(mine[p], threshold, flex_at) for p in profiles},
+        averaging=[_averaged(config, traverses, time) for time in config.averaging_times],
+        truths=[_with_truth(config, traverses, *way) for way in _truths(config)],
+    )
 
 
-def _needed(config: TouchConfig) -> dict[str, Any]:
+def _needed(config: TouchConfig) -> Needed:
     """Flex at which b reaches theta, and the force normal to the tip that bends so far."""
     angle = _flex_at(config, config.rule.threshold)
     forces = {p: None if angle is None else _tip_force(config, p, angle) for p in config.profiles}
-    return {"flex_rad": angle, "tip_force_n": forces}
+    return Needed(flex_rad=angle, tip_force_n=dict(forces))
 
 
 def _flex_at(config: TouchConfig, level: float) -> float | None:
@@ -175,13 +185,6 @@ def _flex_at(config: TouchConfig, level: float) -> float | None:
     b = bending_level(config.conditioning, sensor.counts(config.antenna.sensor, _FLEX))
     enough = np.flatnonzero(b >= level)
     return float(_FLEX[enough[0]]) if len(enough) else None
-
-
-def _with_flex(config: TouchConfig, curve: dict[str, Any]) -> dict[str, Any]:
-    """Beside the thresholds that stand out, the flex that reaches them."""
-    for name in ("default", "best_f1"):
-        curve[name]["flex_rad"] = _flex_at(config, curve[name]["theta"])
-    return curve
 
 
 def _tip_force(config: TouchConfig, profile: str, angle: float) -> float | None:
@@ -199,18 +202,21 @@ def _tip_force(config: TouchConfig, profile: str, angle: float) -> float | None:
     return float(np.interp(angle, bent[: enough[0] + 1], force[: enough[0] + 1]))
 
 
-def _measured_anew(config: TouchConfig, traverses: Sequence[Traverse]) -> dict[str, Any]:
+def _measured_anew(
+    kind: type[Part], config: TouchConfig, traverses: Sequence[Traverse], **given: Any
+) -> Part:
     """All profiles together, with another configuration of the control or the truth."""
     valid = [c for c in compare(config, traverses) if c is not None]
-    return Pool(valid, config.trials, config.antenna.sensor.rate).measure(valid)
+    whole = Pool(valid, config.trials, config.antenna.sensor.rate).measure(valid)
+    known = {each.name for each in fields(kind)}
+    return kind(**{k: v for k, v in vars(whole).items() if k in known}, **given)
 
 
-def _averaged(config: TouchConfig, traverses: Sequence[Traverse], time: float) -> dict[str, Any]:
+def _averaged(config: TouchConfig, traverses: Sequence[Traverse], time: float) -> Averaged:
     """With another T_avg."""
     conditioning = config.conditioning.model_copy(update={"averaging_time": time})
     changed = config.model_copy(update={"conditioning": conditioning})
-    pooled = _measured_anew(changed, traverses)
-    return {"averaging_time_s": time, **{key: pooled[key] for key in _AVERAGED}}
+    return _measured_anew(Averaged, changed, traverses, averaging_time_s=time)
 
 
 def _truths(config: TouchConfig) -> list[tuple[float, float]]:
@@ -221,94 +227,64 @@ def _truths(config: TouchConfig) -> list[tuple[float, float]]:
 
 def _with_truth(
     config: TouchConfig, traverses: Sequence[Traverse], force: float, merge: float
-) -> dict[str, Any]:
+) -> Truth:
     changed = config.model_copy(update={"contact_force": force, "merge_time": merge})
-    pooled = _measured_anew(changed, traverses)
-    keys = ("contact_share", *_SHORT)
-    return {"contact_force_n": force, "merge_time_s": merge, **{key: pooled[key] for key in keys}}
+    given = {"contact_force_n": force, "merge_time_s": merge}
+    return _measured_anew(Truth, changed, traverses, **given)
 
 
-F1 = Measure("f1", "F1", interval="f1_95")
-ONSET = Measure("onset.median_ms", "onset latency", "ms", form=".0f")
-RELEASE = Measure("release.median_ms", "release latency", "ms", form=".0f")
-PROFILE = (
-    Measure("contact_share", "time in contact", "%", form=".0f", scale=100.0),
-    F1,
-    Measure("precision", "precision", interval="precision_95"),
-    Measure("recall", "recall", interval="recall_95"),
-    Measure("contacts", "contacts", form="d"),
-    Measure("missed", "  missed", form="d"),
-    Measure("missed_per_m", "  missed per metre", interval="missed_per_m_95"),
-    Measure("alarms", "alarms", form="d"),
-    Measure("false", "  false", form="d"),
-    Measure("false_per_m", "  false per metre", interval="false_per_m_95"),
-    ONSET,
-    Measure("onset.p90_ms", "  90 %", "ms", form=".0f"),
-    Measure("onset.median_mm", "  way until then", "mm", form=".0f"),
-    RELEASE,
-    Measure("release.p90_ms", "  90 %", "ms", form=".0f"),
-    Measure("auc", "area under ROC, level", form=".3f", interval="auc_95"),
-    Measure("auc_flex", "  flex itself", form=".3f"),
-)
-AVERAGING = (
-    Measure("f1", "F1", form=".3f"),
-    Measure("recall", "recall", form=".3f"),
-    Measure("false_per_m", "false per metre"),
-    ONSET,
-    RELEASE,
-    Measure("auc", "area under ROC", form=".3f"),
-)
-
-
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: TouchResult) -> Sequence[Table]:
     """Profiles, speeds and walls, and what contact must do to be felt."""
-    profiles, needed = result["profiles"], result["needed"]
+    profiles, needed = result.profiles, result.needed
     forces = ", ".join(
         f"{name} {shown(force or None, '.0f', 1e3)} mN"
-        for name, force in needed["tip_force_n"].items()
+        for name, force in needed.tip_force_n.items()
     )
     return (
         Table.of(
             "Contact, sensed against true",
             profiles,
-            PROFILE,
-            f"{result['trials']} trials of every wall and speed, {result['invalid']} traverses "
+            note=f"{result.trials} trials of every wall and speed, {result.invalid} traverses "
             "invalid. Intervals are 95 %: of counts per\nmetre those of chance counts, of all else "
-            "over trials. Latencies are medians.",
-            about(profiles),
+            "over trials.",
+            preface=about(profiles),
         ),
-        _grid("F1 by speed [m/s]", result["by_speed"], "speed_m_s", "g", profiles),
-        _grid("F1 by wall", result["by_wall"], "wall", "", profiles),
+        _grid("F1 by speed [m/s]", ((f"{row.speed_m_s:g}", row) for row in result.by_speed)),
+        _grid("F1 by wall", ((row.wall, row) for row in result.by_wall)),
         Table.of(
-            f"Averaging, all profiles (default {result['averaging_time_s']:g} s)",
-            {f"{row['averaging_time_s']:g} s": row for row in result["averaging"]},
-            AVERAGING,
-            f"The level reaches theta = {result['threshold']:g} at a flex of "
-            f"{shown(needed['flex_rad'])} rad; a steady force normal to the tip\nthat bends so "
+            f"Averaging, all profiles (default {result.averaging_time_s:g} s)",
+            {f"{row.averaging_time_s:g} s": row for row in result.averaging},
+            [
+                replace(column_of(Averaged, name), form=form, interval="")
+                for name, form in _AVERAGED.items()
+            ],
+            f"The level reaches theta = {result.threshold:g} at a flex of "
+            f"{shown(needed.flex_rad)} rad; a steady force normal to the tip\nthat bends so "
             f"far: {forces}.",
         ),
     )
 
 
-def _grid(
-    title: str, rows: list[Mapping[str, Any]], part: str, form: str, profiles: Mapping[str, Any]
-) -> Table:
+def _grid(title: str, rows: Iterable[tuple[str, ProfileMeasures]]) -> Table:
     """One column per profile, and F1 with its interval for every speed or wall."""
-    cells = {(row["profile"], row[part]): row for row in rows}
-    lines = []
-    for value in dict.fromkeys(row[part] for row in rows):
-        for name, label in (("f1", f"{value:{form}}"), ("f1_95", "  95 %")):
-            lines.append((label, [shown(cells[p, value][name]) for p in profiles]))
-    return Table(title, list(profiles), lines)
+    cells: dict[str, dict[str, ProfileMeasures]] = {}
+    for name, row in rows:
+        cells.setdefault(name, {})[row.profile] = row
+    lines = [
+        (label, [of.cell(row) for row in mine.values()])
+        for name, mine in cells.items()
+        for label, of in ((name, F1), (F1.ends.label, F1.ends))
+    ]
+    return Table(title, list(next(iter(cells.values()))), lines)
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: TouchResult) -> str:
     """How well contact is sensed by each profile."""
     scores = ", ".join(
-        f"{name} {shown(row['f1'])}" + (f" ({shown(row['f1_95'])})" if row["f1_95"] else "")
-        for name, row in result["profiles"].items()
+        f"{name} {shown(row.f1)}" + (f" ({shown(row.f1_95)})" if row.f1_95 else "")
+        for name, row in result.profiles.items()
     )
-    over = few([result["trials"]]) or f"Intervals are 95 %, over {result['trials']} trials."
+    over = few([result.trials]) or f"Intervals are 95 %, over {result.trials} trials."
     return f"Contact is sensed with an F1 of {scores}, 1 being without error. {over}"
 
 
@@ -366,6 +342,8 @@ EXPERIMENT = Experiment.of_folder(
     lambda config, workers, on_step, _: run(config, workers, on_step),
     tables,
     sentence,
+    result=TouchResult,
+    row=TouchRow,
     films=films,
     parts="traverses",
     captions={

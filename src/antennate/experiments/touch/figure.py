@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,16 +12,23 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.experiments.touch.experiment import F1, ONSET, RELEASE, TouchOutcome
+from antennate.experiments.touch.experiment import F1, TouchOutcome
 from antennate.experiments.touch.physics import Traverse
+from antennate.experiments.touch.result import Latency, ProfileMeasures, Roc, TouchResult
 from antennate.experiments.touch.sensing import Comparison
 from antennate.params.control import RuleParams
+from antennate.studies.columns import Ends, shown
 
 _TRUE, _SENSED = style.SERIES[5], style.INK
 """Colours that no profile has."""
 _BAR = {"marker": "_", "markersize": 11, "markeredgewidth": 1.8, "capsize": 0}
 _SHAPES = 14
 """Shapes of the antenna drawn along a wall."""
+_Cells = Sequence[tuple[float | str, ProfileMeasures]]
+"""Measures, each with the speed or the wall that it is of."""
+_Known = tuple[float | None, Ends | None]
+"""A number and its interval."""
+_KEYS = ("value", "ends")
 
 
 def figures(outcome: TouchOutcome) -> dict[str, Figure]:
@@ -32,70 +39,76 @@ def figures(outcome: TouchOutcome) -> dict[str, Figure]:
 
 
 @style.styled
-def measures(result: Mapping[str, Any]) -> Figure:
+def measures(result: TouchResult) -> Figure:
     """F1 by speed and by wall, and both latencies by speed, one colour a profile."""
-    figure = style.canvas(style.WIDTH, 11.5)
-    by_speed, by_wall, *latencies = figure.subplots(4, 1)
-    speeds, walls = result["by_speed"], result["by_wall"]
-    for panel, rows, part in ((by_speed, speeds, "speed_m_s"), (by_wall, walls, "wall")):
-        _draw(panel, rows, part, rows, (F1.name, "f1_95"), trials=result["trials"])
-        low, high = (end(row["traverses"] for row in rows) for end in (min, max))
-        over = "walls" if part == "speed_m_s" else "speeds"
+    figure, note = style.canvas(style.WIDTH, 11.5), style.interval_note(result.trials)
+    by_speed, by_wall, onset, release = figure.subplots(4, 1)
+    speeds = sorted(((row.speed_m_s, row) for row in result.by_speed), key=lambda cell: cell[0])
+    walls = [(row.wall, row) for row in result.by_wall]
+    for panel, cells, over in ((by_speed, speeds, "walls"), (by_wall, walls, "speeds")):
+        _draw(panel, cells, lambda row: (row.f1, row.f1_95), trials=result.trials)
+        low, high = (end(row.traverses for _, row in cells) for end in (min, max))
         count = f"{low}" if low == high else f"{low} to {high}"
-        note = style.interval_note(result["trials"])
         panel.set_title(f"All {over}, n = {count} traverses a point,\n{note}")
         panel.set(ylim=(-0.03, 1.02), ylabel=f"{F1.label} of contact, 0 to 1")
-    for panel, measure in zip(latencies, (ONSET, RELEASE), strict=True):
-        key = measure.name.partition(".")[0]
-        latencies_by_speed = [row[key] for row in speeds]
-        median = ("median_ms", "median_95_ms")
-        _draw(panel, speeds, "speed_m_s", latencies_by_speed, median, trials=result["trials"])
-        _draw(panel, speeds, "speed_m_s", latencies_by_speed, ("p90_ms", ""), **_BAR)
-        low, high = (end(row["n"] for row in latencies_by_speed) for end in (min, max))
-        note = style.interval_note(result["trials"])
-        panel.set_title(f"Median, {note}, 90th percentile (bar),\nn = {low} to {high} contacts")
-        panel.set_ylabel(measure.title)
-        bottom, top = panel.get_ylim()
-        panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
+    _draw_latency(onset, speeds, lambda row: row.onset, result.trials)
+    _draw_latency(release, speeds, lambda row: row.release, result.trials)
+    onset.set_ylabel("onset latency [ms]")
+    release.set_ylabel("release latency [ms]")
     figure.legend(*by_speed.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
+def _draw_latency(
+    panel: Axes, cells: _Cells, latency: Callable[[ProfileMeasures], Latency], trials: int
+) -> None:
+    """A latency in each cell: its median and its 90th percentile."""
+    found = [latency(row) for _, row in cells]
+
+    def median(row: ProfileMeasures) -> _Known:
+        return latency(row).median_ms, latency(row).median_95_ms
+
+    _draw(panel, cells, median, trials)
+    _draw(panel, cells, lambda row: (latency(row).p90_ms, None), **_BAR)
+    low, high = (end(each.n for each in found) for end in (min, max))
+    note = style.interval_note(trials)
+    panel.set_title(f"Median, {note}, 90th percentile (bar),\nn = {low} to {high} contacts")
+    bottom, top = panel.get_ylim()
+    panel.set_ylim(min(0.0, bottom), max(1.05 * top, 10.0))
+
+
 def _draw(
     panel: Axes,
-    cells: Sequence[Mapping[str, Any]],
-    part: str,
-    rows: Sequence[Mapping[str, Any]],
-    keys: style.Keys,
+    cells: _Cells,
+    measure: Callable[[ProfileMeasures], _Known],
     trials: int = 0,
     **look: Any,
 ) -> None:
-    """A measure of what was found in each cell, over speeds or walls, the profiles side by side."""
-    values = list(dict.fromkeys(cell[part] for cell in cells))
-    values = sorted(values) if part == "speed_m_s" else values
-    profiles = list(dict.fromkeys(cell["profile"] for cell in cells))
+    """A measure of each cell, over speeds or walls, the profiles side by side."""
+    values = list(dict.fromkeys(at for at, _ in cells))
+    profiles = list(dict.fromkeys(row.profile for _, row in cells))
     for i, name in enumerate(profiles):
         colour, own, _ = style.PROFILE_LOOKS[name]
         aside = 0.6 * (i - (len(profiles) - 1) / 2) / max(len(profiles), 3)
-        mine = [k for k, cell in enumerate(cells) if cell["profile"] == name]
-        x = [values.index(cells[k][part]) + aside for k in mine]
+        mine = [(at, row) for at, row in cells if row.profile == name]
+        x = [values.index(at) + aside for at, _ in mine]
         own_look = look or {"marker": own, "label": name}
-        drawn = [rows[k] for k in mine]
-        style.intervals(panel, x, drawn, keys, trials, color=colour, **own_look)
-    style.categories(panel, [f"{v:g}" if isinstance(v, float) else v for v in values])
-    panel.set_xlabel("speed of the traverse [m/s]" if part == "speed_m_s" else "wall")
+        drawn = [dict(zip(_KEYS, measure(row), strict=True)) for _, row in mine]
+        style.intervals(panel, x, drawn, _KEYS, trials, color=colour, **own_look)
+    style.categories(panel, [v if isinstance(v, str) else f"{v:g}" for v in values])
+    panel.set_xlabel("wall" if isinstance(values[0], str) else "speed of the traverse [m/s]")
 
 
 @style.styled
-def curves(result: Mapping[str, Any]) -> Figure:
+def curves(result: TouchResult) -> Figure:
     """ROC of the bending level with the default theta, and F1 over theta."""
     figure = style.canvas(style.WIDTH, 8.4)
     roc, over = figure.subplots(2, 1, height_ratios=(1.25, 1))
     roc.plot([0, 100], [0, 100], color=style.MUTED, linewidth=1.0, linestyle=(0, (2, 2)))
     roc.annotate("chance", (60, 60), (63, 55), color=style.MUTED, rotation=38, fontsize=8)
-    for name, curve in result["roc"].items():
-        _draw_curve(roc, over, result, name, curve)
-    theta = result["threshold"]
+    for name, profile in result.profiles.items():
+        _draw_curve(roc, over, profile, result.roc[name])
+    theta = result.threshold
     over.axvline(theta, color=style.MUTED, linewidth=1.0, linestyle=(0, (4, 2)))
     over.annotate(f"default {theta:g}", (theta, 0.03), (4, 0), textcoords="offset points")
     over.set_xscale("logit", one_half="0.5")
@@ -108,7 +121,7 @@ def curves(result: Mapping[str, Any]) -> Figure:
         ylabel="F1 of contact, 0 to 1",
         title="F1 over theta, no hysteresis;\nrings: best on these data",
     )
-    ticks = sum(row["ticks"] for row in result["profiles"].values())
+    ticks = sum(profile.ticks for profile in result.profiles.values())
     roc.set(
         xlim=(-2, 102),
         ylim=(-2, 102),
@@ -122,26 +135,21 @@ def curves(result: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _draw_curve(
-    roc: Axes, over: Axes, result: Mapping[str, Any], name: str, curve: Mapping[str, Any]
-) -> None:
+def _draw_curve(roc: Axes, over: Axes, profile: ProfileMeasures, found: Roc) -> None:
+    name, curve = profile.profile, found.curve
     colour, marker, line = style.PROFILE_LOOKS[name]
-    points = [p for p in curve["curve"] if None not in p.values()]
-    if not points:
+    points = [(p.false_positive_rate, p.true_positive_rate) for p in (*curve, found.default)]
+    *rates, own = 100 * np.array(points, float)
+    if np.isnan(own).any():  # all of the time is contact, or none
         return
-    area = result["profiles"][name]
-    wrong = [100 * p["false_positive_rate"] for p in points]
-    right = [100 * p["true_positive_rate"] for p in points]
-    label = f"{name}: area {area['auc']:.3f}, of flex itself {area['auc_flex']:.3f}"
-    roc.plot([100, *wrong, 0], [100, *right, 0], color=colour, linestyle=line, label=label)
-    own = curve["default"]
-    at = (100 * own["false_positive_rate"], 100 * own["true_positive_rate"])
-    roc.plot(*at, color=colour, marker=marker, markersize=6, linestyle="", zorder=4)
-    over.plot([p["theta"] for p in points], [p["f1"] for p in points], color=colour, linestyle=line)
-    best = curve["best_f1"]
-    over.plot(
-        best["theta"], best["f1"], color=colour, marker="o", markersize=8, markerfacecolor="white"
-    )
+    area, of_flex = shown(profile.auc, ".3f"), shown(profile.auc_flex, ".3f")
+    label = f"{name}: area {area}, of flex itself {of_flex}"
+    ends = np.array([(100.0, 100.0), *rates, (0.0, 0.0)])
+    roc.plot(*ends.T, color=colour, linestyle=line, label=label)
+    roc.plot(*own, color=colour, marker=marker, markersize=6, linestyle="", zorder=4)
+    *scores, best = np.array([(p.theta, p.f1) for p in (*curve, found.best_f1)], float)
+    over.plot(*np.transpose(scores), color=colour, linestyle=line)
+    over.plot(*best, color=colour, marker="o", markersize=8, markerfacecolor="white")
 
 
 @style.styled

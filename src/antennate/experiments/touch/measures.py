@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from antennate.experiments.touch.result import Latency, Measures, Pair, Point, Roc, Threshold
 from antennate.experiments.touch.sensing import Comparison
 from antennate.jackknife import ENOUGH, jackknife95, median95
 from antennate.studies import statistics
+from antennate.studies.columns import Ends
 from antennate.types import Floats, Ints
 
 _BINS = 500
 _LEVELS = np.arange(-13.0, 13.01, 0.25)
 """Logits of the thresholds on the ROC curve."""
+
+
+class Estimate(NamedTuple):
+    """A number and its 95 % interval; None where they do not exist."""
+
+    value: float | None
+    ends: Ends | None
 
 
 class Pool:
@@ -36,55 +45,43 @@ class Pool:
         self._level_edges = _edges([v.level for v in comparisons])
         self._flex_edges = _edges([abs(v.flex) for v in comparisons])
 
-    def measure(self, group: Sequence[Comparison]) -> dict[str, Any]:
+    def measure(self, group: Sequence[Comparison]) -> Measures:
         """All measures of one group."""
         matches = [v.matches for v in group]
         contacts = sum(len(m.contacts) for m in matches)
         missed = sum(int((~m.found).sum()) for m in matches)
-        lost = np.concatenate([v.missed_flex for v in group]) if group else np.zeros(0)
+        bends = np.concatenate([v.missed_flex for v in group]) if group else np.zeros(0)
         false = sum(m.false for m in matches)
         metres = float(self._sum(group, lambda v: v.metres).sum())
-        return {
-            "traverses": len(group),
-            "ticks": sum(len(v.truth) for v in group),
-            "metres": metres,
-            **self._per_tick(group),
-            "contacts": contacts,
-            "missed": missed,
-            "missed_wilson95": statistics.wilson95(missed, contacts),
-            "carried": sum(m.carried for m in matches),
-            "alarms": sum(m.alarms for m in matches),
-            "false": false,
-            **_rate("missed_per_m", missed, metres),
-            **_rate("false_per_m", false, metres),
-            "missed_flex_rad": float(np.median(lost)) if len(lost) else None,
-            "onset": self._latency(group, [m.onset for m in matches]),
-            "release": self._latency(group, [m.release for m in matches]),
-            **self._area("auc", group, [v.level for v in group], self._level_edges),
-            **self._area("auc_flex", group, [abs(v.flex) for v in group], self._flex_edges),
-        }
-
-    def _per_tick(self, group: Sequence[Comparison]) -> dict[str, Any]:
         hit, wrong, lost = self._ticks(group)
         truth, ticks = hit + lost, self._sum(group, lambda v: len(v.truth))
-        return {
-            **self._ratio("contact_share", truth, ticks),
-            **self._ratio("f1", 2 * hit, 2 * hit + wrong + lost),
-            **self._ratio("precision", hit, hit + wrong),
-            **self._ratio("recall", hit, truth),
-            **self._lead(hit, truth, 2 * hit + wrong + lost, ticks),
-        }
-
-    def _lead(self, hit: Floats, truth: Floats, called: Floats, ticks: Floats) -> dict[str, Any]:
-        """F1 less that of a sensor that always says contact, a trial left out of both at once."""
-        (one, ones), (two, twos) = (
-            self._left_out(2 * right, whole)
-            for right, whole in ((hit, called), (truth, truth + ticks))
+        either, flexes = 2 * hit + wrong + lost, [abs(v.flex) for v in group]
+        always = self._left_out(2 * truth, truth + ticks)
+        return Measures(
+            traverses=len(group),
+            ticks=sum(len(v.truth) for v in group),
+            metres=metres,
+            contacts=contacts,
+            missed=missed,
+            missed_wilson95=statistics.wilson95(missed, contacts),
+            carried=sum(m.carried for m in matches),
+            alarms=sum(m.alarms for m in matches),
+            false=false,
+            missed_flex_rad=float(np.median(bends)) if len(bends) else None,
+            onset=self._latency(group, [m.onset for m in matches]),
+            release=self._latency(group, [m.release for m in matches]),
+            **_with_ends(
+                contact_share=self._ratio(truth, ticks),
+                f1=self._ratio(2 * hit, either),
+                f1_over_always_contact=_less(self._left_out(2 * hit, either), always),
+                precision=self._ratio(hit, hit + wrong),
+                recall=self._ratio(hit, truth),
+                missed_per_m=_rate(missed, metres),
+                false_per_m=_rate(false, metres),
+                auc=self._area(group, [v.level for v in group], self._level_edges),
+                auc_flex=self._area(group, flexes, self._flex_edges),
+            ),
         )
-        return {
-            "f1_over_always_contact": _finite(one - two),
-            "f1_over_always_contact_95": _interval(one - two, ones - twos, -1.0, 1.0),
-        }
 
     def _ticks(self, group: Sequence[Comparison]) -> tuple[Floats, Floats, Floats]:
         """True positive, false positive and false negative ticks by trial, each (trials,)."""
@@ -94,18 +91,13 @@ class Pool:
             self._sum(group, lambda v: (v.truth & ~v.alarm).sum()),
         )
 
-    def f1_difference(
-        self, first: Sequence[Comparison], second: Sequence[Comparison]
-    ) -> dict[str, Any]:
+    def f1_difference(self, first: Sequence[Comparison], second: Sequence[Comparison]) -> Pair:
         """F1 of the first group less that of the second, a trial left out of both at once."""
-        (one, ones), (two, twos) = (
+        one, two = (
             self._left_out(2 * hit, 2 * hit + wrong + lost)
             for hit, wrong, lost in map(self._ticks, (first, second))
         )
-        return {
-            "f1_difference": _finite(one - two),
-            "f1_difference_95": _interval(one - two, ones - twos, -1.0, 1.0),
-        }
+        return Pair(**_with_ends(f1_difference=_less(one, two)))
 
     def _sum(self, group: Sequence[Comparison], value: Any) -> Floats:
         """Sums of value(comparison) by trial, shape (trials,)."""
@@ -124,35 +116,34 @@ class Pool:
             value = float(np.divide(part.sum(), whole.sum()))
         return value, np.where(whole > 0, left, np.nan)
 
-    def _ratio(self, name: str, part: Floats, whole: Floats) -> dict[str, Any]:
+    def _ratio(self, part: Floats, whole: Floats) -> Estimate:
         value, left = self._left_out(part, whole)
-        return {name: _finite(value), f"{name}_95": _interval(value, left, 0.0, 1.0)}
+        return Estimate(_finite(value), _interval(value, left, 0.0, 1.0))
 
-    def _latency(self, group: Sequence[Comparison], ticks: Sequence[Ints]) -> dict[str, Any]:
+    def _latency(self, group: Sequence[Comparison], ticks: Sequence[Ints]) -> Latency:
         """Median with its interval and 90th percentile [ms], and the median way meanwhile [mm]."""
         values = np.concatenate([np.zeros(0, dtype=np.int64), *ticks])
         if not len(values):
-            keys = ("median_ms", "median_95_ms", "p90_ms", "median_mm")
-            return {"n": 0, **dict.fromkeys(keys)}
+            return Latency(n=0, median_ms=None, median_95_ms=None, p90_ms=None, median_mm=None)
         trials = np.concatenate(
             [np.full(len(t), v.trial) for v, t in zip(group, ticks, strict=True)]
         )
         way = np.concatenate(
             [v.speed * t * self._tick_ms for v, t in zip(group, ticks, strict=True)]
         )
-        return {
-            "n": len(values),
-            "median_ms": float(np.median(values)) * self._tick_ms,
-            "median_95_ms": _within(median95(np.float64(self._tick_ms) * values, trials), least=0.0)
-            if len(np.unique(trials)) >= ENOUGH
-            else None,
-            "p90_ms": float(np.percentile(values, 90)) * self._tick_ms,
-            "median_mm": float(np.median(way)),
-        }
+        enough = len(np.unique(trials)) >= ENOUGH
+        all_ms = np.float64(self._tick_ms) * values
+        return Latency(
+            n=len(values),
+            median_ms=float(np.median(values)) * self._tick_ms,
+            median_95_ms=_within(median95(all_ms, trials), least=0.0) if enough else None,
+            p90_ms=float(np.percentile(values, 90)) * self._tick_ms,
+            median_mm=float(np.median(way)),
+        )
 
     def _area(
-        self, name: str, group: Sequence[Comparison], scores: Sequence[Floats], edges: Floats
-    ) -> dict[str, Any]:
+        self, group: Sequence[Comparison], scores: Sequence[Floats], edges: Floats
+    ) -> Estimate:
         """Area under the ROC curve, ties counted half, from histograms by trial."""
         touching = np.zeros((self._trials, len(edges) + 1))
         free = np.zeros_like(touching)
@@ -169,10 +160,22 @@ class Pool:
             left = ((others @ order) * others).sum(axis=1)
             left = left / ((others @ pairs) * others).sum(axis=1)
         left[touching.sum(axis=1) + free.sum(axis=1) == 0] = np.nan
-        return {name: _finite(whole), f"{name}_95": _interval(whole, left, 0.0, 1.0)}
+        return Estimate(_finite(whole), _interval(whole, left, 0.0, 1.0))
 
 
-def _interval(value: float, left: Floats, least: float, most: float) -> tuple[float, float] | None:
+def _with_ends(**estimates: Estimate) -> dict[str, Any]:
+    """Fields of these numbers, and of their intervals with `_95` behind the name."""
+    values = {name: estimate.value for name, estimate in estimates.items()}
+    return {**values, **{f"{name}_95": estimate.ends for name, estimate in estimates.items()}}
+
+
+def _less(first: tuple[float, Floats], second: tuple[float, Floats]) -> Estimate:
+    """A difference of two ratios, each given with what it is without each trial."""
+    (one, ones), (two, twos) = first, second
+    return Estimate(_finite(one - two), _interval(one - two, ones - twos, -1.0, 1.0))
+
+
+def _interval(value: float, left: Floats, least: float, most: float) -> Ends | None:
     """Jackknife interval by Student's t, within the bounds.
 
     Args:
@@ -189,19 +192,17 @@ def _interval(value: float, left: Floats, least: float, most: float) -> tuple[fl
     return _within(jackknife95(value, left), least, most) if len(left) >= ENOUGH else None
 
 
-def _within(
-    ends: Floats, least: float = -np.inf, most: float = np.inf
-) -> tuple[float, float] | None:
+def _within(ends: Floats, least: float = -np.inf, most: float = np.inf) -> Ends | None:
     low, high = ends.tolist()
     return (max(least, low), min(most, high)) if np.isfinite(ends).all() else None
 
 
-def _rate(name: str, count: int, metres: float) -> dict[str, Any]:
+def _rate(count: int, metres: float) -> Estimate:
     """Counts per metre with their exact interval."""
     if metres == 0.0:
-        return {name: None, f"{name}_95": None}
+        return Estimate(None, None)
     low, high = statistics.poisson95(count)
-    return {name: count / metres, f"{name}_95": (low / metres, high / metres)}
+    return Estimate(count / metres, (low / metres, high / metres))
 
 
 def _finite(value: float) -> float | None:
@@ -225,33 +226,44 @@ def _auc(touching: Floats, free: Floats) -> float:
     return float(test.statistic) / (len(touching) * len(free))
 
 
-def roc(group: Sequence[Comparison], threshold: float) -> dict[str, Any]:
-    """ROC curve of b without hysteresis, and where a threshold lies on it."""
+def roc(
+    group: Sequence[Comparison], threshold: float, flex_at: Callable[[float], float | None]
+) -> Roc:
+    """ROC curve of b without hysteresis, and where a threshold lies on it.
+
+    Args:
+        group: What was sensed.
+        threshold: The threshold.
+        flex_at: flex_at(level) -> the least flex at which b reaches a level [rad].
+    """
     truth = np.concatenate([np.zeros(0, dtype=bool), *(v.truth for v in group)])
     level = np.concatenate([np.zeros(0), *(v.level for v in group)])
     touching, free = np.sort(level[truth]), np.sort(level[~truth])
-    own = float(np.log(threshold / (1.0 - threshold)))
-    points = [_point(z, touching, free) for z in (*_LEVELS, own)]
-    *curve, default = points
-    best = max(curve, key=lambda point: point["f1"] or 0.0)
+    own = _point(float(np.log(threshold / (1.0 - threshold))), touching, free)
+    curve = [_point(z, touching, free) for z in _LEVELS]
+    place = max(range(len(curve)), key=lambda i: curve[i].f1 or 0.0)
+    default, best = (
+        Threshold(**vars(point), flex_rad=flex_at(point.theta)) for point in (own, curve[place])
+    )
+    curve[place] = best
     share = len(touching) / len(truth) if len(truth) else float("nan")
     noise = np.random.default_rng(0).random(len(truth))
-    return {
-        "curve": curve,
-        "default": default,
-        "best_f1": best,
-        "f1_always_contact": _finite(2.0 * share / (1.0 + share)),
-        "auc_random": _finite(_auc(noise[truth], noise[~truth])),
-    }
+    return Roc(
+        curve=curve,
+        default=default,
+        best_f1=best,
+        f1_always_contact=_finite(2.0 * share / (1.0 + share)),
+        auc_random=_finite(_auc(noise[truth], noise[~truth])),
+    )
 
 
-def _point(z: float, touching: Floats, free: Floats) -> dict[str, Any]:
+def _point(z: float, touching: Floats, free: Floats) -> Point:
     hit = len(touching) - int(np.searchsorted(touching, z))
     wrong = len(free) - int(np.searchsorted(free, z))
     whole = len(touching) + hit + wrong
-    return {
-        "theta": float(1.0 / (1.0 + np.exp(-z))),
-        "true_positive_rate": hit / len(touching) if len(touching) else None,
-        "false_positive_rate": wrong / len(free) if len(free) else None,
-        "f1": 2.0 * hit / whole if whole else None,
-    }
+    return Point(
+        theta=float(1.0 / (1.0 + np.exp(-z))),
+        true_positive_rate=hit / len(touching) if len(touching) else None,
+        false_positive_rate=wrong / len(free) if len(free) else None,
+        f1=2.0 * hit / whole if whole else None,
+    )

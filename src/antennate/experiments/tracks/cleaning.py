@@ -14,15 +14,9 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.experiments.tracks.config import CleaningParams, TracksConfig
 from antennate.experiments.tracks.track import Track
+from antennate.studies.columns import column, columns, tabular, total
 from antennate.types import Bools, Floats, Ints
 
-COUNTED = (
-    "unsorted", "duplicated", "absent", "still", "low_likelihood", "missing", "swapped", "outliers",
-    "bridged",
-)  # fmt: skip
-"""What is counted: rows after one of a later frame; frames that stand twice, are absent, or repeat
-all points of the last; points of low likelihood and missing ones; frames with exchanged sides;
-wrong points; and bridged ones."""
 _MOST_EXCHANGED, _MOST_ACROSS = 0.5, 0.8
 """Shares of frames beyond which left and right are not exchanged now and then but always: with two
 antennae, and with one, which may swing across the body axis."""
@@ -31,6 +25,34 @@ _CLEARLY = 0.3
 _FRAMES_TO_JUDGE = 10
 _MOST_ABSENT, _SHORT = 20, 100_000
 """Frames from first to last over the rows of a track, and a number that is never too many."""
+
+
+@tabular
+class Handled:
+    """Defects of the track of an animal, counted, and what is done about them."""
+
+    unsorted: int = column("rows after one of a later frame, sorted", pool=total, form="d")
+    """Rows after one of a later frame: sorted."""
+    duplicated: int = column("frames that stand twice, left out", pool=total, form="d")
+    """Frames that stand again with the same points, and instances of SLEAP that were corrected by
+    hand: the first counts, or what was corrected."""
+    absent: int = column("frames absent from the file", pool=total, form="d")
+    """Numbers of frames that are missing: left as a gap."""
+    still: int = column("frames equal to the last in every point, kept", pool=total, form="d")
+    """Frames equal to the last in every point: kept, as the animal may stand, or the camera
+    repeated a picture."""
+    low_likelihood: int = column("points of low likelihood, left out", pool=total, form="d")
+    """Points below `--cleaning.likelihood`, 0.2 for SLEAP, else 0.6: left as a gap."""
+    missing: int = column("points missing", pool=total, form="d")
+    """Points without a value: left as a gap."""
+    swapped: int = column("frames with left and right exchanged, put back", pool=total, form="d")
+    """Frames with left and right exchanged: put back."""
+    outliers: int = column("points in wrong places, left out", pool=total, form="d")
+    """Points far from their running median, and tips of antennae that are far too long: left as a
+    gap."""
+    bridged: int = column("points bridged over short gaps", pool=total, form="d")
+    """Points in gaps of at most `--cleaning.longest_gap`: put on a straight line, in the body's
+    frame."""
 
 
 @dataclass
@@ -44,7 +66,7 @@ class Antennae:
             where not known.
         places: The same points as in the file's frame.
         contact: Whether each antenna touches, shape (n,), where the file has it.
-        counts: What was wrong, by the names in `COUNTED`.
+        handled: What was wrong.
         empty: Names of points that were never known.
     """
 
@@ -53,7 +75,7 @@ class Antennae:
     sides: dict[str, Floats]
     places: dict[str, Floats]
     contact: dict[str, Floats]
-    counts: dict[str, int]
+    handled: Handled
     empty: tuple[str, ...]
 
     @property
@@ -75,7 +97,7 @@ def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Ante
     """
     params, names = config.cleaning, config.points
     _refuse_far_apart(track)
-    counts: dict[str, int] = dict.fromkeys(COUNTED, 0)
+    counts = {each.name: 0 for each in columns(Handled)}
     points = _each_frame_once(params, track, counts)
     width, longest = frames_of(params.smoothing, rate), round(params.longest_gap * rate)
 
@@ -102,7 +124,7 @@ def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Ante
     outwards = {s: v * (1.0, 1.0 if s == "left" else -1.0) for s, v in body.items()}
     contact = {side: _whole(track, values) for side, values in track.contact.items()}
     empty = tuple(name for name, values in points.items() if np.isnan(values).all())
-    return Antennae(track, rate, outwards, places, contact, counts, empty)
+    return Antennae(track, rate, outwards, places, contact, Handled(**counts), empty)
 
 
 def _refuse_far_apart(track: Track) -> None:

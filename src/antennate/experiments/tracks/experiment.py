@@ -3,36 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antennate import figures as style
 from antennate.experiments.tracks import measures
 from antennate.experiments.tracks.config import TracksConfig
-from antennate.experiments.tracks.measures import FREE, MOST_BEYOND, NAMES, SHAPES, UNKNOWN, Antenna
+from antennate.experiments.tracks.measures import (
+    FREE,
+    MOST_BEYOND,
+    NAMES,
+    SHAPES,
+    UNKNOWN,
+    Antenna,
+    Varied,
+)
+from antennate.experiments.tracks.result import TrackRow, TracksResult
 from antennate.experiments.tracks.run import TracksOutcome, run
 from antennate.messages import shortened
+from antennate.studies.columns import column_of, shown
 from antennate.studies.experiment import Experiment
-from antennate.studies.measures import NONE, Table, few, shown
+from antennate.studies.tables import Table, few
 from antennate.types import Ints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-HANDLED = {
-    "unsorted": "rows after one of a later frame, sorted",
-    "duplicated": "frames that stand twice, left out",
-    "absent": "frames absent from the file",
-    "still": "frames equal to the last in every point, kept",
-    "low_likelihood": "points of low likelihood, left out",
-    "missing": "points missing",
-    "swapped": "frames with left and right exchanged, put back",
-    "outliers": "points in wrong places, left out",
-    "bridged": "points bridged over short gaps",
-}
 _DEGREES = 180.0 / math.pi
 UNITS = {
     "gap": ("lengths", 1.0),
@@ -51,110 +50,88 @@ _OUTLINES = 40
 _MARKS = dict(zip(SHAPES, ("o", "s", "^", "D"), strict=True))
 
 
-def tables(result: Mapping[str, Any]) -> Sequence[Table]:
+def tables(result: TracksResult) -> Sequence[Table]:
     """The shapes, what depends on each criterion, and what was wrong with the tracks."""
-    return _shapes(result), _varied(result), _handled(result)
+    found = Table.of("What was found in the tracks", {"number": result})
+    return _shapes(result), _varied(result), found
 
 
-def _shapes(result: Mapping[str, Any]) -> Table:
+def _shapes(result: TracksResult) -> Table:
     """Shares of the shapes over trials."""
-    trials = result["trials_in_contact"]
+    trials = result.trials_in_contact
     many = "one trial" if trials == 1 else f"the mean over {trials} trials"
     notes = [f"Shares of the frames in contact, {many}."]
-    if result["classified_by"] == "direction":
+    if result.classified_by == "direction":
         notes.append(
             "With two points along an antenna its bend cannot be seen: forward and "
             "backward\nare the side to which it points, and straight is not known."
         )
     if _free_air(result):
         notes.append("Without a wall every frame counts as contact.")
-    return Table(
-        "Shapes in contact",
-        ["share", "95 %"],
-        [
-            (name, [shown(row["share"]), shown(row["share_95"] or NONE)])
-            for name, row in result["shapes"].items()
-        ],
-        "\n".join(notes),
-    )
+    return Table.lines("Shapes in contact", result.shapes, note="\n".join(notes))
 
 
-def _varied(result: Mapping[str, Any]) -> Table:
-    """The same with one criterion changed."""
+def _varied(result: TracksResult) -> Table:
+    """The shares with one criterion changed."""
+    change = column_of(Varied, "change")
     return Table(
-        f"The same with each criterion {100 * result['vary']:g} % less and more",
-        [*SHAPES, "change"],
+        f"The same with each criterion {100 * result.vary:g} % less and more",
+        [*SHAPES, change.title],
         [
             (
-                f"{row['criterion']} [{unit}] {scale * row['value']:.3g}",
-                [*(shown(row["share"][name]) for name in SHAPES), shown(row["change"])],
+                f"{row.criterion} [{unit}] {scale * row.value:.3g}",
+                [*(shown(row.share[name]) for name in SHAPES), change.cell(row)],
             )
-            for row in result["sensitivity"]
-            for unit, scale in [UNITS[row["criterion"]]]
+            for row in result.sensitivity
+            for unit, scale in [UNITS[row.criterion]]
         ],
     )
 
 
-def _handled(result: Mapping[str, Any]) -> Table:
-    """Frames, animals, and what was wrong."""
-    frames = result["frames"]
-    return Table(
-        "What was found in the tracks",
-        ["number"],
-        [
-            *((f"frames {name}", [str(frames[name])]) for name in ("contact", "free", "unknown")),
-            ("animals", [str(result["animals"])]),
-            ("animals known in too few frames, left out", [str(result["skipped"])]),
-            *((text, [str(result["handled"].get(name, 0))]) for name, text in HANDLED.items()),
-        ],
-    )
-
-
-def _free_air(result: Mapping[str, Any]) -> bool:
+def _free_air(result: TracksResult) -> bool:
     """Whether no file has a wall."""
-    return all(wall["kind"] == "none" for wall in result["wall"].values())
+    return all(wall.kind == "none" for wall in result.wall.values())
 
 
-def sentence(result: Mapping[str, Any]) -> str:
+def sentence(result: TracksResult) -> str:
     """Which shapes antennae in contact have, and how much depends on the criteria."""
-    if not result["trials_in_contact"]:
+    if not result.trials_in_contact:
         return f"No antenna was seen in contact{_nearest(result)}{_unseen(result)}"
     listed = ", ".join(
-        f"{name} {100 * row['share']:.0f} %"
-        + (f" ({shown(row['share_95'], '.0f', 100.0)})" if row["share_95"] else "")
-        for name, row in result["shapes"].items()
-        if row["share"] is not None
+        f"{name} {100 * each.share:.0f} %"
+        + (f" ({shown(each.share_95, '.0f', 100.0)})" if each.share_95 else "")
+        for name, each in result.shapes.items()
+        if each.share is not None
     )
-    most = max(result["sensitivity"], key=lambda row: row["change"])
-    correct = result["correct"]
-    drawn = result.get("synthetic_shapes", "known")
+    most = max(result.sensitivity, key=lambda row: row.change or 0.0)
     right = (
         ""
-        if correct is None
-        else f" Of frames with {drawn} shapes {100 * correct:.1f} % are classified correctly."
+        if result.correct is None
+        else f" Of frames with {result.synthetic_shapes} shapes {100 * result.correct:.1f} % are "
+        "classified correctly."
     )
-    so_few = few([result["trials_in_contact"]])
+    so_few = few([result.trials_in_contact])
     where = "With no wall given" if _free_air(result) else "In contact"
     return (
-        f"{where}: {listed} of the frames. Of all criteria the {most['criterion']} matters "
-        f"most: changed by {100 * result['vary']:g} % it moves a share by "
-        f"{100 * most['change']:.1f} points.{right}{_beyond(result)}{_unseen(result)}"
+        f"{where}: {listed} of the frames. Of all criteria the {most.criterion} matters "
+        f"most: changed by {100 * result.vary:g} % it moves a share by "
+        f"{100 * (most.change or 0.0):.1f} points.{right}{_beyond(result)}{_unseen(result)}"
         f"{so_few and f' {so_few}'}"
     )
 
 
-def _nearest(result: Mapping[str, Any]) -> str:
+def _nearest(result: TracksResult) -> str:
     """How near to a wall the antennae came."""
-    near = [wall["nearest"] for wall in result["wall"].values() if wall.get("nearest")]
+    near = [wall.nearest for wall in result.wall.values() if wall.nearest]
     if not near:
         return "."
     unit = "; is the wall given in the unit of the file?" if min(near) > 1 else "."
     return f": the nearest point lay {min(near):.2g} lengths of an antenna from the wall{unit}"
 
 
-def _beyond(result: Mapping[str, Any]) -> str:
+def _beyond(result: TracksResult) -> str:
     """Which walls many antennae reach beyond."""
-    far = {name: wall["beyond"] for name, wall in result["wall"].items() if wall.get("beyond")}
+    far = {name: wall.beyond for name, wall in result.wall.items() if wall.beyond}
     worst = max(far, key=lambda name: far[name], default="")
     if not worst or far[worst] <= MOST_BEYOND:
         return ""
@@ -164,21 +141,21 @@ def _beyond(result: Mapping[str, Any]) -> str:
     )
 
 
-def _unseen(result: Mapping[str, Any]) -> str:
+def _unseen(result: TracksResult) -> str:
     """Which animals were left out, and which antennae were hardly ever seen."""
-    antennae = result.get("unseen")
+    antennae = result.unseen
     if not antennae:
         return ""
-    gone = dict.fromkeys(a["animal"] or a["file"] for a in antennae if a.get("left_out"))
-    count, skipped = result["animals"] + result["skipped"], result["skipped"]
+    gone = dict.fromkeys(each.animal or each.file for each in antennae if each.left_out)
+    count, skipped = result.animals + result.skipped, result.skipped
     left = f" Of {count} animals {skipped} left out: {shortened(', '.join(gone))}." if gone else ""
     first = antennae[0]
-    empty = f", as {', '.join(first['empty'])} never has a value" if first["empty"] else ""
+    empty = f", as {', '.join(first.empty)} never has a value" if first.empty else ""
     others = f"; {len(antennae) - 1} more in result.json" if len(antennae) > 1 else ""
-    of = f" of {first['animal']}" if first["animal"] else ""
+    of = f" of {first.animal}" if first.animal else ""
     return (
-        f"{left} The {first['side']} antenna{of} in {first['file']} is known in "
-        f"{first['known']} of {first['frames']} frames{empty}{others}."
+        f"{left} The {first.side} antenna{of} in {first.file} is known in "
+        f"{first.known} of {first.frames} frames{empty}{others}."
     )
 
 
@@ -202,7 +179,7 @@ def figures(outcome: TracksOutcome) -> dict[str, Figure]:
     return {"tracks": figure}
 
 
-def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any]) -> None:
+def _draw_shares(panel: Axes, outcome: TracksOutcome, result: TracksResult) -> None:
     """A bar for each trial in contact, and the mean over all with its interval."""
     table = measures.by_trial(outcome.config.criteria, outcome.antennae)
     bars = table if len(table) <= _MOST_TRIALS else table[:0]
@@ -213,11 +190,11 @@ def _draw_shares(panel: Axes, outcome: TracksOutcome, result: Mapping[str, Any])
             panel.bar(at, part, 0.85, bottom, color=style.SHAPE_COLOURS[name])
             bottom += part
         left = at + 1.6
-    for k, (name, row) in enumerate(result["shapes"].items()):
+    for k, (name, each) in enumerate(result.shapes.items()):
         style.intervals(
             panel,
             [left + k],
-            [row],
+            [each],
             ("share", "share_95"),
             len(table),
             marker=_MARKS[name],
@@ -273,26 +250,26 @@ def _draw_angle(panel: Axes, antenna: Antenna, shapes: Ints) -> None:
     panel.set_title(f"Angle from the body axis, trial {antenna.trial + 1}, {antenna.side} antenna")
 
 
-def _draw_change(panel: Axes, result: Mapping[str, Any]) -> None:
+def _draw_change(panel: Axes, result: TracksResult) -> None:
     """Share of every shape with each criterion less and more; equal ones stand side by side."""
-    rows = result["sensitivity"]
+    rows = result.sensitivity
     for k, name in enumerate(SHAPES):
-        usual = result["shapes"][name]["share"]
-        if usual is None or math.isnan(usual):
+        usual = result.shapes[name].share
+        if usual is None:
             continue
         colour = style.SHAPE_COLOURS[name]
         panel.axvline(usual, color=colour, linewidth=1.0)
         panel.plot(
-            [row["share"][name] for row in rows],
+            np.array([row.share[name] for row in rows], float),
             np.arange(len(rows)) + 0.15 * (k - 1.5),
             marker=_MARKS[name],
             linestyle="",
             color=colour,
             markeredgecolor=style.INK,
         )
-    percent = f"{100 * result['vary']:g} %"
+    percent = f"{100 * result.vary:g} %"
     signs = ("−", "+") * len(rows)
-    labels = [f"{row['criterion']} {s}{percent}" for row, s in zip(rows, signs, strict=False)]
+    labels = [f"{row.criterion} {s}{percent}" for row, s in zip(rows, signs, strict=False)]
     panel.set_yticks(range(len(rows)), labels)
     panel.set_ylim(len(rows) - 0.4, -0.6)
     panel.margins(x=0.12)
@@ -309,7 +286,9 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     files=lambda outcome: {"frames.csv": outcome.frames_csv()},
-    failed=lambda result: not result["trials_in_contact"],
+    result=TracksResult,
+    row=TrackRow,
+    failed=lambda result: not result.trials_in_contact,
     parts="files",
     figures=figures,
     captions={

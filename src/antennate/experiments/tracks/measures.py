@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from antennate.antenna.shapes import Outline, Shape, classify, held, outline, po
 from antennate.errors import BadInputError
 from antennate.experiments.tracks.cleaning import Antennae
 from antennate.experiments.tracks.config import CriteriaParams, TracksConfig, TrackWallParams
+from antennate.studies.columns import Ends, column, tabular
 from antennate.studies.statistics import mean95
 from antennate.types import Bools, Floats, Ints
 
@@ -34,21 +34,18 @@ _SECTORS, _LEAST_SECTORS = 36, 12
 _ROUNDS = 5
 
 
-@dataclass(frozen=True)
+@tabular
 class Wall:
-    """A wall in the unit of the file.
-
-    Attributes:
-        kind: `none`, `line` or `circle`.
-        numbers: x, y, x, y of two points of a line; x, y and r of a circle.
-        fitted: Whether it was fitted.
-        rms: Root mean square distance of the points it was fitted to, None if it was given.
-    """
+    """A wall in the unit of the file."""
 
     kind: str
+    """`none`, `file`, `line` or `circle`."""
     numbers: tuple[float, ...] = ()
+    """Two points of a line as x, y, x, y; centre and radius of a circle as x, y, r."""
     fitted: bool = False
+    """Whether it was fitted to the tips."""
     rms: float | None = None
+    """Root mean square distance of the tips that it was fitted to; `null` if it was not."""
 
     def distance(self, points: Floats) -> Floats:
         """Distance of points (..., 2): below 0 outside a circle, and on one side of a line."""
@@ -103,14 +100,14 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
     """
     given = params.line if params.kind == "line" else params.circle
     if params.kind in ("none", "file") or given is not None:
-        return Wall(params.kind, tuple(given or ()))
+        return Wall(kind=params.kind, numbers=tuple(given or ()))
     known, near = tips[np.isfinite(tips).all(axis=1)], NEAR * length
     numbers = _best(params.kind, known, near) if len(known) >= _LEAST_TIPS else None
     for _ in range(_ROUNDS):
         if numbers is not None:
-            at = abs(Wall(params.kind, numbers).distance(known)) < near
+            at = abs(Wall(kind=params.kind, numbers=numbers).distance(known)) < near
             numbers = _THROUGH[params.kind](known[at]) if at.sum() >= _LEAST_TIPS else None
-    wall = None if numbers is None else Wall(params.kind, numbers)
+    wall = None if numbers is None else Wall(kind=params.kind, numbers=numbers)
     if wall is None or not _fixed(wall, known[abs(wall.distance(known)) < near]):
         raise BadInputError(
             f"{file}: expected tips along a {params.kind} to fit the wall, found too few of "
@@ -118,7 +115,7 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
         )
     off = wall.distance(known)
     rms = float(np.sqrt(np.mean(off[abs(off) < near] ** 2)))
-    return Wall(wall.kind, wall.numbers, True, rms)
+    return replace(wall, fitted=True, rms=rms)
 
 
 def require_inside(file: str, wall: Wall, bases: Floats) -> None:
@@ -149,7 +146,7 @@ def _best(kind: str, tips: Floats, near: float) -> tuple[float, ...] | None:
         numbers = _THROUGH[kind](tips[pick])
         if numbers is None:
             continue
-        off = Wall(kind, numbers).distance(judges)
+        off = Wall(kind=kind, numbers=numbers).distance(judges)
         beyond = (off < -near).mean()
         beyond = min(beyond, (off > near).mean()) if kind == "line" else beyond
         count = int((abs(off) < near).sum())
@@ -264,36 +261,64 @@ def by_trial(criteria: CriteriaParams, antennae: Sequence[Antenna]) -> Floats:
     return table[np.isfinite(table).all(axis=1)]
 
 
-def over_trials(criteria: CriteriaParams, antennae: Sequence[Antenna]) -> dict[str, Any]:
+@tabular
+class ShapeShare:
+    """Share of a shape among the frames in contact; no interval below five trials."""
+
+    share: float | None = column("share", interval="share_95")
+    """Mean over trials; `null` without contact, and of `straight` with two points along an
+    antenna."""
+    share_95: Ends | None = column("95 %")
+
+
+@tabular
+class Varied:
+    """Shares with one criterion changed."""
+
+    criterion: str
+    """Name of the criterion."""
+    value: float
+    """Changed value, in the unit of the flag."""
+    share: dict[str, float | None]
+    """Mean share of each shape over trials."""
+    change: float | None = column("change")
+    """Largest change of a share; `null` if no antenna is in contact."""
+
+
+def over_trials(criteria: CriteriaParams, antennae: Sequence[Antenna]) -> dict[str, ShapeShare]:
     """Mean share of each shape over trials, with its 95 % interval (Student's t).
 
     A share lies between 0 and 1, and so does its interval. It is None with fewer than `ENOUGH`
-    trials, as so few say little about the next. With two points along the antenna straight cannot
-    be seen: its share is None.
+    trials, as so few say little about the next.
     """
+    means = dict.fromkeys(SHAPES, ShapeShare(share=None, share_95=None))
+    hidden = Shape.STRAIGHT if antennae and antennae[0].points.shape[1] == 2 else None
     table = by_trial(criteria, antennae)
-    means: dict[str, Any] = {}
-    for name, column in zip(SHAPES, table.T, strict=True):
-        mean, ends = mean95(column, 0.0, 1.0)
-        means[name] = {"share": mean, "share_95": ends}
-    if antennae and antennae[0].points.shape[1] == 2:
-        means[Shape.STRAIGHT.name.lower()] = {"share": None, "share_95": None}
+    for shape, values in zip(Shape, table.T, strict=True):
+        if len(values) and shape != hidden:
+            mean, ends = mean95(values, 0.0, 1.0)
+            means[NAMES[shape]] = ShapeShare(share=mean, share_95=ends)
     return means
 
 
-def sensitivity(config: TracksConfig, antennae: Sequence[Antenna]) -> list[dict[str, Any]]:
+def sensitivity(config: TracksConfig, antennae: Sequence[Antenna]) -> list[Varied]:
     """Shares over trials with each criterion less and more by `vary`, one row for each."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Varied] = []
     usual = over_trials(config.criteria, antennae)
     for name in config.read_criteria:
         for factor in (1.0 - config.vary, 1.0 + config.vary):
             value = factor * getattr(config.criteria, name)
             other = over_trials(config.criteria.model_copy(update={name: value}), antennae)
-            share = {shape: other[shape]["share"] for shape in SHAPES}
-            known = [shape for shape in SHAPES if share[shape] is not None]
-            change = max(abs(share[shape] - usual[shape]["share"]) for shape in known)
-            rows.append({"criterion": name, "value": value, "share": share, "change": change})
+            share = {shape: each.share for shape, each in other.items()}
+            change = _change(usual, other)
+            rows.append(Varied(criterion=name, value=value, share=share, change=change))
     return rows
+
+
+def _change(one: Mapping[str, ShapeShare], other: Mapping[str, ShapeShare]) -> float | None:
+    """Largest difference of a share; None if one of them has none."""
+    pairs = [(one[name].share, other[name].share) for name in SHAPES]
+    return max((abs(b - a) for a, b in pairs if a is not None and b is not None), default=None)
 
 
 def curvatures(criteria: CriteriaParams, antennae: Sequence[Antenna]) -> dict[str, list[float]]:

@@ -7,84 +7,26 @@ import hashlib
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from antennate.errors import BadInputError
 from antennate.experiments.tracks import measures, synthetic
-from antennate.experiments.tracks.cleaning import COUNTED, Antennae, clean
+from antennate.experiments.tracks.cleaning import Antennae, Handled, clean
 from antennate.experiments.tracks.config import TracksConfig
 from antennate.experiments.tracks.readers import read
+from antennate.experiments.tracks.result import Seen, TrackRow, TracksResult, Unseen, WallFound
 from antennate.experiments.tracks.track import Track
 from antennate.messages import shortened
+from antennate.studies.columns import frame, mean, pooled
 from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers
 from antennate.types import Ints
 
 _RATES_AGREE = 0.02
 """Relative difference of two frame rates that are the same."""
-
-
-@dataclass(frozen=True, slots=True)
-class Unseen:
-    """An antenna that was known in hardly any frame.
-
-    Attributes:
-        file: Where.
-        animal: Whose, empty if the file has one alone.
-        side: `left` or `right`.
-        frames: Frames of the animal, `known` those in which the antenna was known.
-        left_out: Whether the animal was left out, as it has no other antenna.
-        empty: Points of the antenna and the body axis that never have a value.
-    """
-
-    file: str
-    animal: str
-    side: str
-    frames: int
-    known: int
-    empty: tuple[str, ...]
-    left_out: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TrackRow:
-    """One antenna of one animal, a row of trials.csv.
-
-    Shares are of the frames in contact, None without any. The counts from `unsorted` to `bridged`
-    are those of the animal and the same on both sides; docs/tracks.md says what they count.
-    """
-
-    seed: int
-    trial: int
-    file: str
-    animal: str
-    side: str
-    status: str
-    rate_hz: float
-    frames: int
-    unknown: int
-    free: int
-    contact: int
-    forward: float | None
-    backward: float | None
-    straight: float | None
-    transition: float | None
-    angle_median_rad: float | None
-    flex_median_rad: float | None
-    correct: float | None
-    unsorted: int
-    duplicated: int
-    absent: int
-    still: int
-    low_likelihood: int
-    missing: int
-    swapped: int
-    outliers: int
-    bridged: int
 
 
 @dataclass
@@ -106,7 +48,7 @@ class TracksOutcome:
     antennae: list[measures.Antenna] = field(default_factory=list[measures.Antenna])
     walls: dict[str, measures.Wall] = field(default_factory=dict[str, measures.Wall])
     skipped: int = 0
-    unseen: list[Unseen] = field(default_factory=list["Unseen"])
+    unseen: list[Unseen] = field(default_factory=list[Unseen])
     files: dict[bytes, str] = field(default_factory=dict[bytes, str])
 
     def add(
@@ -136,9 +78,16 @@ class TracksOutcome:
                 parts = {part for name in config.points.of(side) for part in name.split("+")}
                 of = parts | {*config.points.tail.split("+"), *config.points.head.split("+")}
                 empty = tuple(name for name in antennae.empty if name in of)
-                numbers = antennae.frames, count
-                gone = len(few) == len(known)
-                self.unseen.append(Unseen(track.file, track.animal, side, *numbers, empty, gone))
+                unseen = Unseen(
+                    file=track.file,
+                    animal=track.animal,
+                    side=side,
+                    frames=antennae.frames,
+                    known=count,
+                    empty=empty,
+                    left_out=len(few) == len(known),
+                )
+                self.unseen.append(unseen)
             if len(few) == len(known):
                 self.skipped += 1
             else:
@@ -160,47 +109,39 @@ class TracksOutcome:
                 )
         self.files |= dict.fromkeys(hashes, name)
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+    def result(self) -> TracksResult:
+        """What they come to."""
         config, criteria = self.config, self.config.criteria
-        table = measures.by_trial(criteria, self.antennae)
-        counted = {r.trial: r for r in self.rows}.values()
-        correct = [row.correct for row in self.rows if row.correct is not None]
-        return {
-            "schema": 1,
-            "command": "tracks",
-            "seed": config.seed,
-            "source": "files" if config.files else "synthetic",
-            "synthetic_shapes": None if config.files else config.synthetic.shapes,
-            "classified_by": "bend" if config.points.count > 2 else "direction",
-            "wall": {
-                name: {**asdict(wall), **self._at_wall(name)} for name, wall in self.walls.items()
-            },
-            "animals": len(counted),
-            "skipped": self.skipped,
-            "unseen": [asdict(antenna) for antenna in self.unseen],
-            "trials_in_contact": len(table),
-            "frames": {
-                name: sum(getattr(row, name) for row in self.rows)
-                for name in ("frames", "contact", "free", "unknown")
-            },
-            "handled": {name: sum(getattr(row, name) for row in counted) for name in COUNTED},
-            "shapes": measures.over_trials(criteria, self.antennae),
-            "vary": config.vary,
-            "sensitivity": measures.sensitivity(config, self.antennae),
-            "curvature_rad": measures.curvatures(criteria, self.antennae),
-            "correct": float(np.mean(correct)) if correct else None,
-        }
+        rows = frame(self.rows, TrackRow)
+        animals = rows.drop_duplicates("trial")
+        return TracksResult(
+            seed=config.seed,
+            source="files" if config.files else "synthetic",
+            synthetic_shapes=None if config.files else config.synthetic.shapes,
+            classified_by="bend" if config.points.count > 2 else "direction",
+            wall={name: self._found(name, wall) for name, wall in self.walls.items()},
+            frames=pooled(Seen, rows),
+            animals=len(animals),
+            skipped=self.skipped,
+            handled=pooled(Handled, animals),
+            unseen=self.unseen,
+            trials_in_contact=len(measures.by_trial(criteria, self.antennae)),
+            shapes=measures.over_trials(criteria, self.antennae),
+            vary=config.vary,
+            sensitivity=measures.sensitivity(config, self.antennae),
+            curvature_rad=measures.curvatures(criteria, self.antennae),
+            correct=mean(rows, "correct"),
+        )
 
-    def _at_wall(self, name: str) -> dict[str, float | None]:
-        """Least distance of a point to the wall of a file, and the share of frames beyond it."""
+    def _found(self, name: str, wall: measures.Wall) -> WallFound:
+        """The wall of a file, and how near to it its antennae came."""
         pairs = zip(self.rows, self.antennae, strict=True)
         near = [a.distance[a.known] for row, a in pairs if row.file == name]
         joined = np.concatenate([np.zeros(0), *near])
-        if self.walls[name].kind not in ("line", "circle") or not len(joined):
-            return {"nearest": None, "beyond": None}
-        beyond = (joined < -measures.NEAR).mean()
-        return {"nearest": float(joined.min()), "beyond": float(beyond)}
+        nearest = beyond = None
+        if wall.kind in ("line", "circle") and len(joined):
+            nearest, beyond = float(joined.min()), float((joined < -measures.NEAR).mean())
+        return WallFound(**vars(wall), nearest=nearest, beyond=beyond)
 
     def frames_csv(self) -> str:
         """Every frame of every antenna: angles, curvature and shape."""
@@ -269,7 +210,7 @@ def run(
 def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> measures.Wall:
     """The wall of a file, from its animals."""
     if not animals:
-        return measures.Wall("none")
+        return measures.Wall(kind="none")
     places = [antenna for animal in animals for antenna in animal.places.values()]
     lengths = [measures.length_of(side) for animal in animals for side in animal.sides.values()]
     usual, file = float(np.nanmedian(lengths)), animals[0].track.file
@@ -334,5 +275,5 @@ def _row(
         flex_median_rad=flex,
         correct=None if truth is None else float((shape == truth).mean()),
         **{name: None if math.isnan(share) else share for name, share in shares},
-        **animal.counts,
+        **vars(animal.handled),
     )

@@ -182,8 +182,15 @@ def watched(view: SimulationView) -> dict[str, Any]:
 def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> TrialResult:
     """The row of a trial of which there is nothing else."""
     limit = config.time_limit or TIME_LIMIT
-    key = config.seed, trial, condition
-    return TrialResult(*key, "invalid", limit, limit_s=limit, reason=reason)
+    return TrialResult(
+        seed=config.seed,
+        trial=trial,
+        controller=condition,
+        outcome="invalid",
+        time_s=limit,
+        limit_s=limit,
+        reason=reason,
+    )
 
 
 def _decisions(config: TunnelConfig, control: CheckedController, batch: int) -> Decisions:

@@ -3,68 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of, short_names
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials, watched
-from antennate.experiments.tunnel.measures import (
-    COLUMNS,
-    limit_of,
-    none_valid,
-    paired,
-    sentence,
-    summary,
-    tables,
-)
-from antennate.experiments.tunnel.physics import TrialPath, TrialResult, TunnelConfig
+from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
+from antennate.experiments.tunnel.result import TunnelResult, summarise
+from antennate.experiments.tunnel.tables import none_valid, sentence, tables
 from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
-from antennate.studies.experiment import Experiment, OnRow, OnStep, Trial, Trials, no_row, no_step
-from antennate.studies.pool import Workers
+from antennate.studies.experiment import Experiment, Trial, Trials
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Controller
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
-    from antennate.telemetry.view.simulation import SimulationView
-
-
-@dataclass(frozen=True, slots=True)
-class TunnelOutcome:
-    """All rows in the order of controllers and trials, and what figures need of them."""
-
-    config: TunnelConfig
-    rows: list[TrialResult]
-    paths: dict[tuple[str, int], TrialPath]
-    interrupted: bool
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        config = self.config
-        shared = limit_of(self.rows, config.time_limit)
-        by_name = {
-            name: [row for row in self.rows if row.controller == name] for name in config.conditions
-        }
-        return {
-            "schema": 2,
-            "command": "tunnel",
-            "seed": config.seed,
-            "scene": config.scene,
-            "knows": list(config.knows),
-            "time_limit_s": shared,
-            "length_m": config.tunnel.length if config.scene == TUNNEL else None,
-            "interrupted": self.interrupted,
-            "controllers": {name: summary(rows, shared) for name, rows in by_name.items()},
-            "paired": paired(by_name, shared),
-        }
 
 
 def check(config: TunnelConfig) -> None:
@@ -116,35 +76,6 @@ def _check_batch(config: TunnelConfig, logs: Path | None) -> None:
         raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
     if YOKED in config.readings:
         raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
-
-
-TRIALS = Trials[TunnelConfig](
-    *("controller", every, run_trials, TrialResult, lost_row, BATCH, _on_warp, _check_batch),
-    watched=watched,
-    interruptible=True,
-)
-
-
-def run(
-    config: TunnelConfig,
-    workers: int | Workers = 1,
-    on_step: OnStep = no_step,
-    on_row: OnRow = no_row,
-    logs: Path | None = None,
-    view: SimulationView | None = None,
-) -> TunnelOutcome:
-    """Run all trials of all controllers, with the log of each in a folder if one is given.
-
-    With a view they run in this process, one after the other, and give the same.
-
-    Raises:
-        LogError: A log cannot be written.
-        SceneError: A scene cannot be built as described.
-        WorkerError: A worker process failed.
-    """
-    trials, interrupted = TRIALS.gather(config, workers, on_step, on_row, logs, view)
-    paths = {(row.controller, row.trial): path for row, path in trials if path is not None}
-    return TunnelOutcome(config, [row for row, _ in trials], paths, interrupted)
 
 
 SPEED = 2.0
@@ -208,16 +139,30 @@ CAPTIONS = {
     "restricted mean time, with a 95 % interval from five trials on.",
 }
 
-EXPERIMENT = Experiment.of_folder(
-    *(__name__, TunnelConfig, run, tables, sentence),
+EXPERIMENT = Experiment.of_trials(
+    __name__,
+    TunnelConfig,
+    Trials[TunnelConfig](
+        condition="controller",
+        every=every,
+        carry_out=run_trials,
+        row=TrialResult,
+        invalid=lost_row,
+        most=BATCH,
+        batch=_on_warp,
+        check_batch=_check_batch,
+        watched=watched,
+        interruptible=True,
+    ),
+    summarise,
+    tables,
+    sentence,
+    result=TunnelResult,
     check=check,
     films=films,
     failed=lambda result: bool(none_valid(result)),
-    shown=True,
     logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in every(config)],
-    trials=TRIALS,
     tasks=tasks,
-    measures=COLUMNS,
     captions=CAPTIONS,
     explained="docs/results.md",
 )

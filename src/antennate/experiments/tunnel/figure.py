@@ -19,8 +19,10 @@ from antennate import figures as style
 from antennate.control.readings import short_names
 from antennate.control.registry import looks
 from antennate.experiments.tunnel.batch import SHOWN_TRIALS
-from antennate.experiments.tunnel.experiment import TunnelOutcome
-from antennate.experiments.tunnel.physics import TrialPath, TrialResult
+from antennate.experiments.tunnel.physics import TrialPath, TrialResult, TunnelConfig
+from antennate.experiments.tunnel.result import ControllerSummary, TunnelResult
+from antennate.studies.columns import Ends
+from antennate.studies.experiment import Found
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3
@@ -48,14 +50,12 @@ _OUTCOMES = {
 }
 
 
-def figures(outcome: TunnelOutcome) -> dict[str, Figure]:
+def figures(found: Found[TunnelConfig, TunnelResult, TrialPath]) -> dict[str, Figure]:
     """Both figures of a run."""
-    config, trials = outcome.config, range(min(SHOWN_TRIALS, outcome.config.trials))
+    result, trials = found.result(), range(min(SHOWN_TRIALS, found.config.trials))
     return {
-        "trajectories": trajectories(outcome.paths, config.conditions, outcome.rows, trials),
-        "summary": summary(
-            (result := outcome.result())["controllers"], outcome.rows, result["time_limit_s"]
-        ),
+        "trajectories": trajectories(found.drawn, found.config.conditions, found.rows, trials),
+        "summary": summary(result.controllers, found.rows, result.time_limit_s),
     }
 
 
@@ -210,32 +210,33 @@ def _handles(paths: Sequence[TrialPath]) -> list[Any]:
 
 @style.styled
 def summary(
-    controllers: Mapping[str, Mapping[str, Any]],
+    controllers: Mapping[str, ControllerSummary],
     rows: Sequence[TrialResult],
     time_limit: float | None,
 ) -> Figure:
     """Success, time inside and restricted mean time of every controller.
 
     Args:
-        controllers: Per controller what result.json says of it.
+        controllers: Summary of each controller.
         rows: The table.
         time_limit: Time after which a trial has failed [s]; None where each trial has its own,
             then times are shares of it.
     """
-    key = "restricted_mean_share" if time_limit is None else "restricted_mean_time"
     figure = style.canvas(style.WIDTH, 2.6 + 2 * (1.0 + 0.4 * len(controllers)))
     heights = 1.0 + 0.4 * len(controllers), 2.6, 1.0 + 0.4 * len(controllers)
     rate, inside, mean = figure.subplots(3, 1, height_ratios=heights)
     drawn = looks(controllers)
     short = style.plain(short_names(controllers))
     for i, (name, row) in enumerate(controllers.items()):
-        valid, (colour, line) = row["trials"] - row["invalid"], drawn[name]
+        valid, (colour, line) = row.trials - row.invalid, drawn[name]
         if not valid:
             continue
-        time = row[key if time_limit is None else f"{key}_s"]
-        time95 = row[f"{key}_95"] if valid >= style.ENOUGH_TRIALS else None
-        _interval(rate, i, row["successes"] / valid, row["wilson95"], colour)
-        _interval(mean, i, time, time95 or (), colour)
+        time, ends = row.restricted_mean_time_s, row.restricted_mean_time_95
+        if time_limit is None:
+            time, ends = row.restricted_mean_share, row.restricted_mean_share_95
+        _interval(rate, i, row.successes / valid, row.wilson95, colour)
+        assert time is not None  # noqa: S101  there is a valid trial
+        _interval(mean, i, time, ends if valid >= style.ENOUGH_TRIALS else None, colour)
         exits = sorted(
             r.time_s / (r.limit_s if time_limit is None else 1.0)
             for r in rows
@@ -250,7 +251,7 @@ def summary(
             linewidth=max(1.2, 3.2 - 0.8 * i),
             label=short[name],
         )
-    valid = [row["trials"] - row["invalid"] for row in controllers.values()]
+    valid = [row.trials - row.invalid for row in controllers.values()]
     counted = [f"{label}\nn = {n}" for label, n in zip(short.values(), valid, strict=True)]
     _name_lines(rate, counted)
     _name_lines(mean, list(short.values()))
@@ -295,11 +296,11 @@ def _title_panels(
         axis.set_major_formatter(PercentFormatter(1.0, symbol=""))
 
 
-def _interval(panel: Axes, at: int, value: float, ends: Sequence[float], colour: str) -> None:
+def _interval(panel: Axes, at: int, value: float, ends: Ends | None, colour: str) -> None:
     """A value, and its interval if it has one."""
     panel.plot(
-        list(ends),
-        [at] * len(ends),
+        list(ends or ()),
+        [at] * len(ends or ()),
         color=colour,
         linewidth=2.4,
         solid_capstyle="butt",

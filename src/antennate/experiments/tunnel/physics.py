@@ -43,6 +43,7 @@ from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.sim.trial import TrialConfig, require_own_curves
 from antennate.sim.world import World
+from antennate.studies.columns import column, largest, mean, smallest, tabular, tabular_row, total
 from antennate.types import Floats, Ints, Maneuver
 
 if TYPE_CHECKING:
@@ -136,57 +137,74 @@ Watched = Union[World, "WarpRow"]
 """What is looked at: on the CPU, or in a batch on a device."""
 
 
-@dataclass(frozen=True, slots=True)
-class TrialResult:
-    """One row of the table.
+@tabular
+class Measured:
+    """What is measured of a walk, and of many: pooled over the valid ones."""
 
-    Attributes:
-        seed: Seed of the run; with `trial` it decides all chance.
-        controller: Name of the controller.
-        outcome: success (the head crossed the exit from inside), timeout, left (out another way),
-            overturned (most links on their backs), fell (a link is lower than the ground at the
-            start by more than `FALL`), both on ground that is not flat alone, or invalid.
-        time_s: Time to exit [s]; the limit for every failure.
-        progress_m: How far the head came, within 0 and the length of the scene [m].
-        stuck: Episodes of being stuck; `recovered` of them ended by getting on.
-        share_forward: Share of ticks in each maneuver.
-        force_mean_n: Mean over 10 Hz samples of the summed normal force on robot and antennae [N].
-        force_max_n: Their maximum [N].
-        limit_s: Time limit of the trial [s].
-        offset_m: Mean distance of the head from the centre line over the length that it came [m],
-            whatever the time it took; NaN in a scene without one.
-        spring_low_n_m: Smallest torque of the antenna spring that bore the largest one [N·m];
-            negative where it was bent the other way too.
-        spring_high_n_m: That largest torque [N·m], of looks at every tick.
-        spring_cycles: Load cycles of that spring, see `largest_load`.
-        overturned: Whether the robot lies on its back at the end.
-        void_decisions: Decisions of a learned policy whose answer was no number: it held.
-        reason: Why a trial is invalid, with the physics step; empty otherwise.
-    """
+    stuck: int = column("stuck episodes", pool=total, form="d", least=0.0, default=0)
+    """Episodes of being stuck."""
+    recovered: int = column("  recovered", pool=total, form="d", least=0.0, default=0)
+    """Those of them that ended by getting on."""
+    force_mean_n: float | None = column("contact force, mean", "N", mean, least=0.0, default=0.0)
+    """Summed normal force on robot and antennae, mean over samples at 10 Hz."""
+    force_max_n: float | None = column(
+        "contact force, largest", "N", largest, form=".1f", least=0.0, default=0.0
+    )
+    """Largest summed normal force."""
+    spring_low_n_m: float | None = column(pool=smallest, default=0.0)
+    """Smallest torque of the antenna spring that bore the largest one; negative where it was bent
+    the other way, too."""
+    spring_high_n_m: float | None = column(
+        "spring torque, most", "N·mm", largest, scale=1e3, default=0.0
+    )
+    """Largest torque of any antenna spring, of looks at every tick; the stop of its hinge bounds
+    it."""
+    spring_cycles: int | None = column(
+        "  load cycles, most", pool=largest, form="d", least=0.0, default=0
+    )
+    """Load cycles of that spring: half of its reversals that are larger than a tenth of its
+    range."""
+
+
+@tabular_row
+class TrialResult(Measured):
+    """One trial, a row of trials.csv."""
 
     seed: int
+    """Seed of the run."""
     trial: int
+    """Number of the trial from 0; with the seed it decides tunnel, start and disturbances."""
     controller: str
+    """Name of the controller, with its readings if they are not its own."""
     outcome: Outcome
-    time_s: float
+    """How it ended, see above."""
+    time_s: float = column(
+        "time, a failure as the limit", "s", form=".1f", least=0.0, most="time_limit"
+    )
+    """Time to the exit; the limit for every failure."""
+    limit_s: float = column("time limit", "s", form=".1f", least=0.0, default=TIME_LIMIT)
+    """Time limit of the trial."""
     progress_m: float = 0.0
-    stuck: int = 0
-    recovered: int = 0
+    """How far the head came, within 0 and the length of the scene."""
+    offset_m: float = column("off the middle", "m", form=".3f", least=0.0, default=math.nan)
+    """Mean distance of the head from the centre line over the length that it came: each stretch of
+    5 cm counts alike, however long it took. None in a scene without one."""
     share_forward: float = 0.0
+    """Share of ticks in FORWARD; so `share_turn_l` and the others."""
     share_turn_l: float = 0.0
+    """Share of ticks in TURN_L."""
     share_turn_r: float = 0.0
+    """Share of ticks in TURN_R."""
     share_reverse: float = 0.0
+    """Share of ticks in REVERSE."""
     share_hold: float = 0.0
-    force_mean_n: float = 0.0
-    force_max_n: float = 0.0
-    limit_s: float = TIME_LIMIT
-    offset_m: float = math.nan
-    spring_low_n_m: float = 0.0
-    spring_high_n_m: float = 0.0
-    spring_cycles: int = 0
+    """Share of ticks in HOLD."""
     overturned: bool = False
+    """Whether the robot lies on its back at the end."""
     void_decisions: int = 0
+    """Decisions of a learned policy whose answer was no number, so that it held."""
     reason: str = ""
+    """Why a trial is invalid, with the physics step."""
 
     def __post_init__(self) -> None:
         require_times(self.time_s, self.limit_s)

@@ -23,6 +23,7 @@ from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.scene import GRAVITY, BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
+from antennate.studies.columns import column, largest, median, tabular, tabular_row
 from antennate.types import Floats
 
 COMMAND_PERIOD = 0.002
@@ -78,39 +79,48 @@ SAMPLE_PERIOD = 0.01
 """Time between samples of a passage [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class WallTrial:
-    """One trial, a row of trials.csv.
+@tabular
+class Measured:
+    """What is measured of a passage; of many the median or the largest, of the valid ones."""
 
-    Attributes:
-        seed: Seed of the run; with `trial` it decides all chance.
-        profile: Springs of the antenna.
-        outcome: Over the whole travel; `outcome_after_start` without the start.
-        least_advance_mm: Smallest advance of the tip over any `jam_travel` of the base.
-        longest_stick_mm: Longest travel of the base during which the tip never got ahead by
-            `jam_advance`.
-        longest_gap_s: Longest time without touch after the first one.
-        touched: Share of samples that touch.
-        force_mean_n: Mean contact force [N]; `force_max_n` the largest.
-        flex_max_deg: Largest flex under the flex sensor.
-        hinge_max_deg: Largest angle of any one hinge, also of those beyond the flex sensor.
-        reason: Why it is invalid.
-    """
+    least_advance_mm: float | None = column("least advance", "mm", median, default=None)
+    """Smallest advance of the tip over any `jam_travel` of the base."""
+    longest_stick_mm: float | None = column("longest stick", "mm", median, form=".1f", default=None)
+    """Longest travel of the base during which the tip never got ahead by `jam_advance`."""
+    longest_gap_s: float | None = column("longest gap", "s", median, default=None)
+    """Longest time without touch after the first one."""
+    touched: float | None = column(pool=median, default=None)
+    """Share of samples that touch."""
+    force_mean_n: float | None = column(
+        "contact force, mean", "N", median, form=".3f", default=None
+    )
+    """Contact force, mean."""
+    force_max_n: float | None = column("contact force, largest", "N", largest, default=None)
+    """Largest contact force."""
+    flex_max_deg: float | None = column("flex, largest", "deg", largest, form=".0f", default=None)
+    """Largest flex under the flex sensor."""
+    hinge_max_deg: float | None = column(
+        "angle of a hinge, largest", "deg", largest, form=".0f", default=None
+    )
+    """Largest angle of any one hinge, also of those beyond the flex sensor."""
+
+
+@tabular_row
+class WallTrial(Measured):
+    """One trial, a row of trials.csv; what is measured is empty where it is invalid."""
 
     seed: int
+    """Seed of the run; with `trial` it decides all chance."""
     trial: int
+    """Number of the trial."""
     profile: str
+    """Springs of the antenna."""
     outcome: Outcome
+    """Success, jam, slip or invalid, over the whole travel."""
     outcome_after_start: Outcome
-    least_advance_mm: float
-    longest_stick_mm: float
-    longest_gap_s: float
-    touched: float
-    force_mean_n: float
-    force_max_n: float
-    flex_max_deg: float
-    hinge_max_deg: float
+    """The same without the start."""
     reason: str = ""
+    """Why it is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +176,10 @@ def classify(wall: WallParams, seed: int, trial: int, profile: str, seen: Traver
     )
 
 
-def invalid(seed: int, trial: int, profile: str, reason: str) -> WallTrial:
+def invalid(config: WallConfig, profile: str, trial: int, reason: str) -> WallTrial:
     """What is told of a trial that has no passage."""
-    return WallTrial(seed, trial, profile, "invalid", "invalid", *[math.nan] * 8, reason=reason)
+    place = {"seed": config.seed, "trial": trial, "profile": profile, "reason": reason}
+    return WallTrial(outcome="invalid", outcome_after_start="invalid", **place)
 
 
 def least_advance(base: Floats, tip: Floats, travel: float) -> float:

@@ -26,7 +26,6 @@ from antennate.hardware.esp32.clock import Timed
 from antennate.hardware.esp32.frame import FLAG_LEFT_RAIL, FLAG_RIGHT_RAIL, IMU_NONE
 from antennate.hardware.esp32.wire import Counters, FrameDecoder, Hello, Sample
 from antennate.messages import typed
-from antennate.notebook import from_columns
 from antennate.params.hardware import DoctorParams, RecordParams
 from antennate.types import Bools, Floats, Ints
 
@@ -223,11 +222,10 @@ class Esp32Recording:
         """A pandas DataFrame: boot, seq, t [s], left, right [counts], left_rail, right_rail.
 
         With an inertial sensor also the columns of `IMU_COLUMNS` [counts].
-
-        Raises:
-            MissingPackageError: pandas is not installed.
         """
-        return from_columns(
+        from pandas import DataFrame  # slow to import
+
+        return DataFrame(
             {
                 "boot": self.boot,
                 "seq": self.seq,

@@ -28,6 +28,7 @@ from antennate.antenna.curves import (
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.jackknife import student95
+from antennate.studies.columns import Ends, column, tabular
 from antennate.types import Bools, Floats, Ints
 
 _STEADY = 0.01
@@ -38,23 +39,22 @@ _END = 0.2
 """Share of a hold at its beginning and at its end over which readings are averaged."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Relaxation:
-    """How readings move while the bend is held, over the span of readings.
+    """How readings move while the bend is held, over the span of readings."""
 
-    Attributes:
-        mean: Mean over holds: above 0 readings go on as before the hold, below 0 they go back.
-        mean_95: 95 % interval of it over holds, None with fewer than two.
-        largest: Largest change of a hold.
-        time: Median length of the holds [s].
-        holds: How many there are.
-    """
-
-    mean: float
-    mean_95: tuple[float, float] | None
+    mean: float = column(
+        "relaxation in a hold", "% of the span", form="+.1f", scale=100.0, interval="mean_95"
+    )
+    """Mean change in a hold: above 0 readings go on as before the hold, below 0 they go back; the
+    interval is over holds, `null` with fewer than two."""
+    mean_95: Ends | None
     largest: float
-    time: float
+    """Largest change in a hold."""
+    time: float = column("  length of a hold", "s", form=".2g")
+    """Median length of the holds [s]."""
     holds: int
+    """Number of holds."""
 
 
 def relaxation(samples: Samples, t: Floats, span: float) -> Relaxation | None:
@@ -80,8 +80,13 @@ def relaxation(samples: Samples, t: Floats, span: float) -> Relaxation | None:
     if len(changes) > 1:
         half = student95(len(changes) - 1) * float(np.std(changes, ddof=1)) / len(changes) ** 0.5
         interval = (mean - half, mean + half)
-    largest = max(changes, key=abs)
-    return Relaxation(mean, interval, largest, float(np.median(times)), len(changes))
+    return Relaxation(
+        mean=mean,
+        mean_95=interval,
+        largest=max(changes, key=abs),
+        time=float(np.median(times)),
+        holds=len(changes),
+    )
 
 
 def _holds(samples: Samples) -> Iterator[tuple[Ints, float]]:
@@ -157,67 +162,60 @@ def _monotonic(level: Floats, turn: float) -> Iterator[tuple[int, int, int]]:
     yield start, len(level), sign
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Hysteresis:
-    """How far readings of loading and unloading lie apart at the same bend.
+    """How far readings lie apart at the same bend: loading minus unloading, over their span."""
 
-    Attributes:
-        largest: Largest gap of mean readings, loading minus unloading, over the span of readings.
-        at_bend: Where.
-        mean: Mean gap over all bends that both directions reach, over the span of readings.
-        mean_95: 95 % interval of it over pushes, None with fewer than two.
-        level: What the curve makes of it: largest gap in b at the same bend.
-        pushes: Pushes that have both directions.
-        one_way_r2: Share of the level's variance that a sigmoid of its own explains, of loading
-            and of unloading.
-    """
-
-    largest: float
-    at_bend: float
-    mean: float
-    mean_95: tuple[float, float] | None
-    level: float
+    mean: float = column(
+        "hysteresis, mean gap", "% of the span", form="+.1f", scale=100.0, interval="mean_95"
+    )
+    """Mean gap over all bends that both directions reach; the interval is over pushes, `null` with
+    fewer than two."""
+    mean_95: Ends | None
+    largest: float = column("  largest gap", "% of the span", form="+.1f", scale=100.0)
+    """Largest gap of mean readings."""
+    at_bend: float = column("  at a bend of")
+    """Bend at which the gap is largest."""
+    level: float = column("  largest gap in b", form="+.3f")
+    """Largest gap in b that the curve makes of these readings."""
     pushes: int
-    one_way_r2: tuple[float, float]
+    """Pushes that have both directions."""
+    one_way_r2: Ends
+    """R² of a sigmoid of its own: of loading, and of unloading."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class NewPush:
-    """What to expect of a push that served no fit.
+    """What to expect of a push that served no fit."""
 
-    Attributes:
-        error_95: Predictive interval: lowest and highest error of b, curve minus bend, between
-            which 95 % of the readings of a new push are expected, with 95 % confidence. None with
-            two pushes: each is judged by the other, so that both err by the same.
-        rmse: Root mean squared error of b on pushes left out; `worst_rmse` of the worst of them.
-        pushes: Pushes that were left out in turn.
-    """
-
-    error_95: tuple[float, float] | None
-    rmse: float
-    worst_rmse: float
+    error_95: Ends | None = column("error of b in a new push, 95 %", form="+.3f")
+    """Predictive interval of the error of b, curve minus bend: 95 % of the readings of a new push
+    are expected in it, with 95 % confidence; `null` with two pushes, as each is judged by the other
+    and both err by the same."""
+    rmse: float = column("RMSE of b, pushes left out", form=".4f")
+    """Root mean square error of b on pushes left out."""
+    worst_rmse: float = column("  of the worst", form=".4f")
+    """Root mean square error of b on the worst push left out."""
     pushes: int
+    """Pushes that were left out in turn."""
 
 
-@dataclass(frozen=True, slots=True)
+@tabular
 class Assessment:
-    """What is known about the next push.
-
-    Attributes:
-        pushes: Pushes found.
-        hysteresis: None if no push was both loaded and unloaded.
-        new_push: None with a single push: nothing is known about the next one.
-        rivals: Gain of each rival under each check; the first check is the recording as it is.
-        named: Rivals that win beyond noise under every check.
-        relaxation: None if there is no hold after a change of the bend, or no time.
-    """
+    """What is known about the next push; it is not in `calibration.json`."""
 
     pushes: int
+    """Pushes found, by trials and by turns of the bend."""
     hysteresis: Hysteresis | None
+    """Gap between loading and unloading; `null` if no push has both."""
     new_push: NewPush | None
+    """Error to expect of the next push; `null` with a single push."""
     rivals: dict[str, dict[str, Gain]]
+    """Gain of a `line` and of an `isotonic` curve, for every check; the first is `as recorded`."""
     named: tuple[str, ...]
-    relaxation: Relaxation | None
+    """Rivals that win beyond noise under every check."""
+    relaxation: Relaxation | None = None
+    """Change of readings in holds; `null` without a hold after a change of the bend."""
 
 
 RECORDED = "as recorded"
@@ -252,15 +250,14 @@ def assess(samples: Samples, calibration: Calibration, t: Floats | None = None) 
         for rival in MODELS[1:]
     }
     named = tuple(r for r, gains in rivals.items() if gains and all(g.wins for g in gains.values()))
+    span = calibration.counts_high - calibration.counts_low
     return Assessment(
-        pushes.count,
-        hysteresis(samples, pushes, calibration),
-        _new_push(checks[RECORDED][calibration.kind]),
-        rivals,
-        named,
-        None
-        if t is None
-        else relaxation(samples, t, calibration.counts_high - calibration.counts_low),
+        pushes=pushes.count,
+        hysteresis=hysteresis(samples, pushes, calibration),
+        new_push=_new_push(checks[RECORDED][calibration.kind]),
+        rivals=rivals,
+        named=named,
+        relaxation=None if t is None else relaxation(samples, t, span),
     )
 
 
@@ -279,10 +276,10 @@ def _new_push(errors: list[Floats]) -> NewPush | None:
         low, high = (ends.mean(axis=0) + wide * [-1.0, 1.0]).tolist()
         interval = low, high
     return NewPush(
-        interval,
-        float(np.sqrt(np.mean(np.concatenate(errors) ** 2))),
-        float(sizes.max()),
-        len(errors),
+        error_95=interval,
+        rmse=float(np.sqrt(np.mean(np.concatenate(errors) ** 2))),
+        worst_rmse=float(sizes.max()),
+        pushes=len(errors),
     )
 
 
@@ -335,14 +332,19 @@ def hysteresis(samples: Samples, pushes: Pushes, calibration: Calibration) -> Hy
         half = student95(len(gaps) - 1) * float(np.std(gaps, ddof=1)) / len(gaps) ** 0.5
         interval = (mean - half, mean + half)
     return Hysteresis(
-        float(gap[worst]),
-        float(grid[usual][worst]),
-        mean,
-        interval,
-        float(levels[np.argmax(abs(levels))]),
-        len(gaps),
-        (sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)),
+        mean=mean,
+        mean_95=interval,
+        largest=float(gap[worst]),
+        at_bend=float(grid[usual][worst]),
+        level=float(levels[np.argmax(abs(levels))]),
+        pushes=len(gaps),
+        one_way_r2=one_way_r2(samples, pushes),
     )
+
+
+def one_way_r2(samples: Samples, pushes: Pushes) -> Ends:
+    """R² of a sigmoid fitted to loading alone, and of one fitted to unloading alone."""
+    return sigmoid_r2(samples, pushes.way > 0), sigmoid_r2(samples, pushes.way < 0)
 
 
 def sigmoid_r2(samples: Samples, rows: Bools) -> float:

@@ -1,0 +1,164 @@
+"""What a competition comes to: of each controller, of each in each scene, and of every two."""
+
+from __future__ import annotations
+
+from antennate.experiments.compete.comparison import Check
+from antennate.studies.columns import (
+    Ends,
+    column,
+    count,
+    share,
+    tabular,
+    total,
+)
+from antennate.studies.statistics import wilson
+
+
+@tabular
+class Ranked:
+    """Where a controller stands."""
+
+    given: str
+    """What the simulation gave to it, in words; such a controller has no rank."""
+    rank: int | None = column("rank", form=".0f", interval="rank_95")
+    """One more than how many others succeed more often by more than `tie`, and its interval, of
+    all ranks together."""
+    rank_95: tuple[int, int] | None
+
+
+@tabular
+class Cell:
+    """A controller in one scene; without an episode there all but counts are `null`."""
+
+    episodes: int = column("episodes", form="d")
+    """Episodes run."""
+    successes: int = column("successes", pool=count("end", "success"), form="d")
+    """Episodes that succeeded."""
+    success_share: float | None = column(
+        "  share", "%", share("end", "success"), form=".0f", scale=100.0
+    )
+    """Successes over episodes."""
+    wilson95: Ends | None = wilson("end")
+    """Wilson's interval of that share; over several scenes, of the effective number of trials."""
+    restricted_mean_share: float | None = column(
+        "restricted mean time",
+        "% of limit",
+        form=".1f",
+        scale=100.0,
+        interval="restricted_mean_share_95",
+    )
+    """Mean time as a share of the limit of each episode, 1 for a failure, and its interval."""
+    restricted_mean_share_95: Ends | None
+
+
+@tabular
+class Controller(Cell, Ranked):
+    """A controller over all scenes.
+
+    `successes`, `timeouts`, `left`, `fell`, `invalid` and the outcomes `overturned` add up to
+    `episodes`.
+    """
+
+    speed_m_s: float | None = column("speed over successes", "m/s", form=".3f", interval="speed_95")
+    """Mean speed over successes, and its interval over draws."""
+    speed_95: Ends | None
+    timeouts: int = column("out of time", pool=count("end", "timeout"), form="d")
+    """Episodes that were not out within the limit."""
+    left: int = column("left the scene", pool=count("end", "left"), form="d")
+    """Episodes that left the scene by another way than the exit."""
+    fell: int = column("fell", pool=count("end", "fell"), form="d")
+    """Episodes in which the robot fell."""
+    overturned: int = column("on its back at the end", pool=count("overturned", True), form="d")
+    """Episodes after which the robot lay on its back, whatever their outcome."""
+    invalid: int = column("INVALID", form="d")
+    """Episodes that are INVALID; they are failures."""
+    void_decisions: int = column(pool=total, default=0)
+    """Decisions of a learned policy whose answer was no number, so that the robot held."""
+    first_reason: str | None
+    """Why the first INVALID episode is that; `null` if none is."""
+
+
+@tabular
+class Pair:
+    """Two controllers that are ranked, on the draws that both have."""
+
+    names: tuple[str, str]
+    """The first and the second."""
+    episodes: int
+    """Episodes compared."""
+    draws: int
+    """Draws that these are of."""
+    only_first: int = column("only first", form="d")
+    """Episodes in which only the first succeeded."""
+    only_second: int = column("only second", form="d")
+    """Episodes in which only the second did."""
+    mcnemar_p: float
+    """McNemar's test of successes, exact, by draws."""
+    mcnemar_holm_p: float = column("McNemar p", form=".2g")
+    """P of that test with Holm's correction over all pairs."""
+    share_difference: float = column(
+        "time apart", "% of limit", form="+.1f", scale=100.0, interval="share_difference_95"
+    )
+    """Mean of a draw's restricted times as a share of the limit, first less second, and its
+    interval."""
+    share_difference_95: Ends | None
+    wilcoxon_p: float | None
+    """Signed-rank test on those means; `null` of one draw."""
+    wilcoxon_holm_p: float = column("Wilcoxon p", form=".2g")
+    """P of that test with Holm's correction over all pairs."""
+    both: int
+    """Episodes in which both succeeded."""
+    success_difference: float
+    """Success share of the first less that of the second."""
+    tie: bool
+    """Whether that difference is no more than the run's `tie`."""
+
+
+@tabular
+class Asked:
+    """What was run."""
+
+    schema: int = 1
+    command: str = "compete"
+    seed: int | None
+    """Seed of the run; `null` with `--check`."""
+    trials: int
+    """Draws of each scene."""
+    decision_limit_s: float
+    """Processor time that a decision may take."""
+    tie: float
+    """Largest difference of success shares that is a tie."""
+    interrupted: bool = False
+    """Always false: a run that is interrupted has no result."""
+
+
+@tabular
+class Standing:
+    """What the rows of one run or of several come to."""
+
+    seeds: list[int]
+    """Seeds of all rows."""
+    hidden: bool
+    """Whether the seed of each row was drawn when its run began."""
+    controllers: dict[str, Controller]
+    """Each controller by name."""
+    scenes: dict[str, dict[str, Cell]]
+    """Of each scene every controller by name."""
+    paired: dict[str, Pair]
+    """Every two controllers that are ranked, as `first-second`."""
+    check: Check | None
+    """How a table repeats, with `--check`; else `null`."""
+
+
+@tabular
+class CompeteResult(Standing, Asked):
+    """What a run comes to."""
+
+
+def none_valid(result: Standing) -> dict[str, str | None]:
+    """Controllers of which every episode is INVALID, and why the first one is."""
+    return {
+        name: each.first_reason
+        for name, each in result.controllers.items()
+        if each.episodes and each.invalid == each.episodes
+    }

@@ -1,0 +1,338 @@
+"""Columns: each number is said once, where the class of a row or of a result names it.
+
+A field declared with `column` carries its label, its unit, how it is written, and how rows are
+pooled into it. Tables, result.json, axes and docs/results.md follow from that.
+
+    @tabular
+    class Measured:
+        force_max_n: float | None = column("contact force, largest", "N", largest, default=None)
+
+    @tabular
+    class Row(Measured): ...      # one trial
+
+    @tabular
+    class Summary(Measured): ...  # many: `pooled(Summary, frame(rows))`
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
+from inspect import get_annotations
+from typing import Any, TypeVar, cast, dataclass_transform, get_type_hints
+
+import numpy as np
+
+NONE = "-"
+"""Shown where there is no number."""
+INVALID = "invalid"
+"""Outcome of a trial that says nothing; nothing but its number is pooled."""
+Ends = tuple[float, float]
+"""An interval: its lower and its upper end."""
+Frame = Any
+"""A pandas DataFrame, imported where one is made; its own types tell a checker too little."""
+Pool = Callable[[Frame, str], Any]
+"""pool(rows, name): the value of a column over rows."""
+_KEY = "column"
+_UNITS = {
+    "s": "s",
+    "ms": "ms",
+    "hz": "Hz",
+    "rad": "rad",
+    "percent": "%",
+    "n_m": "N·m",
+    "per_m": "1/m",
+    "m_s2": "m/s²",
+    "rad_s": "rad/s",
+    "kg": "kg",
+    "w": "W",
+    "a": "A",
+    "v": "V",
+    "m": "m",
+    "mm": "mm",
+    "m_s": "m/s",
+    "deg": "deg",
+    "n": "N",
+    "n_mm": "N·mm",
+    "n_mm_per_deg": "N·mm/deg",
+    "n_m_per_rad": "N·m/rad",
+    "pa": "Pa",
+    "ohm": "Ohm",
+    "counts": "counts",
+}
+"""Ends of the names of columns, and the unit that each says."""
+Kind = TypeVar("Kind")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """How one number, or the ends of an interval, is called, pooled and written.
+
+    Attributes:
+        name: Key in result.json; a dot leads into a part (`share.forward`). It ends with the unit.
+        label: What tables and figures call it; a column without one is not shown.
+        unit: Its unit as shown.
+        pool: How rows make it; None if it is computed elsewhere.
+        form: Its format.
+        scale: Factor to the unit shown.
+        join: Between two numbers, as the ends of an interval.
+        least: What it cannot lie below.
+        most: What it cannot exceed; text names the parameter that says so.
+        interval: Key of its 95 % interval, beside its own; a line of the table below it.
+    """
+
+    name: str = ""
+    label: str = ""
+    unit: str = ""
+    pool: Pool | None = None
+    form: str = ".2f"
+    scale: float = 1.0
+    join: str = " to "
+    least: float = -math.inf
+    most: float | str = math.inf
+    interval: str = ""
+
+    @property
+    def ends(self) -> Column:
+        """Its interval."""
+        path = self.name.rpartition(".")[0]
+        name = f"{path}.{self.interval}" if path else self.interval
+        return replace(self, name=name, label="  95 %", pool=None, interval="")
+
+    @property
+    def title(self) -> str:
+        """Label and unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def value(self, of: Any) -> Any:
+        """Its value in a row or a summary, an object or a mapping; None where there is none."""
+        for part in self.name.split("."):
+            of = of.get(part) if isinstance(of, Mapping) else getattr(of, part, None)
+        return of
+
+    def cell(self, of: Any) -> str:
+        """Its value as a table shows it."""
+        return shown(self.value(of), self.form, self.scale, self.join)
+
+
+def column(
+    label: str = "",
+    unit: str = "",
+    pool: Pool | None = None,
+    *,
+    form: str = ".2f",
+    scale: float = 1.0,
+    join: str = " to ",
+    least: float = -math.inf,
+    most: float | str = math.inf,
+    interval: str = "",
+    default: Any = MISSING,
+) -> Any:
+    """A field with what `Column` says of it. One that holds further columns lends its label."""
+    said = Column("", label, unit, pool, form, scale, join, least, most, interval)
+    return field(default=default, metadata={_KEY: said})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(column, field))
+def tabular(kind: type[Kind]) -> type[Kind]:
+    """A frozen dataclass, given by names, whose fields may be columns: of rows and of results."""
+    return dataclass(frozen=True, kw_only=True)(kind)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(column, field))
+def tabular_row(kind: type[Kind]) -> type[Kind]:
+    """Such a class for a row of trials.csv: its own fields stand before those that it shares."""
+    made: Any = tabular(kind)
+    known = dict(made.__dataclass_fields__)
+    own = {name: known.pop(name) for name in get_annotations(kind) if name in known}
+    made.__dataclass_fields__ = {**own, **known}
+    return made
+
+
+def column_of(kind: type, name: str) -> Column:
+    """The column of this name."""
+    return next(each for each in columns(kind) if each.name == name)
+
+
+@functools.cache
+def columns(kind: type) -> tuple[Column, ...]:
+    """The columns of a class in their order, those of its parts among them."""
+    found: list[Column] = []
+    for name, said, part in _declared(kind):
+        if said is not None and part is None:
+            found.append(replace(said, name=name))
+        elif said is not None and part is not None:
+            inner = columns(part)
+            found += (replace(c, name=f"{name}.{c.name}", label=_of(c, said)) for c in inner)
+    return tuple(found)
+
+
+def _of(inner: Column, outer: Column) -> str:
+    """The label of a column in a part: that of the part stands behind it."""
+    behind = inner.label and not inner.label.startswith(" ") and outer.label
+    return f"{inner.label} {outer.label}" if behind else inner.label
+
+
+@functools.cache
+def _declared(kind: type) -> tuple[tuple[str, Column | None, type | None], ...]:
+    """Name and column of each field, and the class of its parts where it has some."""
+    hints = get_type_hints(kind)
+    found: list[tuple[str, Column | None, type | None]] = []
+    for each in fields(cast("Any", kind)):
+        hint: Any = hints[each.name]
+        part: Any = hint if is_dataclass(hint) else None
+        found.append((each.name, each.metadata.get(_KEY), part))
+    return tuple(found)
+
+
+def named(name: str) -> Column:
+    """A column that is known by its name alone: its words, and the unit that it ends with."""
+    end = next((e for e in sorted(_UNITS, key=len)[::-1] if name.endswith(f"_{e}")), "")
+    words = name.removesuffix(f"_{end}").replace("_", " ")
+    return Column(name, words, _UNITS.get(end, ""), form=".3g")
+
+
+def frame(rows: Iterable[Any], kind: type | None = None) -> Frame:
+    """The rows of a run as a pandas DataFrame: a row for each, a column for each field.
+
+    Args:
+        rows: Dataclasses or mappings of one kind.
+        kind: Their class, which names the columns where there are no rows.
+    """
+    import pandas  # slow to import
+
+    some = list(rows)
+    if kind is None and some and isinstance(some[0], Mapping):
+        return pandas.DataFrame({name: [row[name] for row in some] for name in some[0]})
+    kind = kind or (type(some[0]) if some else None)
+    names = [each.name for each in fields(kind)] if kind else []
+    return pandas.DataFrame({name: [getattr(row, name) for row in some] for name in names})
+
+
+def by(rows: Frame, name: str, values: Iterable[Any] = ()) -> dict[Any, Frame]:
+    """Rows by their value in a column: these values first, even without rows, then all others."""
+    groups = dict(iter(rows.groupby(name, sort=False))) if len(rows) else {}
+    return {value: groups.get(value, rows.iloc[:0]) for value in dict.fromkeys([*values, *groups])}
+
+
+def valid(rows: Frame) -> Frame:
+    """Rows without those that are invalid."""
+    return rows[rows["outcome"] != INVALID]
+
+
+def pooled(kind: type[Kind], rows: Frame, **given: Any) -> Kind:
+    """Rows as one summary of a class: each column over the valid ones, as the column says.
+
+    Fields `trials`, `invalid` and `first_reason` are counted over all rows.
+
+    Args:
+        kind: Class of the summary.
+        rows: Rows with an `outcome`, or rows that are all valid.
+        given: Fields that are computed elsewhere.
+    """
+    sound = valid(rows) if "outcome" in rows else rows
+    lost = rows.drop(sound.index)
+    reasons = lost["reason"].tolist() if "reason" in lost else []
+    counted = {
+        "trials": len(rows),
+        "invalid": len(lost),
+        "first_reason": reasons[0] if reasons else None,
+    }
+    known = {each.name for each in fields(cast("Any", kind))}
+    return _fill(kind, sound, {k: v for k, v in counted.items() if k in known} | given, "")
+
+
+def _fill(kind: type[Kind], rows: Frame, given: Mapping[str, Any], path: str) -> Kind:
+    values = dict(given)
+    for name, said, part in _declared(kind):
+        if name in given or said is None:
+            continue
+        if part is not None:
+            values[name] = _fill(part, rows, {}, f"{path}{name}_")
+        elif said.pool is not None:
+            values[name] = said.pool(rows, f"{path}{name}")
+    return kind(**values)
+
+
+def _known(values: Any) -> Any:
+    """What is known of a column, as an array."""
+    return values.dropna().to_numpy()
+
+
+def mean(rows: Frame, name: str) -> float | None:
+    """Mean of a column over the rows that have it; None without any."""
+    values = _known(rows[name])
+    return float(np.mean(values.astype(float))) if len(values) else None
+
+
+def median(rows: Frame, name: str) -> float | None:
+    """Median of a column; None without rows."""
+    values = _known(rows[name])
+    return float(np.median(values.astype(float))) if len(values) else None
+
+
+def largest(rows: Frame, name: str) -> float | None:
+    """Largest value of a column; None without rows."""
+    return max(_known(rows[name]).tolist(), default=None)
+
+
+def smallest(rows: Frame, name: str) -> float | None:
+    """Smallest value of a column; None without rows."""
+    return min(_known(rows[name]).tolist(), default=None)
+
+
+def total(rows: Frame, name: str) -> int:
+    """Sum of a column."""
+    return sum(_known(rows[name]).tolist())
+
+
+def count(name: str, value: Any) -> Pool:
+    """How many rows hold a value in a column."""
+    return lambda rows, _: int((rows[name] == value).sum())
+
+
+def share(name: str, value: Any) -> Pool:
+    """The share of rows that hold a value in a column; None without rows."""
+    return lambda rows, _: int((rows[name] == value).sum()) / len(rows) if len(rows) else None
+
+
+def content(result: Any) -> dict[str, Any]:
+    """A result as result.json holds it: dataclasses as dictionaries."""
+    return result if isinstance(result, dict) else asdict(result)
+
+
+def typed(kind: type[Kind], data: Any) -> Kind:
+    """A result from the content of result.json.
+
+    Raises:
+        ValueError: It is not of this class: another version wrote it, or it is damaged.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "all of it"
+        raise ValueError(f"{where}: {first['msg'].lower()}") from None
+
+
+def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ") -> str:
+    """A number, an interval as `low to high`, a text, or a dash for what is not known."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Sequence | np.ndarray):
+        if not np.isfinite(np.array(value, float)).all():  # None in result.json
+            return NONE
+        return join.join(_written(scale * end, form) for end in value)
+    if value is None or value != value:
+        return NONE
+    return _written(scale * value if scale != 1.0 else value, form)
+
+
+def _written(value: Any, form: str) -> str:
+    """A number in digits; what rounds to zero has no sign."""
+    text = format(value, form)
+    return text if text.strip("-0.") else text.lstrip("-")

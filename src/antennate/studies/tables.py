@@ -1,0 +1,164 @@
+"""Tables of results, and counts of successes in words."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+from antennate.jackknife import ENOUGH
+from antennate.studies.columns import Column, Ends, columns, shown
+
+
+class Tried(Protocol):
+    """How the trials of a condition ended."""
+
+    @property
+    def trials(self) -> int:
+        """All of them."""
+        ...
+
+    @property
+    def invalid(self) -> int:
+        """Those that say nothing."""
+        ...
+
+    @property
+    def successes(self) -> int:
+        """Those that succeeded."""
+        ...
+
+    @property
+    def wilson95(self) -> Ends | None:
+        """Interval of their share of the valid ones; None without any."""
+        ...
+
+
+def successes(conditions: Mapping[str, Tried]) -> str:
+    """Successes of each condition by name, of its valid trials, with their interval."""
+    return ", ".join(
+        f"{name} {of_valid(each.successes, each.trials - each.invalid, each.wilson95)}"
+        for name, each in conditions.items()
+    )
+
+
+def of_valid(
+    count: int, valid: int, interval: Sequence[float] | None = None, word: str = ""
+) -> str:
+    """A count of valid trials in words, as `16 of 20 (0.58 to 0.92)`."""
+    if not valid:
+        return "without a valid trial"
+    return f"{count} of {valid}{word}" + (f" ({shown(interval)})" if interval else "")
+
+
+FEW = f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
+
+
+def few(trials: Iterable[int]) -> str:
+    """What is said where valid trials are too few for an interval of a mean; empty if they are not.
+
+    Args:
+        trials: Valid trials of each condition or point; those without any do not count.
+    """
+    some = [count for count in trials if count]
+    if not some or min(some) >= ENOUGH:
+        return ""
+    return FEW
+
+
+class Interim:
+    """How the trials that have ended came out, while others run."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, Counter[str]] = {}
+
+    def add(self, row: Any) -> None:
+        """Count a row: a dataclass or a mapping with a condition and an outcome."""
+        cells = row if isinstance(row, Mapping) else asdict(row)
+        outcome = cells.get("outcome") or cells.get("status")
+        if outcome is not None:
+            condition = next((str(cells[c]) for c in _CONDITIONS if c in cells), _ANY)
+            self._counts.setdefault(condition, Counter())[str(outcome)] += 1
+
+    def table(self) -> Table | None:
+        """A line for each condition; None if it tells no more than how many."""
+        found = {outcome for counts in self._counts.values() for outcome in counts}
+        outcomes = sorted(found, key=lambda outcome: (outcome != "success", outcome))
+        rows = [
+            (name, [str(counts[outcome]) for outcome in outcomes])
+            for name, counts in sorted(self._counts.items())
+        ]
+        ended = sum(counts.total() for counts in self._counts.values())
+        tells = len(outcomes) > 1 or any(name != _ANY for name in self._counts)
+        words = [_WORDS.get(outcome, outcome) for outcome in outcomes]
+        return Table(f"So far, {ended} trials", words, rows) if tells else None
+
+
+_CONDITIONS = ("controller", "profile")
+"""Columns that tell a condition."""
+_WORDS = {"success": "successes", "timeout": "out of time", "left": "left the scene"}
+"""Outcomes as tables of results name them."""
+_ANY = "trials"
+"""Stands for all of them where there are no conditions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table to be shown: measures are rows, so that it fits a narrow terminal.
+
+    Attributes:
+        title: Above it.
+        preface: Before the title: what its columns are, a line each.
+        columns: Names of the columns.
+        rows: Name and cells of every row.
+        note: Under it.
+        leading: Cells that tell two rows apart in place of their names, from the first on.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[str]]]
+    note: str = ""
+    leading: int = 0
+    preface: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        conditions: Mapping[str, Any],
+        measures: Iterable[Column] | None = None,
+        note: str = "",
+        preface: str = "",
+    ) -> Table:
+        """A line for each column that has a label, a cell for each condition.
+
+        Args:
+            title: Above it.
+            conditions: Summaries by name, of one class or mappings.
+            measures: What is shown; None for all columns of the class of the summaries.
+            note: Under it.
+            preface: Before the title.
+        """
+        if measures is None:
+            measures = columns(type(next(iter(conditions.values())))) if conditions else ()
+        lines = (line for m in measures for line in ((m, m.ends) if m.interval else (m,)))
+        rows = [(m.title, [m.cell(c) for c in conditions.values()]) for m in lines if m.label]
+        return cls(title, list(conditions), rows, note, preface=preface)
+
+    @classmethod
+    def lines(
+        cls,
+        title: str,
+        rows: Mapping[str, Any],
+        measures: Iterable[Column] | None = None,
+        note: str = "",
+        preface: str = "",
+    ) -> Table:
+        """The same with a line for each condition, and a column for each measure."""
+        if measures is None:
+            measures = columns(type(next(iter(rows.values())))) if rows else ()
+        named = [measure for measure in measures if measure.label]
+        cells = [(name, [m.cell(row) for m in named]) for name, row in rows.items()]
+        return cls(title, [m.title for m in named], cells, note, preface=preface)
