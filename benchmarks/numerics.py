@@ -31,8 +31,8 @@ from antennate.sim import trial
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.world import World, compile_world
-from antennate.studies.experiment import no_step
 from antennate.studies.pool import core_count, gather
+from antennate.studies.trials import no_step
 from antennate.types import Floats, Maneuver
 
 _CHOSEN = PhysicsParams()

@@ -140,7 +140,7 @@ def judge(folders: Sequence[str]) -> None:
     Raises:
         SystemExit: One is missing, or was told something else.
     """
-    runs: dict[str, dict[str, Mapping[str, Any]]] = {setting: {} for setting in FILES}
+    runs: dict[str, dict[str, Any]] = {setting: {} for setting in FILES}
     for folder in folders:
         run = RunDirectory.open(folder)
         name, told = run.result()["command"], run.config(load(run.result()["command"]).config)
@@ -148,7 +148,7 @@ def judge(folders: Sequence[str]) -> None:
         if not fits:
             those = " or ".join(f"`{command(name, c)}`" for c in SETTINGS if name in parts(c))
             sys.exit(f"{folder}: expected a run of {those}, found another")
-        runs[fits[0].setting][name] = run.result()
+        runs[fits[0].setting][name] = load(name).read(run.result())
     for config in SETTINGS:
         of = runs[config.setting]
         if missing := [command(name, config) for name in parts(config) if of and name not in of]:

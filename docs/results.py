@@ -6,7 +6,7 @@ the columns of trials.csv of an experiment, from the classes of its result and o
 
 import re
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -23,11 +23,43 @@ KNOWN = ("schema", "command")
 """Keys of every result, which the page explains once."""
 POOLS = ("mean", "median", "largest", "smallest", "total")
 """How many rows become one number, where a word says it."""
+WORDS = {
+    "controller": "Name of the controller",
+    "first_reason": "Why the first invalid one is invalid; `null` if none is",
+    "interrupted": "Whether the run was interrupted; the rest then speaks of the trials that had "
+    "ended",
+    "invalid": "Invalid trials; they are left out of all else",
+    "profile": "Springs of the antenna",
+    "profiles": "Each profile",
+    "reason": "Why it is invalid; empty otherwise",
+    "seed": "Seed of the run",
+    "statuses": "Trials of each status",
+    "successes": "Trials that succeeded",
+    "trial": "Number of the trial, from 0; with the seed it decides all chance",
+    "trials": "Trials run",
+    "void_decisions": "Decisions of a learned policy whose answer was no number, so that the robot "
+    "held",
+}
+"""What a key is in several experiments, unless a class says it by a docstring of its own."""
 
 
-def texts(kind: type) -> dict[str, str]:
-    """What each field is, by name: its docstring, else its label."""
-    found = {each.name: each.label.strip().capitalize() for each in columns(kind) if each.label}
+def texts(kind: type, others: Iterable[type]) -> dict[str, str]:
+    """What each field is, by name.
+
+    It is its docstring, else a word that all know, its label, or what it is in the first other
+    class of the experiment.
+    """
+    found = dict[str, str]()
+    for other in reversed([*others]):
+        found |= documented(other)
+    labels = {each.name: each.label.strip() for each in columns(kind)}
+    found |= {name: label[0].upper() + label[1:] for name, label in labels.items() if label}
+    return found | WORDS | documented(kind)
+
+
+def documented(kind: type) -> dict[str, str]:
+    """The docstring of each field that has one, by name."""
+    found = dict[str, str]()
     for each in reversed(kind.__mro__):
         found |= docstrings(each)
     return found
@@ -42,9 +74,9 @@ def parts_of(hint: Any) -> Iterator[tuple[str, type]]:
         yield from (("Of each of" if held else how, kind) for how, kind in parts_of(inner))
 
 
-def table(kind: type, without: Collection[str], pooled: bool = True) -> str:
+def table(kind: type, without: Collection[str], others: Iterable[type], pooled: bool = True) -> str:
     """A line for each field: key, unit and meaning; an interval stands beside its number."""
-    said, lines = texts(kind), list[str]()
+    said, lines = texts(kind, others), list[str]()
     beside = {each.name: each.interval for each in columns(kind) if each.interval}
     pools = {each.name: getattr(each.pool, "__name__", "") for each in columns(kind)}
     units = {  # "1" is none, whatever a name ends with
@@ -53,7 +85,7 @@ def table(kind: type, without: Collection[str], pooled: bool = True) -> str:
         if each.unit and each.scale == 1.0
     }
     for field in fields(kind):
-        if field.name in without or (field.name in beside.values() and field.name not in said):
+        if field.name in without or field.name in beside.values():
             continue
         if field.name not in said:
             raise SystemExit(
@@ -61,8 +93,9 @@ def table(kind: type, without: Collection[str], pooled: bool = True) -> str:
             )
         keys = [field.name, *filter(None, [beside.get(field.name)])]
         text = " ".join(said[field.name].split()).removesuffix(".")
-        if pooled and pools.get(field.name) in POOLS:
-            text += f" ({pools[field.name]})"
+        pool = pools.get(field.name)
+        if pooled and pool in POOLS and not text.endswith(f", {pool}"):
+            text += f" ({pool})"
         of_name = "" if field.name.startswith("per_") else named(field.name).unit
         unit = units.get(field.name, of_name)
         lines.append(row(", ".join(f"`{key}`" for key in keys), unit, text))
@@ -85,14 +118,14 @@ def keys_above(known: dict[str, str], seen: dict[type, str]) -> Iterator[tuple[s
         yield where, "all of them" if every else ", ".join(f"`{key}`" for key in keys)
 
 
-def tables(kind: type, name: str, seen: dict[type, str]) -> Iterator[str]:
+def tables(kind: type, name: str, seen: dict[type, str], rows: list[type]) -> Iterator[str]:
     """The table of a class, then those of its parts, each class and each inherited field once."""
     known = above(kind, seen)
     told = list(keys_above(known, seen))
     hidden = known if seen else KNOWN
     seen[kind] = name
     if any(field.name not in known for field in fields(kind)):
-        yield table(kind, hidden)
+        yield table(kind, hidden, [*rows, *seen])
     for where, keys in told:
         yield f"Keys as in `{where}`: {keys}.\n"
     for name, hint in get_type_hints(kind).items():
@@ -102,7 +135,7 @@ def tables(kind: type, name: str, seen: dict[type, str]) -> Iterator[str]:
             if inner in seen or any(issubclass(each, inner) for each in wider):
                 continue
             yield f"{how} `{name}`: {' '.join((inner.__doc__ or '').split())}\n"
-            yield from tables(inner, name, seen)
+            yield from tables(inner, name, seen, rows)
 
 
 def results(name: str) -> str:
@@ -110,15 +143,16 @@ def results(name: str) -> str:
     experiment = experiments.load(name)
     parts = list[str]()
     seen: dict[type, str] = {}
+    rows = [experiment.row] if experiment.row is not None else []
     if experiment.result is not None:
-        parts += tables(experiment.result, name, seen)
+        parts += tables(experiment.result, name, seen, rows)
     if experiment.row in seen:
         parts.append(f"A row of `trials.csv` is one of `{seen[experiment.row]}`.\n")
     elif experiment.row is not None:
         known = above(experiment.row, seen)
         said = "A row of `trials.csv` has these keys of `{}`: {}.\n"
         if any(field.name not in known for field in fields(experiment.row)):
-            parts += ["A row of `trials.csv`:\n", table(experiment.row, known, pooled=False)]
+            parts += ["A row of `trials.csv`:\n", table(experiment.row, known, seen, pooled=False)]
             said = "And of this trial what `{}` has of many: {}.\n"
         parts += [said.format(*told) for told in keys_above(known, seen)]
     return "\n".join(parts)

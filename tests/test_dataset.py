@@ -330,7 +330,7 @@ def test_an_episode_whose_physics_fails_is_counted_and_gives_no_window(
         return sound(config, draw)
 
     count = itertools.count()
-    monkeypatch.setitem(experiment._MAKE, "push", burst)
+    monkeypatch.setitem(experiment.MAKE, "push", burst)
     outcome = run(DatasetConfig.model_validate(SMALL | {"kinds": ["push"]}))
     pushes = outcome.result().kinds["push"]
     assert (pushes.trials, pushes.invalid) == (10, 4)

@@ -50,6 +50,20 @@ def test_it_runs_and_leaves_a_directory_like_ours(
     assert "trials = 3" in (dice / "run" / "config.toml").read_text()
 
 
+def test_a_column_is_one_line(dice: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is in the result and in the table."""
+    line = '    sixes: int = column("sixes", "", lambda rows, _: int((rows.eyes == 6).sum()))'
+    (dice / "site" / "dice_study.py").write_text(
+        DICE.replace("    schema: int = 1\n", f"{line}\n    schema: int = 1\n")
+    )
+    assert main(["dice", "--trials", "40", "--seed", "7", "--out", "run"]) == 0
+    run = RunDirectory.open(dice / "run")
+    thrown = sum(row["eyes"] == 6 for row in run.rows())
+    assert thrown > 0
+    assert run.result()["sixes"] == thrown
+    assert f"sixes {thrown}.00" in " ".join(capsys.readouterr().out.split())
+
+
 def test_it_is_told_how_many_workers_are_asked_for(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from antennate.params.base import Params, number
-from antennate.studies.experiment import OneByOne, Trials, no_row, no_step
+from antennate.studies.trials import OneByOne, Trials, no_row, no_step
 from antennate.telemetry.view import Restart
 
 

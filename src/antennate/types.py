@@ -1,6 +1,8 @@
 """What flows between a robot and its controller, and the protocols of both.
 
-Arrays carry a leading batch axis of B robots; B is 1 for a single one.
+A robot is simulated (`sim/sim_robot.py`), real (`hardware/driving/`) or replayed from a log
+(`telemetry/replay.py`); a controller is not told which. Arrays carry a leading batch axis of B
+robots; B is 1 for a single one. "The paper" is arXiv 2603.07795.
 """
 
 from __future__ import annotations
@@ -43,15 +45,15 @@ class Maneuver(IntEnum):
 
     @classmethod
     def label(cls, value: int) -> str:
-        """Its name; a number that is none of ours, as a controller may say, stays one."""
+        """Name of a maneuver; a number that is no maneuver, as text."""
         return cls(value).name if value in set(cls) else str(value)
 
 
 class State(IntEnum):
-    """State of the supervisor of a real robot; each is safer than the one before.
+    """State of the supervisor, which may stop a real robot; each is safer than the one before.
 
-    DEGRADED walks. HOLD keeps the last command, torque on. FAULT is a HOLD that only an arm event
-    ends. OFF has no torque and also needs an arm event.
+    OK and DEGRADED walk. HOLD keeps the last joint targets, with the motors on. FAULT is a HOLD
+    that lasts until a person arms the robot again. OFF has no torque and lasts likewise.
     """
 
     OK = 0
@@ -65,13 +67,16 @@ class State(IntEnum):
 class AntennaFrame:
     """What a robot feels: one reading of both antennae, its joints, and how its head moves.
 
+    A further sensor is a field here, empty by default and NaN where a sample is missing. The robots
+    above fill it, and `telemetry/topics.py` logs it.
+
     Attributes:
         t: Time at which the sensors were sampled [s], shape (B,).
         counts: 12-bit ADC readings, shape (B, 2), left before right; NaN where a sample is missing.
         positions: Joint angles as the servos report them [rad], shape (B, n), in the order of the
-            robot's joints, legs unwrapped; NaN where one did not answer. Shape (B, 0) or (0, 0)
-            where a robot cannot tell any. A bus tells them after its goals: they are those of the
-            tick before.
+            robot's joints, legs counted over full turns; NaN where one did not answer. Shape (B, 0)
+            or (0, 0) where a robot cannot tell any. A real robot reads them after it has written
+            its targets, so they are those of the control period before.
         angular_velocity: Of the head [rad/s], shape (B, 3), about its axes: x forward, y to the
             left, z up (REP 103). NaN where a sample is missing. Shape (B, 0) or (0, 0) where a
             robot has no inertial sensor.
@@ -96,7 +101,8 @@ class JointCommand:
 
     Attributes:
         yaw: Yaw joint angles [rad], shape (B, Y).
-        leg: Leg axle angles [rad], unwrapped, 0 at mid-stance, shape (B, L, 2).
+        leg: Leg axle angles [rad], counted over full turns, 0 where the leg stands, shape
+            (B, L, 2).
         antenna: Sweep angle of the antenna bases about their mounting angle [rad], positive
             towards the tail, shape (B, 2).
         pitch: Pitch joint angles [rad], shape (B, P), positive where the part in front of the joint
@@ -121,7 +127,7 @@ def joint_angles(command: JointCommand, parts: Iterable[str], batch: int = 1) ->
 
 
 class Clock(Protocol):
-    """Time of one robot. In simulation, sleeping is what makes the physics advance."""
+    """Time of a robot, or of a batch. In simulation, sleeping makes the physics advance."""
 
     def now(self) -> float:
         """Time [s] since the start."""
@@ -152,8 +158,8 @@ class Robot(Protocol):
 class Controller(Protocol):
     """Control of B robots at once: row i of every array belongs to robot i.
 
-    The rows never influence one another. A row whose reading is NaN answers HOLD and keeps its
-    joint targets. See docs/controllers.md.
+    The rows never influence one another. A row with NaN in `counts`, of either antenna, answers
+    HOLD and keeps its joint targets; NaN elsewhere is no reason to. See docs/controllers.md.
     """
 
     @property

@@ -1,4 +1,8 @@
-"""Controller with a name as one object: what it does, reads and needs, how it is made and drawn."""
+"""Controller with a name as one object: what it does, reads and needs, how it is made and drawn.
+
+`control/registry.py` lists the modules of ours; commands take the names of their `KINDS`, or
+FILE.py:NAME of your own (docs/controllers.md).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ on what a simulation tells the controller."""
 
 _COLOUR = re.compile("(#[0-9A-Fa-f]{6})?").fullmatch
 _SWEEP = tuple(f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency"))
-"""How the gait moves the bases; controllers that climb move them themselves."""
+"""How the gait sweeps the antenna bases; controllers that climb sweep them themselves."""
 _SHARED = tuple(
     path
     for path in paths_of(ControlParams)
@@ -35,11 +39,10 @@ _SHARED = tuple(
 
 @dataclass(frozen=True, repr=False)
 class ControllerKind:
-    """Controller with a name. The module of a controller lists its kinds as `KINDS`.
+    """Controller with a name. The module of a controller lists its kinds as a tuple `KINDS`.
 
-    One may be named wherever a controller is, as any factory, in a file of one's own too. There
-    sentence, colour and line are used: what such a controller needs it says itself, and it may read
-    all parameters.
+    One in a file of your own is taken, too. Of that one `about`, `colour` and `line` are used; it
+    may read all parameters, and its controller has `needs` itself if it has some.
 
     Attributes:
         name: Name, as commands take it.
@@ -47,8 +50,8 @@ class ControllerKind:
         make: Makes it of (control, robot, batch).
         reads: Parameters of the control that it reads; others are refused. All read the rate, the
             conditioning, the rule's threshold and hysteresis, and the gait but for `turn_offset`.
-        colour: Colour in figures, #RRGGBB; empty takes one that no other has.
-        line: Line in figures, as matplotlib takes it: a second mark, for print in grey.
+        colour: Colour in figures, #RRGGBB; where it is empty, one that no other controller has.
+        line: Line in figures, as matplotlib takes it, to tell controllers apart in grey print.
         needs: Knowledge that it cannot do without, and only a simulation has.
         climbs: Whether it raises links and antennae of the robot.
 

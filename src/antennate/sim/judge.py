@@ -1,4 +1,11 @@
-"""How an episode ends: at the exit, outside, on its back, in a fall, or out of time."""
+"""How an episode ends: at the exit, outside, on its back, in a fall, or out of time.
+
+An episode is one robot in one drawn scene with one controller, from a seed and a number, until its
+judge says how it ended. In `tunnel`, `climb` and `compete` it is a trial, a row of the table; other
+experiments have trials of another kind, as a push or a passage. Who lets time pass asks the judge,
+and stops: `experiments/tunnel/batch.py` for many trials at once, `studies/simulate.py`,
+`envs/episodes.py`, `experiments/climb/physics.py`, and the twin.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +23,13 @@ from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.types import Floats
 
 Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
-"""How a trial ends."""
+"""How a trial ends. The judge says all but `invalid`, which says nothing of the controller's walk:
+the physics or the controller failed, or the worker process died."""
 LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 FALL = 0.175
-"""How far a link has fallen that is lower than the ground at the start [m] (assumed: half the depth
-of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
+"""How far below the ground at the start a link has to be to have fallen [m] (assumed: half the
+depth of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
 
 
 class Walker(Protocol):
@@ -45,10 +53,9 @@ class Walker(Protocol):
 class Judge:
     """Judge of one episode: says how it ends, from one look at the robot to the next.
 
-    The head succeeds when it crosses the exit between its ends, outwards and from inside: who went
-    round and came in there has to go out twice. A scene with a rule of its own, `succeeded(head)`,
-    is asked instead. A robot on its back ends the episode where the ground is not flat, and so does
-    one that fell.
+    The head succeeds when it has crossed the exit between its ends more often outwards than
+    inwards. A scene with a rule of its own, `succeeded(head)`, is asked instead. In a scene that
+    has `ground`, which is not flat, a robot on its back ends the episode, and so does a fall.
 
     Args:
         scene: The scene of the episode.
@@ -118,9 +125,10 @@ def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
 
 
 def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
-    """How a trial ends at time t [s], of which a look says this; None if it goes on.
+    """How a trial ends at time t [s], where a look at it says `outcome`; None if it goes on.
 
-    At its limit [s] it ends as `late`, and so does what is seen after it; a table has whole µs.
+    An outcome counts up to the limit [s], times rounded to µs as tables have them; after it, and
+    at the limit without an outcome, the trial ends as `late`.
     """
     if outcome is not None:
         return outcome if round(t, 6) <= limit else late
@@ -128,7 +136,7 @@ def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
 
 
 def require_times(time: float, limit: float, close: float = 0.0) -> None:
-    """Check that a row can have this time and this time limit [s], but for an error of `close` [s].
+    """Check that a time and a time limit [s] can stand in a row; `close` is allowed beyond it [s].
 
     Raises:
         ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.

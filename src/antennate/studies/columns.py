@@ -135,13 +135,24 @@ def column(
     return field(default=default, metadata={_KEY: said})
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(column, field))
+def percent(
+    label: str, unit: str = "%", pool: Pool | None = None, *, form: str = ".0f", **more: Any
+) -> Any:
+    """Such a field that is a share, written in percent; the unit says of what."""
+    return column(label, unit, pool, form=form, scale=100.0, **more)
+
+
+@dataclass_transform(
+    kw_only_default=True, frozen_default=True, field_specifiers=(column, percent, field)
+)
 def tabular(kind: type[Kind]) -> type[Kind]:
     """A frozen dataclass, given by names, whose fields may be columns: of rows and of results."""
     return dataclass(frozen=True, kw_only=True)(kind)
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(column, field))
+@dataclass_transform(
+    kw_only_default=True, frozen_default=True, field_specifiers=(column, percent, field)
+)
 def tabular_row(kind: type[Kind]) -> type[Kind]:
     """Such a class for a row of trials.csv: its own fields stand before those that it shares."""
     made: Any = tabular(kind)

@@ -1,7 +1,17 @@
 """What an experiment is: a configuration, a function that runs it, and how to tell what came out.
 
-An experiment is one object. `antennate NAME` parses its configuration, runs it, keeps its rows and
-its result in a run directory, prints its tables and its closing sentence, and draws its figures.
+An experiment is one object. `antennate NAME` parses its configuration and runs it. A run leaves a
+folder (`studies/run_directory.py`): the configuration, a row for each trial, the result, figures
+and a report. Then its tables and its closing sentence are printed.
+
+A *trial* has a condition, such as a controller or a profile, and a number; its row is an object of
+a class whose fields are the columns of trials.csv. The result is an object, too: result.json and
+the printed tables have its fields. So a column is a field of one of these classes, or of the class
+that both inherit (`studies/columns.py`). A trial whose worker process dies is run again twice, then
+its row is that of an invalid trial (`studies/trials.py`, `studies/work.py`).
+
+Ours are folders of `experiments/` with an object EXPERIMENT in their module `experiment`; one of
+your own is named by an entry point (docs/experiments.md).
 """
 
 from __future__ import annotations
@@ -11,36 +21,19 @@ import importlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from antennate.params.base import Params
 from antennate.studies.columns import Frame, frame, typed
-from antennate.studies.pool import Workers, chunk_of, gather
+from antennate.studies.pool import Workers
 from antennate.studies.report import View
 from antennate.studies.tables import Table
-from antennate.studies.work import Fail, Failure, no_failure
-from antennate.telemetry.view import Restart
+from antennate.studies.trials import Config, OnRow, OnStep, Trial, Trials, no_row, no_step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from antennate.telemetry.film import Film
-    from antennate.telemetry.view.simulation import SimulationView
-
-OnStep = Callable[[int, int], None]
-"""Takes how many of how many parts are done."""
-OnRow = Callable[[Any], None]
-"""Takes a finished row, a dataclass; rows come in no particular order."""
-
-
-def no_step(done: int, total: int) -> None:
-    """Show nothing."""
-
-
-def no_row(row: Any) -> None:
-    """Keep nothing."""
 
 
 class Outcome(Protocol):
@@ -68,181 +61,7 @@ class Done:
         return self.found
 
 
-Config = TypeVar("Config", bound=Params)
-Trial = tuple[str, int]
-"""A condition, such as a controller or a profile, and the number of a trial."""
-OnTrial = Callable[[Any], None]
-"""Takes what a trial came to: its row and what figures draw of it, None for nothing."""
 Out = TypeVar("Out", bound=Outcome)
-
-
-@dataclass(frozen=True)
-class Trials(Generic[Config]):
-    """Trials of an experiment, written once for workers, lockstep, GPU, logs, view and studies.
-
-    Any process can run any of them, in any order. What a trial comes to is a pair: its row, which
-    depends on the configuration and the trial alone, and what figures draw of it.
-
-    Attributes:
-        condition: Column of a row that tells its condition.
-        every: every(config): all of them, in the order of the table.
-        carry_out: carry_out(config, condition, numbers, emit, **how): runs some of one condition,
-            and emits each as it ends; at the top of a module, or `OneByOne`. `how` may hold `logs`,
-            a folder, and what `watched` gives.
-        row: Class of the rows, a dataclass with the fields `condition` and `trial`.
-        invalid: invalid(config, condition, number, reason): row of a trial whose worker died.
-        most: How many may be run in lockstep.
-        batch: The same as `carry_out` in batches on a GPU, with the name of a `device` of Warp or
-            None in place of `how`; None if nothing does.
-        check_batch: Raises if a configuration, given with the folder for logs, has no such batches.
-        watched: watched(view): what `carry_out` is given to show its trials on a page.
-        interruptible: Whether an interrupted run ends with the trials that it has.
-    """
-
-    condition: str
-    every: Callable[[Config], Sequence[Trial]]
-    carry_out: Callable[..., None]
-    row: type
-    invalid: Callable[[Config, str, int, str], Any]
-    most: int = 1
-    batch: Callable[..., None] | None = None
-    check_batch: Callable[[Config, Path | None], None] = lambda config, logs: None
-    watched: Callable[[SimulationView], Mapping[str, Any]] = lambda view: {}
-    interruptible: bool = False
-
-    def run(
-        self, config: Config, trials: Sequence[Trial], emit: Callable[[int, Any], None]
-    ) -> None:
-        """Run some trials in this process; emit the index and the row of each as it ends."""
-        tasks = [(config, *trial, None) for trial in trials]
-        _Lockstep(self)(tasks, lambda i, result: emit(i, result[0]))
-
-    def run_on_device(
-        self,
-        config: Config,
-        trials: Sequence[Trial],
-        emit: Callable[[int, Any], None],
-        device: str | None,
-    ) -> None:
-        """The same in batches on a GPU or another device of Warp.
-
-        Raises:
-            ConfigError: This configuration has no such batches.
-        """
-        tasks = [(config, *trial, None) for trial in trials]
-        self._batched(tasks, lambda i, result: emit(i, result[0]), no_failure, device)
-
-    def gather(
-        self,
-        config: Config,
-        workers: int | Workers,
-        on_step: OnStep,
-        on_row: OnRow,
-        logs: Path | None = None,
-        view: SimulationView | None = None,
-    ) -> tuple[list[tuple[Any, Any]], bool]:
-        """All trials by condition and number, and whether some are missing.
-
-        With a view they run in this process, one after the other, and give the same.
-
-        Raises:
-            LogError: A log cannot be written.
-            WorkerError: A worker process failed.
-        """
-        trials, ended = self.every(config), list[tuple[Any, Any]]()
-
-        def take(item: tuple[Any, Any]) -> None:
-            ended.append(item)
-            on_row(item[0])
-
-        def lost(place: int, failure: Failure) -> tuple[Any, None]:
-            if failure.status == "failed":
-                raise failure.raised()
-            return self.invalid(config, *trials[place], failure.reason), None
-
-        interrupted = False
-        try:
-            if view is None:
-                gather(
-                    _Lockstep(self),
-                    [(config, *trial, logs) for trial in trials],
-                    *(workers, on_step, take),
-                    chunk=chunk_of(len(trials), workers, self.most),
-                    together=True,
-                    batched=self._batched if self.batch else None,
-                    lost=lost,
-                    group=lambda config, condition, *rest: condition,
-                )
-            else:
-                for done, trial in enumerate(trials, start=1):
-                    self._show(config, *trial, take, logs, view)
-                    on_step(done, len(trials))
-        except KeyboardInterrupt:
-            if not self.interruptible:
-                raise
-            interrupted = True
-        order = {name: i for i, name in enumerate(dict.fromkeys(name for name, _ in trials))}
-        ended.sort(key=lambda item: (order[getattr(item[0], self.condition)], item[0].trial))
-        return ended, interrupted
-
-    def _show(
-        self,
-        config: Config,
-        condition: str,
-        number: int,
-        emit: OnTrial,
-        logs: Path | None,
-        view: SimulationView,
-    ) -> None:
-        """One trial on a page; begun anew with another seed whenever a person wants that."""
-        how = {**({"logs": logs} if logs else {}), **self.watched(view)}
-        while True:
-            view.begin(f"{condition}, trial {number}", getattr(config, "seed", 0))
-            try:
-                return self.carry_out(config, condition, [number], emit, **how)
-            except Restart as wish:
-                config = config.model_copy(update={"seed": wish.seed})
-
-    def _batched(
-        self,
-        tasks: Sequence[_Task],
-        emit: Callable[[int, Any], None],
-        fail: Fail,
-        device: str | None,
-    ) -> None:
-        """Tasks on a GPU; what fails is an invalid row, and nothing is told to `fail`."""
-        self.check_batch(tasks[0][0], tasks[0][3])
-        assert self.batch is not None  # noqa: S101  whoever calls this has looked
-        _in_lockstep(partial(self.batch, device=device), tasks, emit)
-
-
-_Task = tuple[Any, str, int, Path | None]
-"""Configuration, condition, number of the trial, folder for its log."""
-
-
-class _Lockstep:
-    """Runs tasks in a worker, those of one condition in lockstep."""
-
-    def __init__(self, trials: Trials[Any]) -> None:
-        self._carry_out = trials.carry_out
-        self.__module__ = trials.row.__module__  # by which `gather` knows whom to trust
-
-    def __call__(self, tasks: Sequence[_Task], emit: Callable[[int, Any], None]) -> None:
-        logs = tasks[0][3]
-        _in_lockstep(partial(self._carry_out, **({"logs": logs} if logs else {})), tasks, emit)
-
-
-def _in_lockstep(
-    carry_out: Callable[..., None], tasks: Sequence[_Task], emit: Callable[[int, Any], None]
-) -> None:
-    places = {(name, number): i for i, (_, name, number, _) in enumerate(tasks)}
-    for name in dict.fromkeys(name for name, _ in places):
-        numbers = [number for condition, number in places if condition == name]
-
-        def take(item: tuple[Any, Any], name: str = name) -> None:
-            emit(places[name, item[0].trial], item)
-
-        carry_out(tasks[0][0], name, numbers, take)
 
 
 Result = TypeVar("Result")
@@ -259,7 +78,8 @@ class Found(Generic[Config, Result, Drawn]):
         drawn: What figures draw of a trial, by its condition and its number.
         interrupted: Whether trials are missing.
         row: Class of the rows.
-        summarise: summarise(config, rows) -> result.
+        summarise: summarise(config, rows) -> result, an object that has `interrupted` if a run of
+            these trials may end early (`Trials.interruptible`).
     """
 
     config: Config
@@ -275,27 +95,9 @@ class Found(Generic[Config, Result, Drawn]):
         return frame(self.rows, self.row)
 
     def result(self) -> Result:
-        """What they come to, with `interrupted` where the result has it."""
+        """What they come to; `interrupted` is true in it if trials are missing."""
         found: Any = self.summarise(self.config, self.frame)
         return replace(found, interrupted=True) if self.interrupted else found
-
-
-@dataclass(frozen=True)
-class OneByOne:
-    """Runs trials one after the other: `Trials.carry_out` where nothing goes in lockstep.
-
-    Attributes:
-        trial: trial(config, condition, number, **how) -> what it comes to; at the top of a module.
-    """
-
-    trial: Callable[..., tuple[Any, Any]]
-
-    def __call__(
-        self, config: Any, condition: str, numbers: Sequence[int], emit: OnTrial, **how: Any
-    ) -> None:
-        """Run the trials of these numbers, and emit each."""
-        for number in numbers:
-            emit(self.trial(config, condition, number, **how))
 
 
 @dataclass(frozen=True)
@@ -307,38 +109,40 @@ class Experiment(Generic[Config, Out]):
         description: What `--help` says; its first sentence is the summary in the list of commands.
         config: Its configuration.
         run: run(config, workers, on_step, on_row) -> outcome, which does not depend on the number
-            of worker processes. Where there are `logs` it also takes `logs`, a folder for them, and
-            where it can be `shown` a `view`: then all runs in this process.
+            of worker processes. An experiment with `logs` is also given a folder `logs`, one that
+            can be `shown` a page `view`, with which all runs in this process.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
         result: Class of its results, a dataclass; without one they are dictionaries.
-        row: Class of its rows, a dataclass.
+        row: Class of its rows, a dataclass; those of `trials` have `trial` and the condition.
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
-        names: names(config) -> the names of those files, so that one that is somebody else's is
-            refused before the run.
-        settled: settled(config, folder) -> the configuration with what chance decides before a run,
-            as of the run that goes on in a folder; None where none does.
+        names: names(config) -> the names of those files: where the folder holds such a file that
+            no run made, it is refused before the run.
+        settled: settled(config, folder) -> the configuration with its seed drawn, if it asks for a
+            drawn one; `folder` holds the run that goes on and has drawn it, None for a new run.
         check: Raises if a configuration cannot be run; called before anything is written.
-        failed: Whether a result says nothing, so that the command ends with exit code 2.
+        failed: Whether a result says nothing, as all trials are invalid; exit code 2.
         parts: What `on_step` counts.
         logs: Names of the logs of a configuration; None if there are no controllers to log.
         shown: Whether its trials can be shown on a page.
-        films: films(config, trial) -> for each condition, by name, what runs this trial of it once
-            more and records it; None where nothing can be filmed.
+        films: films(config, trial) -> by condition a function that runs this trial once more and
+            records it; None where nothing can be filmed.
         body: body(result, images) -> HTML that stands in its report in place of tables and figures.
-        trials: Its trials one by one, for studies; without them a study runs it as a whole.
-        continued: Whether its folder is continued without being asked, and keeps its trials.
+        trials: Its trials one by one, for studies (`antennate study`, which varies parameters);
+            without them a study runs it as a whole.
+        continued: Whether a run goes on with its folder without --resume, and keeps its trials.
         explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
-        anywhere: Whether workers may be elsewhere than in processes of this machine.
+        anywhere: Whether workers may be on other machines.
         foretold: foretold(config, workers) -> one line on how long it will take, said before the
             first trial; empty for nothing.
-        tasks: tasks(config): what each task of `run` is, by its place, whatever the number of
-            trials; None if it is the list of `trials`, or if a run does not go on with more.
-        in_shards: Whether its trials are known from the start, so that shards can divide them.
-        undivided: Why they cannot divide those of a configuration; empty where they can.
+        tasks: tasks(config) -> a name for each task of `run`, the same with more trials, so that a
+            run can go on with more; None if the list of `trials` is that, or no run goes on.
+        in_shards: Whether its trials are known from the start, so that several machines can each
+            run a share of them, a shard.
+        undivided: undivided(config) -> why shards cannot divide its trials; empty if they can.
     """
 
     name: str
@@ -393,7 +197,7 @@ class Experiment(Generic[Config, Out]):
 
     @property
     def grows(self) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
-        """Tasks of a configuration as JSON has it; None if a run does not go on with more."""
+        """`tasks` of a configuration read from JSON; None if no run goes on with more trials."""
         tasks = self.tasks or (self.trials.every if self.trials else None)
         if tasks is None:
             return None
@@ -411,9 +215,8 @@ class Experiment(Generic[Config, Out]):
     ) -> Experiment[Config, Out]:
         """An experiment with a folder of its own: a package that has its name and describes it.
 
-        `module` is the `__name__` of a module in the folder. Without `figures` they are those that
-        `figures(outcome)` of the module `figure` beside it returns, which is imported when they are
-        drawn.
+        `module` is the `__name__` of a module in the folder. If `figures` is not given, it is the
+        function `figures(outcome)` of the module `figure` beside it, imported when it is needed.
         """
         folder = module.rpartition(".")[0]
         if "figures" not in more:
@@ -438,7 +241,10 @@ class Experiment(Generic[Config, Out]):
         sentence: Callable[[Any], str],
         **more: Any,
     ) -> Experiment[Config, Any]:
-        """An experiment of a folder that is its trials: they are run, then summarised."""
+        """An experiment with a folder whose run is its trials, which `summarise` makes a result of.
+
+        Arguments are those of `of_folder` and of `Found`.
+        """
 
         def run(
             config: Config,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from antennate.jackknife import ENOUGH, student95
-from antennate.studies.columns import Ends, Frame, column, tabular
+from antennate.studies.columns import Ends, Frame, column, count, percent, share, tabular
 from antennate.types import Bools, Floats, Ints
 
 _Z95 = 1.959963984540054
@@ -37,16 +37,31 @@ def wilson95(successes: float, trials: float) -> tuple[float, float]:
     return low, 1.0 if successes == trials else center + half
 
 
-"""Lower and upper end of an interval."""
-
-
 def wilson(name: str = "outcome", value: Any = "success") -> Any:
     """A column: Wilson's 95 % interval of the share of rows that hold a value in a column."""
 
     def ends(rows: Frame, _: str) -> Ends | None:
         return wilson95(int((rows[name] == value).sum()), len(rows)) if len(rows) else None
 
-    return column("  Wilson 95 %", "%", ends, form=".0f", scale=100.0)
+    return percent("  Wilson 95 %", pool=ends)
+
+
+@tabular
+class Outcomes:
+    """How trials ended."""
+
+    trials: int = column("trials", form="d")
+    successes: int = column("successes", pool=count("outcome", "success"), form="d")
+    success_share: float | None = percent("  share", pool=share("outcome", "success"))
+    """Successes over valid trials; `null` without any."""
+    wilson95: Ends | None = wilson()
+    """Wilson's interval of that share; `null` without any."""
+    timeouts: int = column("out of time", pool=count("outcome", "timeout"), form="d")
+    """Trials that ran out of time."""
+    left: int = column("left the scene", pool=count("outcome", "left"), form="d")
+    """Trials in which the robot left the scene by another way than its end."""
+    invalid: int = column("invalid", form="d")
+    first_reason: str | None
 
 
 def mean95(
@@ -173,11 +188,17 @@ def _mean(values: Floats, without: float) -> float:
 
 
 @tabular
-class Discordance:
-    """Two conditions on the same trials, by success alone."""
+class Both:
+    """How many trials two conditions have in common."""
 
     trials: int = column("valid in both", form="d")
     """Trials that are valid in both."""
+
+
+@tabular
+class Discordance:
+    """Two conditions on the same trials, by success alone."""
+
     only_first: int = column("only the first", form="d")
     """Trials on which only the first succeeded."""
     only_second: int = column("only the second", form="d")
@@ -186,7 +207,12 @@ class Discordance:
     """McNemar's test on those, exact and two-sided."""
 
 
-def mcnemar(ok: Bools) -> Discordance:
+@tabular
+class Matched(Discordance, Both):
+    """Two conditions on the same trials, by success, and how many those are."""
+
+
+def mcnemar(ok: Bools) -> Matched:
     """Compare the successes of two conditions trial by trial, shape (n, 2)."""
     from scipy.special import bdtr  # scipy.stats takes half a second longer
 
@@ -194,7 +220,7 @@ def mcnemar(ok: Bools) -> Discordance:
     only_first, only_second = int((first & ~second).sum()), int((second & ~first).sum())
     tail = float(bdtr(min(only_first, only_second), only_first + only_second, 0.5))
     p = min(1.0, 2.0 * tail)
-    return Discordance(trials=len(ok), only_first=only_first, only_second=only_second, mcnemar_p=p)
+    return Matched(trials=len(ok), only_first=only_first, only_second=only_second, mcnemar_p=p)
 
 
 def sign_flips(sums: Ints) -> float:
@@ -294,7 +320,7 @@ def signed_rank(difference: Floats) -> float:
 
 
 @tabular
-class PairedTest(Discordance):
+class PairedTest(Matched):
     """Two conditions on the same seeds, by success and by time."""
 
     both: int = column("both succeeded", form="d")
@@ -307,7 +333,7 @@ class PairedTest(Discordance):
     """Mean of restricted time, first minus second, and its interval, see `difference95`."""
     time_difference_95: Ends | None = None
     wilcoxon_p: float | None = column("Wilcoxon p", form=".3g")
-    """Two-sided signed-rank test on restricted times, see `signed_rank`; `null` of one trial."""
+    """Two-sided signed-rank test on restricted times, see `signed_rank`; `null` with one trial."""
 
 
 def compare(

@@ -28,7 +28,7 @@ from antennate.antenna.curves import (
 from antennate.antenna.fitting import FEWEST_PUSHES
 from antennate.antenna.sensor import FULL_SCALE
 from antennate.jackknife import student95
-from antennate.studies.columns import Ends, column, tabular
+from antennate.studies.columns import Ends, column, percent, tabular
 from antennate.types import Bools, Floats, Ints
 
 _STEADY = 0.01
@@ -43,9 +43,7 @@ _END = 0.2
 class Relaxation:
     """How readings move while the bend is held, over the span of readings."""
 
-    mean: float = column(
-        "relaxation in a hold", "% of the span", form="+.1f", scale=100.0, interval="mean_95"
-    )
+    mean: float = percent("relaxation in a hold", "% of the span", form="+.1f", interval="mean_95")
     """Mean change in a hold: above 0 readings go on as before the hold, below 0 they go back; the
     interval is over holds, `null` with fewer than two."""
     mean_95: Ends | None
@@ -166,13 +164,11 @@ def _monotonic(level: Floats, turn: float) -> Iterator[tuple[int, int, int]]:
 class Hysteresis:
     """How far readings lie apart at the same bend: loading minus unloading, over their span."""
 
-    mean: float = column(
-        "hysteresis, mean gap", "% of the span", form="+.1f", scale=100.0, interval="mean_95"
-    )
+    mean: float = percent("hysteresis, mean gap", "% of the span", form="+.1f", interval="mean_95")
     """Mean gap over all bends that both directions reach; the interval is over pushes, `null` with
     fewer than two."""
     mean_95: Ends | None
-    largest: float = column("  largest gap", "% of the span", form="+.1f", scale=100.0)
+    largest: float = percent("  largest gap", "% of the span", form="+.1f")
     """Largest gap of mean readings."""
     at_bend: float = column("  at a bend of")
     """Bend at which the gap is largest."""

@@ -72,7 +72,6 @@ class Wrap:
     """A clock that began at 0 again."""
 
     row: int
-    """Row of the file."""
     clock: str
     """Kind of the clock."""
 
@@ -94,7 +93,7 @@ class Handled:
     wraps: tuple[Wrap, ...]
     """Rows at which the clock began at 0 again and was unwrapped."""
     conversion: Conversion | None
-    """Way of the readings to counts; `null` if they are counts."""
+    """How readings became counts; `null` if they are counts."""
     units: tuple[str, ...] = ()
     """Units taken as declared, against the name of their column, in a sentence each."""
 

@@ -20,7 +20,7 @@ class Sigmoid:
     than three pushes, or where all are alike. Where there is a `misfit`, it is of noise alone."""
     slope_95: Ends | None
     midpoint: float = column("midpoint", form=".4f", interval="midpoint_95")
-    """x at which b is 0.5; its interval is as that of the slope."""
+    """x at which b is 0.5; its interval is like that of the slope."""
     midpoint_95: Ends | None
 
 
@@ -45,9 +45,7 @@ class Curve(Sigmoid):
     polarity: int = column("polarity", form="+d")
     """1 if readings rise with the flex, -1 if they fall."""
     counts_low: float = column("reading at x = 0", "counts", form=".0f")
-    """Reading that x = 0 stands for [counts]."""
     counts_high: float = column("reading at x = 1", "counts", form=".0f")
-    """Reading that x = 1 stands for [counts]."""
     threshold: float = column("theta")
     """θ, the level from which on there is contact."""
     r2: float = column("R²", form=".3f")
@@ -104,7 +102,6 @@ class CalibrateResult:
     schema: int = 1
     command: str = "calibrate"
     seed: int
-    """Seed of the run."""
     source: Literal["rig", "recording"]
     """`rig` or `recording`."""
     poor: bool

@@ -38,8 +38,9 @@ from antennate.params.bench import BenchVariationParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Watch
-from antennate.studies.experiment import OnStep, Outcome, no_step
+from antennate.studies.experiment import Outcome
 from antennate.studies.pool import Workers, gather
+from antennate.studies.trials import OnStep, no_step
 from antennate.types import Floats
 
 _BETTER = 0.2

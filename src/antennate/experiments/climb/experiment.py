@@ -13,7 +13,8 @@ from antennate.experiments.climb.result import ClimbResult
 from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.tables import sentence, tables
 from antennate.experiments.tunnel.batch import BATCH, watched
-from antennate.studies.experiment import Experiment, Trial, Trials
+from antennate.studies.experiment import Experiment
+from antennate.studies.trials import Trial, Trials
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film

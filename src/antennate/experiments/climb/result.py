@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from antennate.experiments.climb.rows import Effort, Probe
-from antennate.studies.columns import Ends, Frame, column, count, mean, share, tabular
-from antennate.studies.statistics import wilson
+from antennate.studies.columns import Ends, Frame, column, count, mean, percent, tabular
+from antennate.studies.statistics import Outcomes
 
 REFERENCE = "level"
 """Whose speed on the flat floor the others are compared with."""
@@ -16,29 +16,11 @@ def _of_successes(rows: Frame, name: str) -> float | None:
 
 
 @tabular
-class Ended:
-    """How trials ended."""
+class Ended(Outcomes):
+    """How the trials of a condition ended."""
 
-    trials: int = column("trials", form="d")
-    """Trials run."""
-    successes: int = column("successes", pool=count("outcome", "success"), form="d")
-    """Trials that succeeded."""
-    success_share: float | None = column(
-        "  share", "%", share("outcome", "success"), form=".0f", scale=100.0
-    )
-    """Successes over valid trials; `null` without any."""
-    wilson95: Ends | None = wilson()
-    """Wilson's interval of that share; `null` without any."""
-    timeouts: int = column("out of time", pool=count("outcome", "timeout"), form="d")
-    """Trials that ran out of time."""
     overturned: int = column("overturned", pool=count("outcome", "overturned"), form="d")
     """Trials in which the robot overturned."""
-    left: int = column("left the scene", pool=count("outcome", "left"), form="d")
-    """Trials in which the robot left the ground, to a side or behind the start."""
-    invalid: int = column("invalid", form="d")
-    """Invalid trials; they are left out of all else."""
-    first_reason: str | None
-    """Why the first invalid one is invalid; `null` without any."""
     success_time_s: float | None = column("time of a success", "s", _of_successes, form=".1f")
     """Time to the end, mean over successes."""
     success_speed_m_s: float | None = column(
@@ -91,7 +73,7 @@ class PlanError:
     """Error of the plan, median."""
     high_cm: float | None = column("95 %", "cm", form="+.1f", default=None)
     """Error of the plan, 95th percentile."""
-    within: float | None = column("within -6 to +4 cm", "%", form=".0f", scale=100.0, default=None)
+    within: float | None = percent("within -6 to +4 cm", default=None)
     """Share of the crossings within the aim of -6 to +4 cm."""
 
 
@@ -148,7 +130,6 @@ class Crossing:
     """Other grounds, with one gain divisor."""
 
     divisor: float
-    """Gain divisor of the servos of the body."""
     grounds: dict[str, list[OnGround]]
     """Each condition, ground by ground, of those that are to be crossed."""
     pairs: dict[str, dict[str, Pair]]
@@ -176,16 +157,15 @@ class FalseClimbs:
     """Climbs begun where there is no step, over all valid trials."""
 
     false_climbs: int = column("false climbs", form="d")
-    """Climbs begun."""
     time_s: float
     """Time of all trials."""
     way_m: float
-    """Way of the middle of the robot in all trials."""
+    """Distance that the middle of the robot walked in all trials."""
     per_1000_s: float | None = column("  per 1000 s", interval="per_1000_s_95")
     """Climbs begun in 1000 s, with Garwood's exact interval of a Poisson count."""
     per_1000_s_95: Ends | None
     per_m: float | None = column("  per metre", "1/m", form=".3f", interval="per_m_95")
-    """Climbs begun in a metre of way, with its interval."""
+    """Climbs begun in a metre walked, with its interval."""
     per_m_95: Ends | None
 
 
@@ -206,11 +186,8 @@ class Sensing:
     """What `climb` feels, with one gain divisor."""
 
     divisor: float
-    """Gain divisor of the servos of the body."""
     invalid: int
-    """Invalid trials; they are left out of all else."""
     first_reason: str | None
-    """Why the first invalid one is invalid; `null` without any."""
     confusion: dict[str, dict[str, int]]
     """Valid trials of each ground by what it is taken for: `FLOOR`, `STEP_UP` and so on."""
     felt: dict[str, Probe]
@@ -230,13 +207,11 @@ class ClimbResult:
     schema: int = 1
     command: str = "climb"
     seed: int
-    """Seed of the run."""
     time_limit_s: float
     """Time after which a trial on one step has failed."""
     heights_m: list[float]
     """Heights of the steps."""
     interrupted: bool = False
-    """Whether trials are missing, because the run was stopped."""
     climbing: list[Climbing]
     """Steps: an entry for each gain divisor."""
     grounds: list[Crossing]

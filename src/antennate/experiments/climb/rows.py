@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.studies.columns import column, mean, tabular
+from antennate.studies.columns import column, mean, percent, tabular
 
 
 @tabular
@@ -11,11 +11,10 @@ class Place:
 
     seed: int
     """Seed of the trials on this ground: on a step, that of the run plus ten thousand times the
-    height in metres. With `trial` it decides all chance."""
+    height in metres."""
     cell: str
     """Name of the cell: part, condition, ground and gain divisor."""
     trial: int
-    """Number of the trial."""
     part: str
     """`climbing`, `ground` or `sensing`."""
     condition: str
@@ -25,7 +24,6 @@ class Place:
     height_m: float | None
     """Height of the edge; empty without one."""
     divisor: float
-    """Gain divisor of the servos of the body."""
 
 
 @tabular
@@ -33,7 +31,6 @@ class Effort:
     """Climbs begun, and the load of the pitch motors; of many the mean over the valid ones."""
 
     climbs: float | None = column("climbs begun, mean", pool=mean, least=0.0, default=0)
-    """Climbs begun."""
     torque_rms_n_m: float | None = column(
         "RMS torque of the worst pitch joint", "N·m", mean, least=0.0, default=None
     )
@@ -42,18 +39,12 @@ class Effort:
         "largest torque, mean", "N·m", mean, least=0.0, default=None
     )
     """Largest torque of any pitch motor."""
-    above_half: float | None = column(
-        "over half the stall torque",
-        "% of climb",
-        mean,
-        form=".1f",
-        scale=100.0,
-        least=0.0,
-        default=None,
+    above_half: float | None = percent(
+        "over half the stall torque", "% of climb", mean, form=".1f", least=0.0, default=None
     )
     """Share of the climb in which a pitch motor gives more than half its stall torque."""
-    saturated: float | None = column(
-        "drive at its limit", "% of climb", mean, form=".1f", scale=100.0, least=0.0, default=None
+    saturated: float | None = percent(
+        "drive at its limit", "% of climb", mean, form=".1f", least=0.0, default=None
     )
     """Share of the climb in which the drive of a pitch motor is at its limit."""
     current_rms_a: float | None = column(
@@ -73,7 +64,7 @@ class Probe:
     ahead_m: float | None = column("ahead", "cm", mean, form=".1f", scale=100.0, default=None)
     """Distance of the edge from the middle of the head when it is felt."""
     latency_s: float | None = column("latency", "s", mean, default=None)
-    """Time until it is felt from the first touch, or from when an antenna is past a drop."""
+    """Time until it is felt, from the first touch or from when an antenna is past a drop."""
 
 
 @tabular
@@ -90,12 +81,11 @@ class ClimbRow(Probe, Effort, Place):
     speed_m_s: float | None = None
     """Speed of the middle of the robot in that time; on the flat floor over all its way."""
     walked_m: float = 0.0
-    """Way of the middle of the robot."""
+    """Distance that the middle of the robot walked."""
     verdict: str | None = None
-    """What `climb` takes the first thing for that it feels: `FLOOR` (it feels nothing), `STEP_UP`,
+    """What `climb` takes the first thing that it feels for: `FLOOR` (it feels nothing), `STEP_UP`,
     `DROP`, `WALL` or `UNKNOWN`; empty for others."""
     plan_error_m: str = ""
     """Place of the head by the plan less the true one when the centre of a link crosses the first
     edge, as `0:-0.012 1:0.004`: links from the head; those without a plan are left out."""
     reason: str = ""
-    """Why a trial is invalid."""

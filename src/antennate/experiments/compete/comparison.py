@@ -26,11 +26,9 @@ class Differing:
     """A row that differs: as the table says, and as it was run here."""
 
     controller: str
-    """Name of the controller."""
     scene: str
     """Scene, with its other parameters."""
     seed: int
-    """Seed of the run."""
     trial: int
     """Number of the draw."""
     outcome: Outcome

@@ -37,7 +37,6 @@ class Episode:
     """One episode, a row of trials.csv."""
 
     controller: str
-    """Name of the controller."""
     scene: str
     """Scene, with its other parameters if it has some, as `uturn+variation.broken=random`."""
     seed: int
@@ -55,7 +54,6 @@ class Episode:
     overturned: bool = False
     """Whether the robot lies on its back at the end."""
     void_decisions: int = 0
-    """Decisions of a learned policy whose answer was no number, so that the robot held."""
     given: str = ""
     """What the simulation gave to the controller, in words; empty for its readings alone."""
     drawn: bool = False
@@ -67,7 +65,6 @@ class Episode:
     processor: str = ""
     """Model of the processor."""
     reason: str = ""
-    """Why it is INVALID; empty otherwise."""
 
 
 @dataclass(frozen=True)

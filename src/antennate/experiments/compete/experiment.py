@@ -28,9 +28,10 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.judge import time_limit_of
 from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
-from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
 from antennate.studies.run_files import span
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.studies.work import Failure
 from antennate.types import AntennaFrame, Controller
 

@@ -3,14 +3,7 @@
 from __future__ import annotations
 
 from antennate.experiments.compete.comparison import Check
-from antennate.studies.columns import (
-    Ends,
-    column,
-    count,
-    share,
-    tabular,
-    total,
-)
+from antennate.studies.columns import Ends, column, count, percent, share, tabular, total
 from antennate.studies.statistics import wilson
 
 
@@ -21,8 +14,8 @@ class Ranked:
     given: str
     """What the simulation gave to it, in words; such a controller has no rank."""
     rank: int | None = column("rank", form=".0f", interval="rank_95")
-    """One more than how many others succeed more often by more than `tie`, and its interval, of
-    all ranks together."""
+    """One more than the number of others that succeed more often by more than `tie`; its interval
+    holds for all ranks at once."""
     rank_95: tuple[int, int] | None
 
 
@@ -31,21 +24,14 @@ class Cell:
     """A controller in one scene; without an episode there all but counts are `null`."""
 
     episodes: int = column("episodes", form="d")
-    """Episodes run."""
     successes: int = column("successes", pool=count("end", "success"), form="d")
     """Episodes that succeeded."""
-    success_share: float | None = column(
-        "  share", "%", share("end", "success"), form=".0f", scale=100.0
-    )
+    success_share: float | None = percent("  share", pool=share("end", "success"))
     """Successes over episodes."""
     wilson95: Ends | None = wilson("end")
     """Wilson's interval of that share; over several scenes, of the effective number of trials."""
-    restricted_mean_share: float | None = column(
-        "restricted mean time",
-        "% of limit",
-        form=".1f",
-        scale=100.0,
-        interval="restricted_mean_share_95",
+    restricted_mean_share: float | None = percent(
+        "restricted mean time", "% of limit", form=".1f", interval="restricted_mean_share_95"
     )
     """Mean time as a share of the limit of each episode, 1 for a failure, and its interval."""
     restricted_mean_share_95: Ends | None
@@ -73,9 +59,7 @@ class Controller(Cell, Ranked):
     invalid: int = column("INVALID", form="d")
     """Episodes that are INVALID; they are failures."""
     void_decisions: int = column(pool=total, default=0)
-    """Decisions of a learned policy whose answer was no number, so that the robot held."""
     first_reason: str | None
-    """Why the first INVALID episode is that; `null` if none is."""
 
 
 @tabular
@@ -87,7 +71,7 @@ class Pair:
     episodes: int
     """Episodes compared."""
     draws: int
-    """Draws that these are of."""
+    """Draws of these episodes."""
     only_first: int = column("only first", form="d")
     """Episodes in which only the first succeeded."""
     only_second: int = column("only second", form="d")
@@ -96,14 +80,13 @@ class Pair:
     """McNemar's test of successes, exact, by draws."""
     mcnemar_holm_p: float = column("McNemar p", form=".2g")
     """P of that test with Holm's correction over all pairs."""
-    share_difference: float = column(
-        "time apart", "% of limit", form="+.1f", scale=100.0, interval="share_difference_95"
+    share_difference: float = percent(
+        "time apart", "% of limit", form="+.1f", interval="share_difference_95"
     )
-    """Mean of a draw's restricted times as a share of the limit, first less second, and its
-    interval."""
+    """Mean over draws of the restricted time as a share of the limit, first less second."""
     share_difference_95: Ends | None
     wilcoxon_p: float | None
-    """Signed-rank test on those means; `null` of one draw."""
+    """Signed-rank test on the means of the draws; `null` with one draw."""
     wilcoxon_holm_p: float = column("Wilcoxon p", form=".2g")
     """P of that test with Holm's correction over all pairs."""
     both: int

@@ -38,7 +38,6 @@ class EpisodeRow(Kept):
     """One episode, a row of trials.csv."""
 
     seed: int
-    """Seed of the run."""
     trial: int
     """Number of the episode."""
     kind: str
@@ -52,7 +51,6 @@ class EpisodeRow(Kept):
     speed_factor: float | None
     """Speed over the usual one; empty if its worker died."""
     reason: str = ""
-    """Why the episode is invalid."""
 
 
 @dataclass(frozen=True, slots=True)

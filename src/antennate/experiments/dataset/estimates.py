@@ -60,7 +60,6 @@ class LengthErrors(Estimated):
     mae_m: float | None = column(
         "mean absolute error", "mm", scale=1e3, join="–", interval="mae_m_95"
     )
-    """Mean absolute error."""
     mae_m_95: Ends | None
     gain_m: float | None = column(interval="gain_m_95")
     """Mean absolute error of the mean of the training labels, less that of the baseline."""
@@ -77,7 +76,6 @@ class AngleErrors(Estimated):
     mae_rad: float | None = column(
         "mean absolute error", "deg", scale=math.degrees(1.0), join="–", interval="mae_rad_95"
     )
-    """Mean absolute error."""
     mae_rad_95: Ends | None
     gain_rad: float | None = column(interval="gain_rad_95")
     """Mean absolute error of the mean of the training labels, less that of the baseline."""
@@ -102,8 +100,7 @@ class TaskResult:
     chosen: dict[str, float]
     """Penalty of `polynomial` and number of `neighbours`, chosen by the validation split."""
     best: str | None
-    """Baseline of least error on the validation split, `mean` apart; `null` if nothing is
-    learned."""
+    """Baseline of least error in validation, `mean` apart; `null` if nothing is learned."""
     told: dict[str, bool | None]
     """Whether `best` errs less than `mean` on each split of test, by an interval that lies above 0
     as a whole; `null` without an interval."""

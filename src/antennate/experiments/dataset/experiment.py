@@ -44,21 +44,14 @@ from antennate.studies.columns import (
     pooled,
     tabular,
 )
-from antennate.studies.experiment import (
-    Done,
-    Experiment,
-    OneByOne,
-    OnRow,
-    OnStep,
-    Trials,
-    no_row,
-    no_step,
-)
+from antennate.studies.experiment import Done, Experiment
 from antennate.studies.parquet import require_parquet
 from antennate.studies.pool import Workers
 from antennate.studies.tables import Table
+from antennate.studies.trials import OneByOne, OnRow, OnStep, Trials, no_row, no_step
 
-_MAKE = {"walk": walk_windows, "gap": gap_windows, "push": push_windows}
+MAKE = {"walk": walk_windows, "gap": gap_windows, "push": push_windows}
+"""What makes the windows of an episode, by its kind."""
 PUBLISHED = {"base_to_tip": 7.75, "gap": 6.73}
 """Errors that CITRAS published [%], arXiv:2507.23719: a real antenna with hinge sensors."""
 
@@ -90,7 +83,6 @@ class DatasetResult:
     format: int
     """Version of columns, splits and definitions."""
     seed: int
-    """Seed of the run."""
     rate_hz: float
     """Samples a second."""
     history: int
@@ -128,7 +120,7 @@ def episode(config: DatasetConfig, kind: Kind, trial: int) -> tuple[EpisodeRow, 
         speed_factor=draw.factor,
     )
     try:
-        windows = _MAKE[kind](config, draw)
+        windows = MAKE[kind](config, draw)
     except SimulationError as error:
         return replace(row, status="invalid", reason=str(error)), None
     label = next(task.label for task in TASKS if task.kind == kind)

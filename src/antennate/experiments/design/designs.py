@@ -28,8 +28,8 @@ class Value:
     """What a design is worth in an objective."""
 
     value: float | None = column(interval="value95")
-    """Mean over the trials, or share of successes, and its interval; `null` if it is that of
-    successes and there are none. Fewer than five trials have no interval of a mean."""
+    """Mean over the trials, or share of successes; `null` for a mean over successes without any.
+    Its interval is `null` for a mean over fewer than five trials."""
     value95: Ends | None
     trials: int
     """Trials behind it."""
@@ -83,7 +83,6 @@ class DesignResult:
     schema: int = 1
     command: str = "design"
     interrupted: bool
-    """Whether trials are missing."""
     optuna: str
     """Version of Optuna, which proposed the designs."""
     objectives: list[Aim]
@@ -93,11 +92,10 @@ class DesignResult:
     proposed: int
     """Designs that were proposed, those that came again among them."""
     repeated: int
-    """Designs among these that came again, and were not run again."""
+    """Designs among these that came again and were not run again."""
     trials: int
     """Trials that have ended."""
     statuses: dict[str, int]
-    """Trials of each status."""
     designs: list[Design]
     """The references, then the proposals."""
 

@@ -24,9 +24,9 @@ from antennate.messages import nearest, shortened
 from antennate.params.base import Params, put_over
 from antennate.params.faults import group_of
 from antennate.studies.columns import content
-from antennate.studies.experiment import Trial, no_row, no_step
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
+from antennate.studies.trials import Trial, no_row, no_step
 
 FRESH = 1_000_000
 """Added to a seed, it gives one that no trial of a search has."""

@@ -29,9 +29,10 @@ from antennate.experiments.design.evaluate import (
 from antennate.experiments.design.propose import Drawn, Proposal, package, point_of, propose
 from antennate.experiments.study.run import REASON, STATUS, aligned, cells
 from antennate.experiments.study.subject import columns_in
-from antennate.studies.experiment import Done, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, chunk_of, gather, workers_from
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.studies.work import Failure
 
 SEARCH, VALIDATION = "search", "validation"

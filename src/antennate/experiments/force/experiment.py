@@ -41,9 +41,10 @@ from antennate.experiments.force.result import (
 )
 from antennate.sim.bench import Watch
 from antennate.studies.columns import shown
-from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.tables import Table
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.types import Floats, Ints
 
 SCALARS = ("flex", "reading", "level")

@@ -59,7 +59,7 @@ class Explained:
     rmse: Number
     """Root mean square error [N]."""
     groups: int
-    """Loads or traverses that these are of."""
+    """Loads or traverses behind these."""
 
 
 def explained(truth: Floats, prediction: Floats, groups: Ints) -> Explained:

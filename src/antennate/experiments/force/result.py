@@ -13,11 +13,9 @@ class TraverseRow:
     """A traverse, a row of trials.csv."""
 
     seed: int
-    """Seed of the run."""
     trial: int
     """Number of the traverse."""
     profile: str
-    """Springs of the antenna."""
     status: Literal["valid", "invalid"]
     """Whether the physics stayed valid; if not, all that is measured is 0."""
     overlap: float
@@ -33,7 +31,6 @@ class TraverseRow:
     place_last: float
     """Place of the last contact over the length of the antenna."""
     reason: str
-    """Why the traverse is invalid."""
 
 
 @tabular
@@ -137,7 +134,6 @@ class ForceResult:
     schema: int = 1
     command: str = "force"
     seed: int
-    """Seed of the run."""
     hinge_limit_deg: float
     """Largest angle of a hinge; loads that turn one farther take no part."""
     from_place: float
@@ -145,4 +141,3 @@ class ForceResult:
     friction: float
     """Friction of the contacts that have any."""
     profiles: dict[str, ProfileResult]
-    """Each profile."""

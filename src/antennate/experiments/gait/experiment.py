@@ -29,9 +29,10 @@ from antennate.experiments.gait.result import (
 )
 from antennate.params.control import GaitParams
 from antennate.sim.world import World
-from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.tables import Table
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Maneuver
 

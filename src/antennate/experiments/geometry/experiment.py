@@ -27,10 +27,11 @@ from antennate.experiments.geometry.torus import Torus
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.robots.mechanics import cycles, peaks, phase_law, wave_of
 from antennate.studies.columns import Frame, by, frame, shown
-from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.types import Floats
 
 SPEED_R, SPEED_RMSE, YAW_R, LEAD_DEG = 0.96, 0.02, 0.95, 15.0

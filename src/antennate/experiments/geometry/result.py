@@ -45,9 +45,9 @@ class Walked:
     model_torque_n_m: float = column("torque of a yaw servo, model", "N·m")
     """Largest torque of a yaw servo, by the model."""
     wanted_m_s: float | None = None
-    """Speed that the twist map was asked for; `null` of all gaits but turns."""
+    """Speed that the twist map was asked for; `null` for all gaits but turns."""
     wanted_per_m: float | None = None
-    """Curvature that the twist map was asked for; `null` of all gaits but turns."""
+    """Curvature that the twist map was asked for; `null` for all gaits but turns."""
 
 
 @tabular
@@ -114,7 +114,7 @@ class Agreement:
     cost_rank_r: Estimate
     """Correlation of ranks of `model_cost` and `cost_of_transport`."""
     rival_speed_m_s: float
-    """The one speed that the rival foretells: that of legs that roll on their longest radius, or
+    """The one speed that the rival predicts: that of legs that roll on their longest radius, or
     where legs lift the mean of these gaits."""
     rival_rmse_m_s: Estimate
     """Root mean square difference of speeds of the rival and the engine."""
@@ -129,7 +129,6 @@ class BestLead:
     """Lead that walks fastest at a wave number."""
 
     wave_number: float
-    """Waves along the body."""
     engine_deg: float = column("engine", "deg", form=".0f")
     """Best lead by the engine."""
     model_deg: float = column("model", "deg", form=".0f")
@@ -148,7 +147,7 @@ class BestLead:
     engine_speed_m_s: float
     """Speed at the best lead, by the engine."""
     reached: bool
-    """Whether model and engine agree as closely as was the aim."""
+    """Whether model and engine agree as closely as was aimed for."""
 
 
 @tabular
@@ -160,7 +159,7 @@ class Fastest:
     speed_over_default: float
     """Speed over that of the configured gait."""
     reached: bool
-    """Whether it is as much faster as was the aim."""
+    """Whether it is as much faster as was aimed for."""
 
 
 @tabular
@@ -190,7 +189,7 @@ class Turns:
     curvature_rmse_per_m: float
     """Root mean square difference of curvatures walked and wanted."""
     curvature_r: float | None
-    """Correlation of curvatures walked and wanted; `null` of one turn."""
+    """Correlation of curvatures walked and wanted; `null` with one turn."""
     wanted_per_m: list[float]
     """Curvatures wanted."""
     curvature_per_m: list[float]
@@ -208,7 +207,6 @@ class GeometryResult:
     schema: int = 1
     command: str = "geometry"
     frequency_hz: float
-    """Gait cycles per second."""
     body_length_m: float
     """Body length: `--body-length`, or the length of the robot without antennae."""
     measured_body_lengths_per_cycle: float | None

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +21,15 @@ from antennate.experiments.reproduce.verdict import (
 )
 from antennate.studies.columns import shown
 
+if TYPE_CHECKING:
+    from antennate.experiments.calibrate.result import CalibrateResult
+    from antennate.experiments.force.result import ForceResult
+    from antennate.experiments.springs.experiment import SpringsResult
+    from antennate.experiments.sweep.result import SweepResult
+    from antennate.experiments.taper.experiment import TaperResult
+    from antennate.experiments.touch.result import TouchResult
+    from antennate.experiments.wall.experiment import WallResult
+
 _ROUNDING = 0.0005
 """Half of the last digit of the paper's stiffnesses [N·mm/deg]."""
 _SLOPE, _SLOPE_NEAR = 18.3, 0.2 * 18.3
@@ -33,7 +41,6 @@ _FIT, _ALIKE = 0.95, 0.02
 """R² from which one curve serves, and how far those of the speeds may lie apart."""
 _LIMIT_DEG = 30.0
 """Deflection of a spring that the paper states [deg]."""
-_NO_PAIR = {"trials": 0, "only_first": 0, "only_second": 0}
 _CHOSEN = "the base angle of 53° was chosen on a map, where profiles differ most"
 _WINDOW = (
     "The angle at which the tip meets the spheres decides, and the taper moves that border by two "
@@ -51,15 +58,15 @@ _OTHERS = "an antenna of other springs at the same angle, judged as a claim of i
     best="fitted",
     ceiling="the coil diameter was worked out from this table, for one of several wires",
 )
-def springs(result: Mapping[str, Any]) -> Finding:
+def springs(result: SpringsResult) -> Finding:
     """Springs of 3, 6 and 9 coils have these stiffnesses."""
-    springs = result["springs"]
-    ours = [row["stiffness_n_mm_per_deg"] for row in springs]
-    paper = [row["paper_n_mm_per_deg"] for row in springs]
+    springs = result.springs
+    ours = [each.stiffness_n_mm_per_deg for each in springs]
+    paper = [printed for each in springs if (printed := each.paper_n_mm_per_deg)]
     bars = [
-        Bar(f"{whose}, {row['active_coils']:g} coils", value)
+        Bar(f"{whose}, {each.active_coils:g} coils", value)
         for whose, values in (("paper", paper), ("ours", ours))
-        for row, value in zip(springs, values, strict=True)
+        for each, value in zip(springs, values, strict=True)
     ]
     return Finding(
         ", ".join(f"{value:.4f}" for value in ours),
@@ -79,11 +86,11 @@ def springs(result: Mapping[str, Any]) -> Finding:
     rival="springs that are all equal",
     best="reproduced",
 )
-def taper(result: Mapping[str, Any]) -> Finding:
+def taper(result: TaperResult) -> Finding:
     """The ladder of springs follows the animal's taper, stiff at the base and soft at the tip."""
-    animal, ladder = result["base_over_tip"], result["ladder"]["base_over_tip"]
-    course = np.array(result["stretches"])
-    ours, equal = result["ladder"]["distance_decades"], distance_decades(course * 0 + 1, course)
+    animal, ladder = result.base_over_tip, result.ladder.base_over_tip
+    course = np.array(result.stretches)
+    ours, equal = result.ladder.distance_decades, distance_decades(course * 0 + 1, course)
     return Finding(
         f"animal {animal:.0f} : 1, ladder {ladder:g} : 1; {ours:.2f} decades from the taper, equal "
         f"springs {equal:.2f}",
@@ -108,10 +115,10 @@ def taper(result: Mapping[str, Any]) -> Finding:
     rival="a sigmoid for each speed, with R² near 1 at each",
     ceiling="length of the mean, sensor and rig are ours",
 )
-def one_curve(result: Mapping[str, Any]) -> Finding:
+def one_curve(result: CalibrateResult) -> Finding:
     """One calibration curve serves pushes at 5, 10 and 15 cm/s."""
-    speeds = result["calibration"]["speeds"]
-    r2 = [row["r2"] for row in speeds]
+    speeds = result.calibration.speeds
+    r2 = [speed.r2 for speed in speeds]
     holds = min(r2) >= _FIT and max(r2) - min(r2) < _ALIKE
     return Finding(
         "R² " + ", ".join(f"{value:.3f}" for value in r2),
@@ -120,7 +127,7 @@ def one_curve(result: Mapping[str, Any]) -> Finding:
         if holds
         else "A running mean lags by half of its length, so that the same reading means more bend "
         "the faster the push.",
-        tuple(Bar(f"ours, {100 * s['speed_m_s']:g} cm/s", s["r2"]) for s in speeds),
+        tuple(Bar(f"ours, {shown(s.speed_m_s, 'g', 100)} cm/s", s.r2) for s in speeds),
         "" if holds else "Without a mean (`--averaging-time 0`) one curve serves all three.",
     )
 
@@ -133,9 +140,9 @@ def one_curve(result: Mapping[str, Any]) -> Finding:
     rival="a straight line, and any rising curve (isotonic)",
     best="reproduced",
 )
-def sigmoid(result: Mapping[str, Any]) -> Finding:
+def sigmoid(result: CalibrateResult) -> Finding:
     """The curve is a sigmoid."""
-    errors = result["calibration"]["cross_validated_rmse"]
+    errors = result.calibration.cross_validated_rmse
     best = min(errors, key=errors.__getitem__)
     serves = ": a sigmoid is one curve that serves, not the one that the readings ask for"
     serves = "" if best == "sigmoid" else serves
@@ -156,23 +163,20 @@ def sigmoid(result: Mapping[str, Any]) -> Finding:
     rival="none: numbers of one sensor",
     ceiling="sensor and divider are ours",
 )
-def slope(result: Mapping[str, Any]) -> Finding:
+def slope(result: CalibrateResult) -> Finding:
     """The sigmoid has this slope and midpoint."""
-    curve = result["calibration"]
-    slope_95, midpoint_95 = (
-        ends and tuple(ends) for ends in (curve["slope_95"], curve["midpoint_95"])
-    )
+    curve = result.calibration
     return Finding(
-        f"slope {curve['slope']:.1f} ({shown(slope_95, '.1f')}), midpoint "
-        f"{curve['midpoint']:.2f} ({shown(midpoint_95)})"
-        + ("; by noise alone, the curve itself misses the readings" if curve.get("misfit") else ""),
+        f"slope {curve.slope:.1f} ({shown(curve.slope_95, '.1f')}), midpoint "
+        f"{curve.midpoint:.2f} ({shown(curve.midpoint_95)})"
+        + ("; by noise alone, the curve itself misses the readings" if curve.misfit else ""),
         all_of(
-            agrees(curve["slope"], slope_95, _SLOPE, _SLOPE_NEAR),
-            agrees(curve["midpoint"], midpoint_95, _MIDPOINT, _MIDPOINT_NEAR),
+            agrees(curve.slope, curve.slope_95, _SLOPE, _SLOPE_NEAR),
+            agrees(curve.midpoint, curve.midpoint_95, _MIDPOINT, _MIDPOINT_NEAR),
         ),
         "Slope and midpoint belong to one sensor, one divider and one way to scale the counts, of "
         "which the paper names none.",
-        (Bar("paper", _SLOPE), Bar("ours", curve["slope"], slope_95)),
+        (Bar("paper", _SLOPE), Bar("ours", curve.slope, curve.slope_95)),
     )
 
 
@@ -184,17 +188,17 @@ def slope(result: Mapping[str, Any]) -> Finding:
     rival="the same without the place",
     ceiling="the place has to be known, which the robot does not feel",
 )
-def force(result: Mapping[str, Any]) -> Finding:
+def force(result: ForceResult) -> Finding:
     """The curvature of the antenna tells the force of a contact."""
-    statics = result["profiles"]["descending"]["statics"]["frictionless"]
-    known, unknown = statics["known"]["flex"], statics["unknown"]["flex"]
+    loads = result.profiles["descending"].statics.frictionless
+    known, unknown = loads.known.flex, loads.unknown.flex
     return Finding(
-        f"R² {known['r2']:.2f} if the place of contact is known, {unknown['r2']:.2f} if not",
-        above(tuple(known["r2_95"]), 0.9),
+        f"R² {known.r2:.2f} if the place of contact is known, {unknown.r2:.2f} if not",
+        above(known.r2_95, 0.9),
         "One flex cannot tell a small force far out from a large one near the base.",
         (
-            Bar("place known", known["r2"], tuple(known["r2_95"])),
-            Bar("place unknown", unknown["r2"], tuple(unknown["r2_95"])),
+            Bar("place known", known.r2, known.r2_95),
+            Bar("place unknown", unknown.r2, unknown.r2_95),
         ),
     )
 
@@ -208,25 +212,24 @@ def force(result: Mapping[str, Any]) -> Finding:
     rival="a sensor that always says contact",
     ceiling="the threshold is ours",
 )
-def contact(result: Mapping[str, Any]) -> Finding:
+def contact(result: TouchResult) -> Finding:
     """A threshold on the bending level tells contact."""
-    row = result["profiles"]["descending"]
-    share = row["contact_share"] or 0.0
+    row = result.profiles["descending"]
+    share = row.contact_share or 0.0
     always = 2 * share / (1 + share)
-    f1, interval = row["f1"], row["f1_95"]
-    ends = row["f1_over_always_contact_95"]
-    walls = [r for r in result["by_wall"] if r["profile"] == "descending"]
-    leads = {r["wall"]: r["f1_over_always_contact_95"] for r in walls}
-    lost = [f"{r['wall']} ({shown(r['f1'])})" for r in walls if not above(leads[r["wall"]], 0.0)]
-    ours = () if f1 is None else (Bar("ours", f1, interval),)
+    ends = row.f1_over_always_contact_95
+    walls = [wall for wall in result.by_wall if wall.profile == "descending"]
+    behind = [wall for wall in walls if not above(wall.f1_over_always_contact_95, 0.0)]
+    lost = [f"{wall.wall} ({shown(wall.f1)})" for wall in behind]
+    ours = () if row.f1 is None else (Bar("ours", row.f1, row.f1_95),)
     return Finding(
-        f"F1 {shown(f1)} ({shown(interval)}); to say always contact {always:.2f}; difference "
-        f"{shown(row['f1_over_always_contact'], '+.3f')} ({shown(ends, '+.3f')})",
+        f"F1 {shown(row.f1)} ({shown(row.f1_95)}); to say always contact {always:.2f}; difference "
+        f"{shown(row.f1_over_always_contact, '+.3f')} ({shown(ends, '+.3f')})",
         above(ends, 0.0),
         f"Taken alone, not surely above it at walls {', '.join(lost) or 'none'}. With "
         "a threshold of one half strong contacts are found and grazes are not: "
-        f"{shown(row['precision'], '.0f', 100)} % of the time that is called contact is contact, "
-        f"and {shown(row['recall'], '.0f', 100)} % of the time in contact is called so.",
+        f"{shown(row.precision, '.0f', 100)} % of the time that is called contact is contact, "
+        f"and {shown(row.recall, '.0f', 100)} % of the time in contact is called so.",
         (Bar("always contact", always), *ours),
     )
 
@@ -239,11 +242,11 @@ def contact(result: Mapping[str, Any]) -> Finding:
     rival="none: any antenna that bends shows some",
     ceiling="limits and grid are ours",
 )
-def shapes(result: Mapping[str, Any]) -> Finding:
+def shapes(result: SweepResult) -> Finding:
     """Sweeping beside a wall the antenna points forward, backward, lies straight, or changes."""
-    motions = result["shapes"]["descending"].values()
+    motions = result.shapes["descending"].values()
     shares = {
-        name: max(100 * (kind["share"][name][0] or 0.0) for kind in motions)
+        name: max(100 * (motion.share[name][0] or 0.0) for motion in motions)
         for name in ("forward", "backward", "straight", "transition")
     }
     return Finding(
@@ -265,12 +268,12 @@ def shapes(result: Mapping[str, Any]) -> Finding:
     best="fitted",
     ceiling=_CHOSEN,
 )
-def stiff_jams(result: Mapping[str, Any]) -> Finding:
+def stiff_jams(result: WallResult) -> Finding:
     """A stiff antenna jams at a wall of boulders."""
-    row = result["profiles"]["stiff"]
-    share, interval = share_of(row, "jams")
+    row = result.profiles["stiff"]
+    share, interval = share_of(row, row.jams)
     return Finding(
-        counted(row, "jam", "jams"),
+        counted(row, "jam", row.jams),
         above(interval, 50.0),
         "",
         (Bar("paper", 100.0), Bar("ours", share, interval)),
@@ -286,12 +289,12 @@ def stiff_jams(result: Mapping[str, Any]) -> Finding:
     rival=_OTHERS,
     ceiling="we chose the base angle, for another claim",
 )
-def soft_slips(result: Mapping[str, Any]) -> Finding:
+def soft_slips(result: WallResult) -> Finding:
     """A soft antenna slips at a wall of boulders."""
-    row = result["profiles"]["compliant"]
-    share, interval = share_of(row, "slips")
+    row = result.profiles["compliant"]
+    share, interval = share_of(row, row.slips)
     return Finding(
-        f"{counted(row, 'slip', 'slips')}, {counted(row, 'jam', 'jams')}",
+        f"{counted(row, 'slip', row.slips)}, {counted(row, 'jam', row.jams)}",
         above(interval, 50.0),
         "",
         (Bar("paper", 100.0), Bar("ours", share, interval)),
@@ -312,9 +315,9 @@ def soft_slips(result: Mapping[str, Any]) -> Finding:
     best="fitted",
     ceiling=_CHOSEN,
 )
-def descending_passes(result: Mapping[str, Any]) -> Finding:
+def descending_passes(result: WallResult) -> Finding:
     """An antenna stiff at the base and soft at the tip passes a wall of boulders."""
-    row = result["profiles"]["descending"]
+    row = result.profiles["descending"]
     share, interval = share_of(row)
     return Finding(
         counted(row, "pass"),
@@ -334,11 +337,11 @@ def descending_passes(result: Mapping[str, Any]) -> Finding:
     best="fitted",
     ceiling=_CHOSEN,
 )
-def taper_decides(result: Mapping[str, Any]) -> Finding:
+def taper_decides(result: WallResult) -> Finding:
     """It is the descending stiffness that lets it pass."""
     names = ("descending", "matched_uniform", "ascending")
-    ours, uniform, ascending = rows = [result["profiles"][name] for name in names]
-    leads = [lead(result["paired"].get(f"descending-{name}", _NO_PAIR)) for name in names[1:]]
+    ours, uniform, ascending = rows = [result.profiles[name] for name in names]
+    leads = [lead(result.paired.get(f"descending-{name}")) for name in names[1:]]
     labels = ("descending", "uniform, same tip stiffness", "ascending")
     return Finding(
         f"descending {counted(ours)}, uniform {counted(uniform)}, ascending {counted(ascending)}",
@@ -357,15 +360,13 @@ def taper_decides(result: Mapping[str, Any]) -> Finding:
     rival="the other antennae, which jam",
     ceiling="we chose angle and overlap",
 )
-def bend(result: Mapping[str, Any]) -> Finding:
+def bend(result: WallResult) -> Finding:
     """Springs bend by less than 30° in use."""
-    rows = result["profiles"]
-    angles = {
-        n: row["hinge_max_deg"] for n, row in rows.items() if row["hinge_max_deg"] is not None
-    }
+    rows = result.profiles
+    angles = {n: row.hinge_max_deg for n, row in rows.items() if row.hinge_max_deg is not None}
     ours = angles.get("descending")
     stays = ours is not None and ours < _LIMIT_DEG
-    few = ours is None or rows["descending"]["trials"] < ENOUGH_TO_STAY
+    few = ours is None or rows["descending"].trials < ENOUGH_TO_STAY
     return Finding(
         f"largest angle of one spring {shown(ours, '.1f')}° in the antenna that passes, up to "
         f"{shown(max(angles.values(), default=None), '.1f')}° where antennae jam",

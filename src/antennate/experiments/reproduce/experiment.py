@@ -26,11 +26,12 @@ from antennate.experiments.reproduce.verdict import (
 from antennate.messages import command_words
 from antennate.params.base import Params, number, put_over, read_file
 from antennate.params.control import ConditioningParams
-from antennate.studies.columns import content, tabular
-from antennate.studies.experiment import Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.columns import tabular
+from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers, workers_from
 from antennate.studies.run_files import REPORT
 from antennate.studies.tables import Table
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 
 CLAIMS: tuple[Claim, ...] = (*ANTENNA, *ROBOT)
 """All claims, in the order of the page."""
@@ -174,13 +175,10 @@ def _settings(name: str, config: ReproduceConfig) -> tuple[dict[str, Any], dict[
     return flags | ({"seed": config.seed} if chance else {}), base
 
 
-def judge(
-    name: str, result: Mapping[str, Any], config: ReproduceConfig
-) -> list[tuple[Claim, Finding]]:
-    """What the result of an experiment says of its claims; springs are wound as in `springs`."""
-    wound = configured("springs", config).model_dump(include={"wire_mm", "coil_mm"})
+def judge(name: str, result: Any, config: ReproduceConfig) -> list[tuple[Claim, Finding]]:
+    """What the result of an experiment says of its claims."""
     own = (claim for claim in claims(config) if claim.experiment == name)
-    return [(claim, claim.judge({**result, "wound": wound})) for claim in own]
+    return [(c, c.judge(result, *(configured(n, config) for n in c.beside))) for c in own]
 
 
 def command(name: str, config: ReproduceConfig) -> str:
@@ -226,11 +224,10 @@ def run(
 
         setting = configured(name, config)
         try:
-            outcome = experiment.run(setting, workers_from(workers), step, no_row)
-            result = content(outcome.result())
+            result = experiment.run(setting, workers_from(workers), step, no_row).result()
         except KeyboardInterrupt:
-            result = {"interrupted": True}
-        if result.get("interrupted"):
+            result = None
+        if result is None or getattr(result, "interrupted", False):
             return ReproduceOutcome(config, tuple(judged), interrupted=True)
         step(1, 1)
         before += own

@@ -5,8 +5,7 @@ In the tunnel the rival of touch is a robot that feels nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from antennate.antenna.springs import endurance
 from antennate.control.registry import RIVAL
@@ -28,6 +27,10 @@ from antennate.experiments.reproduce.verdict import (
 from antennate.params.spring import SpringParams
 from antennate.studies.columns import shown
 from antennate.studies.statistics import wilson95
+
+if TYPE_CHECKING:
+    from antennate.experiments.gait.result import GaitResult
+    from antennate.experiments.tunnel.result import Pair, TunnelResult
 
 _OPEN = "open"
 _NEAR_POINTS = 15.0
@@ -56,14 +59,14 @@ _OURS = "the rule is ours"
     rival="the legs alone, without the body wave",
     ceiling="the lead of the wave over the legs is ours",
 )
-def forward(result: Mapping[str, Any]) -> Finding:
+def forward(result: GaitResult) -> Finding:
     """A body wave from head to tail with stepping legs walks forward."""
-    speed, alone = result["maneuvers"]["forward"]["speed_m_s"], result["wave_off"]["speed_m_s"]
+    speed, alone = result.maneuvers["forward"].speed_m_s, result.wave_off.speed_m_s
     return Finding(
         f"{speed:.3f} m/s with the body wave, {alone:.3f} m/s without",
         speed > alone > 0,
         "The paper gives no lead of the body wave over the legs, and the worst lead walks at "
-        f"{100 * result['cost_of_phase']['worst_over_best']:.0f} % of the best speed.",
+        f"{100 * result.cost_of_phase.worst_over_best:.0f} % of the best speed.",
         (Bar("legs alone", alone), Bar("with the body wave", speed)),
     )
 
@@ -76,9 +79,9 @@ def forward(result: Mapping[str, Any]) -> Finding:
     rival="no offset, which walks straight",
     ceiling="the offset is ours",
 )
-def turns(result: Mapping[str, Any]) -> Finding:
+def turns(result: GaitResult) -> Finding:
     """An offset of the body wave turns the robot."""
-    left, right = (result["maneuvers"][n]["yaw_deg_per_cycle"] for n in ("turn_l", "turn_r"))
+    left, right = (result.maneuvers[n].yaw_deg_per_cycle for n in ("turn_l", "turn_r"))
     return Finding(
         f"{left:+.0f}° and {right:+.0f}° a cycle",
         left > 5 and right < -5,
@@ -95,9 +98,9 @@ def turns(result: Mapping[str, Any]) -> Finding:
     rival="the body wave alone run backwards, which does not reverse rolling legs",
     ceiling="we reverse body and legs",
 )
-def reverse(result: Mapping[str, Any]) -> Finding:
+def reverse(result: GaitResult) -> Finding:
     """The body wave run backwards reverses the robot."""
-    forward, back = (result["maneuvers"][n]["speed_m_s"] for n in ("forward", "reverse"))
+    forward, back = (result.maneuvers[n].speed_m_s for n in ("forward", "reverse"))
     return Finding(
         f"{back:+.3f} m/s",
         back < 0,
@@ -106,24 +109,20 @@ def reverse(result: Mapping[str, Any]) -> Finding:
     )
 
 
-def _blinds(result: Mapping[str, Any]) -> list[str]:
+def _blinds(result: TunnelResult) -> list[str]:
     """The controllers without touch that a claim is held against: that of the paper, the rival."""
-    return [n for n in dict.fromkeys((_OPEN, RIVAL)) if n in result["controllers"]]
+    return [n for n in dict.fromkeys((_OPEN, RIVAL)) if n in result.controllers]
 
 
-def _pair(result: Mapping[str, Any], ours: str, other: str) -> tuple[Mapping[str, Any], bool]:
+def _pair(result: TunnelResult, ours: str, other: str) -> tuple[Pair | None, bool]:
     """What is told of two controllers on the same trials, and whether ours comes first."""
-    first = result["paired"].get(f"{ours}-{other}")
-    if first is not None:
-        return first, True
-    nothing = {"trials": 0, "only_first": 0, "only_second": 0, "mcnemar_p": 1.0}
-    return result["paired"].get(f"{other}-{ours}", nothing), False
+    first = result.paired.get(f"{ours}-{other}")
+    return (first, True) if first else (result.paired.get(f"{other}-{ours}"), False)
 
 
-def _gain(pair: Mapping[str, Any], ours_first: bool, key: str) -> Ends | None:
-    """95 % interval of the other's number less ours, of a difference in `paired`."""
-    ends = pair.get(key)
-    return None if ends is None else (-ends[1], -ends[0]) if ours_first else (ends[0], ends[1])
+def _gain(ends: Ends | None, ours_first: bool) -> Ends | None:
+    """95 % interval of the other's number less ours, of that of a difference in `paired`."""
+    return (-ends[1], -ends[0]) if ends and ours_first else ends
 
 
 def _of_ten(successes: int) -> Bar:
@@ -149,9 +148,9 @@ def _all_cross(share: float, interval: Ends) -> bool | None:
     best="fitted",
     ceiling="the corner of 90° was chosen for this share",
 )
-def blind(result: Mapping[str, Any]) -> Finding:
+def blind(result: TunnelResult) -> Finding:
     """Without feedback 6 of 10 robots cross the tunnel."""
-    row = result["controllers"][_OPEN]
+    row = result.controllers[_OPEN]
     share, interval = share_of(row)
     return Finding(
         f"{counted(row)}",
@@ -165,14 +164,13 @@ def blind(result: Mapping[str, Any]) -> Finding:
 def _touch(name: str, text: str, reason: str = "", by_default: str = "") -> Claim:
     """The claim that all robots cross with the controller of this name."""
 
-    def judge(result: Mapping[str, Any]) -> Finding:
-        row, blinds = result["controllers"][name], _blinds(result)
+    def judge(result: TunnelResult) -> Finding:
+        rows, blinds = result.controllers, _blinds(result)
+        row, pairs = rows[name], [_pair(result, name, other) for other in blinds]
         share, interval = share_of(row)
-        pairs = [_pair(result, name, other) for other in blinds]
         others = "".join(
-            f"; `{other}` {counted(result['controllers'][other])}, McNemar p "
-            f"{pair['mcnemar_p']:.2g}"
-            for other, (pair, _) in zip(blinds, pairs, strict=True)
+            f"; `{n}` {counted(rows[n])}, McNemar p {pair.mcnemar_p if pair else 1.0:.2g}"
+            for n, (pair, _) in zip(blinds, pairs, strict=True)
         )
         leads = [above(lead(*pair), _HALF_LEAD_POINTS) for pair in pairs]
         return Finding(
@@ -182,7 +180,7 @@ def _touch(name: str, text: str, reason: str = "", by_default: str = "") -> Clai
             (
                 _of_ten(10),
                 Bar(f"ours, {name}", share, interval),
-                *(Bar(f"ours, {n}", *share_of(result["controllers"][n])) for n in blinds),
+                *(Bar(f"ours, {n}", *share_of(rows[n])) for n in blinds),
             ),
             by_default,
         )
@@ -206,22 +204,20 @@ def _speed(name: str, text: str, ceiling: str, by_default: str) -> Claim:
     """The claim that robots that cross do so at a speed."""
     paper = _PAPER_SPEED[name]
 
-    def judge(result: Mapping[str, Any]) -> Finding:
-        rows = result["controllers"]
-        names = list(dict.fromkeys((name, *_blinds(result))))
-        speeds = {n: rows[n]["speed_m_s"] for n in names if rows[n]["speed_m_s"] is not None}
-        ends = rows[name]["speed_95"]
+    def judge(result: TunnelResult) -> Finding:
+        rows = result.controllers
+        names = dict.fromkeys((name, *_blinds(result)))
+        speeds = {n: speed for n in names if (speed := rows[n].speed_m_s) is not None}
+        ends = rows[name].speed_95
         beside = "".join(f"; {n} {speed:.3f} m/s" for n, speed in speeds.items() if n != name)
         ours = speeds.get(name)
         return Finding(
             f"{shown(ours, '.3f')} m/s ({shown(ends, '.3f')}){beside}",
-            None
-            if ours is None
-            else agrees(ours, ends and tuple(ends), paper, _NEAR_SPEED * paper),
+            None if ours is None else agrees(ours, ends, paper, _NEAR_SPEED * paper),
             "",
             (
                 Bar("paper", paper),
-                *(Bar(f"ours, {n}", s, rows[n]["speed_95"]) for n, s in speeds.items()),
+                *(Bar(f"ours, {n}", speed, rows[n].speed_95) for n, speed in speeds.items()),
             ),
             by_default,
         )
@@ -249,31 +245,29 @@ def _speed(name: str, text: str, ceiling: str, by_default: str) -> Claim:
     rival=f"robots without feedback, and {_BLIND}",
     ceiling=_OURS,
 )
-def faster(result: Mapping[str, Any]) -> Finding:
+def faster(result: TunnelResult) -> Finding:
     """Feedback makes the robot faster through the tunnel."""
-    rows, blinds = result["controllers"], _blinds(result)
+    rows, blinds = result.controllers, _blinds(result)
     ours = rows["closed"]
     leads = {
-        n: difference(
-            ours["speed_m_s"], ours["speed_95"], rows[n]["speed_m_s"], rows[n]["speed_95"]
-        )
+        n: difference(ours.speed_m_s, ours.speed_95, rows[n].speed_m_s, rows[n].speed_95)
         for n in blinds
     }
     beside = "".join(
-        f", {n} {shown(rows[n]['speed_m_s'], '.3f')} (lead {shown(leads[n], '+.3f')})"
-        for n in blinds
+        f", {n} {shown(rows[n].speed_m_s, '.3f')} (lead {shown(leads[n], '+.3f')})" for n in blinds
     )
-    times = ", ".join(f"{rows[n]['restricted_mean_time_s']:.1f} s of `{n}`" for n in blinds)
-    saved = [_gain(*_pair(result, "closed", n), "time_difference_95") for n in blinds]
+    times = ", ".join(f"{shown(rows[n].restricted_mean_time_s, '.1f')} s of `{n}`" for n in blinds)
+    pairs = [_pair(result, "closed", n) for n in blinds]
+    saved = [_gain(pair and pair.time_difference_95, first) for pair, first in pairs]
     spans = " and ".join(shown(ends, "+.1f") for ends in saved)
     names = ("closed", *blinds)
     return Finding(
-        f"{shown(ours['speed_m_s'], '.3f')} m/s with feedback{beside}",
+        f"{shown(ours.speed_m_s, '.3f')} m/s with feedback{beside}",
         all_of(*(above(ends, _HALF_LEAD_SPEED) for ends in leads.values())),
         "It compares different tunnels, as robots without feedback fail in the hard ones. "
         "By ours, the restricted mean time with failures as the limit, it is "
-        f"{ours['restricted_mean_time_s']:.1f} s against {times}: {spans} s saved.",
-        tuple(Bar(f"ours, {n}", rows[n]["speed_m_s"] or 0.0, rows[n]["speed_95"]) for n in names),
+        f"{shown(ours.restricted_mean_time_s, '.1f')} s against {times}: {spans} s saved.",
+        tuple(Bar(f"ours, {n}", rows[n].speed_m_s or 0.0, rows[n].speed_95) for n in names),
     )
 
 
@@ -286,21 +280,25 @@ def faster(result: Mapping[str, Any]) -> Finding:
     rival=f"robots without feedback, and {_BLIND}",
     ceiling=_OURS,
 )
-def centred(result: Mapping[str, Any]) -> Finding:
+def centred(result: TunnelResult) -> Finding:
     """Feedback keeps the robot in the middle of the tunnel."""
-    rows, blinds = result["controllers"], _blinds(result)
-    gains = [_gain(*_pair(result, "closed", n), "offset_difference_95") for n in blinds]
-    names = ("closed", *blinds)
-    known = [n for n in names if rows[n]["offset_m"] is not None]
+    blinds = _blinds(result)
+    pairs = [_pair(result, "closed", n) for n in blinds]
+    gains = [_gain(pair and pair.offset_difference_95, first) for pair, first in pairs]
+    rows = {n: result.controllers[n] for n in ("closed", *blinds)}
     beside = "; ".join(
         f"nearer than `{n}` by {shown(ends, '+.3f')} m"
         for n, ends in zip(blinds, gains, strict=True)
     )
     return Finding(
-        ", ".join(f"{n} {shown(rows[n]['offset_m'], '.3f')} m" for n in names) + f"; {beside}",
+        ", ".join(f"{n} {shown(row.offset_m, '.3f')} m" for n, row in rows.items()) + f"; {beside}",
         all_of(*(above(ends, 0.0) for ends in gains)),
         "Distance of the head from the centre line, each stretch of 5 cm counts alike.",
-        tuple(Bar(f"ours, {n}", rows[n]["offset_m"], rows[n]["offset_95"]) for n in known),
+        tuple(
+            Bar(f"ours, {n}", row.offset_m, row.offset_95)
+            for n, row in rows.items()
+            if row.offset_m is not None
+        ),
         "The corridor leaves a robot in its middle 0.1 m to either side.",
     )
 
@@ -313,18 +311,18 @@ def centred(result: Mapping[str, Any]) -> Finding:
     f"million cycles (Gerber), in {ENOUGH_TO_STAY} trials or more",
     rival="none: strengths of the wire from Shigley, tables 10-4 and 10-10",
     ceiling="wire and coil are ours",
+    beside=("springs",),
 )
-def unbroken(result: Mapping[str, Any]) -> Finding:
+def unbroken(result: TunnelResult, wire: SpringParams) -> Finding:
     """No antenna fails."""
-    row = result["controllers"]["closed"]
-    if row["spring_high_n_m"] is None:
+    row = result.controllers["closed"]
+    low, high, cycles = row.spring_low_n_m, row.spring_high_n_m, row.spring_cycles
+    if low is None or high is None or cycles is None:
         return Finding("no valid trial", None, "No trial of `closed` is valid.", ())
-    low, high, cycles = (row[f"spring_{n}"] for n in ("low_n_m", "high_n_m", "cycles"))
-    wire = SpringParams.model_validate(result.get("wound", {}))
     usual = endurance(wire, max(low, -high), high)
     music = endurance(wire.model_copy(update={"wire": "music_wire"}), max(low, -high), high)
     stays = min(usual.yield_factor, usual.fatigue_factor) > 1.0
-    few = row["trials"] - row["invalid"] < ENOUGH_TO_STAY
+    few = row.trials - row.invalid < ENOUGH_TO_STAY
     yields = usual.stress * usual.yield_factor
     return Finding(
         f"largest stress {usual.stress / 1e6:.0f} MPa at {1e3 * high:.1f} N·mm, "

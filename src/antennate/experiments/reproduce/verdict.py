@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from antennate.studies.columns import Ends, tabular
-from antennate.studies.statistics import wilson95
+from antennate.studies.statistics import Matched, wilson95
+from antennate.studies.tables import Tried
 
 Verdict = Literal["reproduced", "conditional", "fitted", "not_reproduced", "undecided"]
 Best = Literal["reproduced", "conditional", "fitted"]
@@ -63,17 +64,18 @@ def all_of(*parts: bool | None) -> bool | None:
     return False if False in parts else None if None in parts else True
 
 
-def lead(pair: Mapping[str, Any], first_is_ours: bool = True) -> Ends:
+def lead(pair: Matched | None, first_is_ours: bool = True) -> Ends:
     """95 % interval of the difference of two success shares on the same trials [points].
 
     Adjusted Wald: Bonett and Price, Journal of Educational and Behavioral Statistics 37 (2012) 479.
 
     Args:
-        pair: Trials, and on how many of them only the first or only the second succeeded.
+        pair: On how many of them only the first or only the second succeeded; None without any.
         first_is_ours: Whether the difference is that of the first less the second.
     """
-    n = pair["trials"] + 2
-    first, second = (pair["only_first"] + 1) / n, (pair["only_second"] + 1) / n
+    trials, one, two = (pair.trials, pair.only_first, pair.only_second) if pair else (0, 0, 0)
+    n = trials + 2
+    first, second = (one + 1) / n, (two + 1) / n
     difference = first - second if first_is_ours else second - first
     half = _Z95 * math.sqrt((first + second - difference**2) / n)
     return 100 * max(difference - half, -1.0), 100 * min(difference + half, 1.0)
@@ -93,20 +95,20 @@ def difference(
     return first - second - down, first - second + up
 
 
-def share_of(row: Mapping[str, Any], key: str = "successes") -> tuple[float, Ends]:
-    """Share of valid trials [%] with its 95 % interval."""
-    valid = row["trials"] - row["invalid"]
-    low, high = wilson95(row[key], valid)
-    return 100.0 * row[key] / max(valid, 1), (100.0 * low, 100.0 * high)
+def share_of(row: Tried, count: int | None = None) -> tuple[float, Ends]:
+    """Share of a count, or of successes, in valid trials [%] with its 95 % interval."""
+    valid, count = row.trials - row.invalid, row.successes if count is None else count
+    low, high = wilson95(count, valid)
+    return 100.0 * count / max(valid, 1), (100.0 * low, 100.0 * high)
 
 
-def counted(row: Mapping[str, Any], word: str = "", key: str = "successes") -> str:
-    """The count in words with the interval of its share, as "16 of 20 jam (58 to 92 %)"."""
-    valid = row["trials"] - row["invalid"]
+def counted(row: Tried, word: str = "", count: int | None = None) -> str:
+    """A count, or successes, in words with its interval, as "16 of 20 jam (58 to 92 %)"."""
+    valid, count = row.trials - row.invalid, row.successes if count is None else count
     if not valid:
         return "no valid trial"
-    low, high = share_of(row, key)[1]
-    return f"{row[key]} of {valid}{' ' if word else ''}{word} ({low:.0f} to {high:.0f} %)"
+    low, high = share_of(row, count)[1]
+    return f"{count} of {valid}{' ' if word else ''}{word} ({low:.0f} to {high:.0f} %)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,8 @@ class Claim:
         ceiling: Why it can be no more.
         experiment: Experiment that tests it.
         unit: Unit of the figure's numbers.
-        judge: From the results to a finding.
+        judge: From the result to a finding.
+        beside: Experiments whose configurations `judge` takes, too.
         fitted: Whether numbers that the paper does not give are those fitted to it.
     """
 
@@ -169,7 +172,8 @@ class Claim:
     ceiling: str
     experiment: str
     unit: str
-    judge: Callable[[Mapping[str, Any]], Finding]
+    judge: Callable[..., Finding]
+    beside: Sequence[str] = ()
     fitted: bool = False
 
     def when_fitted(self) -> Claim:
@@ -204,13 +208,14 @@ def claim(
     rival: str,
     best: Best = "conditional",
     ceiling: str = "",
-) -> Callable[[Callable[[Mapping[str, Any]], Finding]], Claim]:
+    beside: Sequence[str] = (),
+) -> Callable[[Callable[..., Finding]], Claim]:
     """Make a function that judges the claim which its docstring states; the claim has its name."""
 
-    def made(judge: Callable[[Mapping[str, Any]], Finding]) -> Claim:
+    def made(judge: Callable[..., Finding]) -> Claim:
         text = (judge.__doc__ or "").removesuffix(".")
         stated = judge.__name__, text, paper, criterion, rival, best, ceiling
-        return Claim(*stated, experiment, unit, judge)
+        return Claim(*stated, experiment, unit, judge, beside)
 
     return made
 

@@ -6,7 +6,7 @@ from dataclasses import field
 from typing import Any, Self
 
 from antennate.antenna.dynamics import Mode, least_damping
-from antennate.studies.columns import Ends, column, tabular
+from antennate.studies.columns import Ends, column, percent, tabular
 
 REJECTED = 0.9
 """Share of a deflection that a cockroach's antenna has lost after one cycle (Mongeau 2014)."""
@@ -68,7 +68,6 @@ class Swing:
     """One mode: how fast it swings and how soon it stops."""
 
     natural_hz: float = column("frequency without damping", "Hz", form=".3f")
-    """Frequency without damping."""
     swing_hz: float = column("frequency of the swing", "Hz", form=".3f")
     """Frequency of the swing; 0 if the antenna creeps back."""
     damping: float = column("damping ratio", form=".3f")
@@ -92,7 +91,7 @@ class Swing:
 class EngineSwing(Swing):
     """The first mode of the ring-down in the physics engine."""
 
-    rejected: float = column("rejected in the first cycle", "%", form=".1f", scale=100.0)
+    rejected: float = percent("rejected in the first cycle", form=".1f")
     """Share of the tip's deflection that is gone for good after one cycle."""
 
 

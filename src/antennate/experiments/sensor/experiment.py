@@ -80,7 +80,7 @@ class SensorResult:
     curve: list[Point]
     """Static curve, from straight to the largest bend."""
     counts_span: float
-    """Reading at the largest bend against the straight one."""
+    """Change of the reading from straight to the largest bend."""
     loop_width_share: float
     """Gap between loading and unloading at half the bend, over the span of readings."""
     creep_counts: float

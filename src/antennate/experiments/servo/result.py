@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.studies.columns import Ends, column, tabular
+from antennate.studies.columns import Ends, column, percent, tabular
 
 
 @tabular
@@ -18,10 +18,9 @@ class RecordingRow:
     error_max_deg: float | None
     """Largest error of position."""
     full_drive: float | None
-    """Share of the time with torque in which the drive is full; `null` where nothing tells it."""
-    stalled: float | None = column("stalls", "%", form=".0f", scale=100.0)
-    """Share of the time with torque in which the drive is full and the shaft rests: a stall; `null`
-    where nothing tells the drive."""
+    """Share of the time with torque in which the drive is full; `null` if unknown."""
+    stalled: float | None = percent("stalls")
+    """Share of that time at full drive with the shaft at rest, a stall; `null` likewise."""
     error_stalled_deg: float | None = column("then", "deg", form=".1f")
     """Mean error while it stalls; `null` if it never does."""
     error_else_deg: float | None = column("else", "deg")

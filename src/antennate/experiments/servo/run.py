@@ -34,7 +34,7 @@ from antennate.experiments.servo.result import (
 )
 from antennate.robots import servos
 from antennate.robots.servos import MODEL_NUMBERS, STEP
-from antennate.studies.experiment import OnStep, no_step
+from antennate.studies.trials import OnStep, no_step
 from antennate.types import Bools, Floats
 
 _JUDGED = 2

@@ -14,7 +14,7 @@ from antennate.antenna.springs import Winding
 from antennate.errors import ConfigError
 from antennate.params.spring import SpringParams
 from antennate.robots.antenna import N_MM_PER_DEG
-from antennate.studies.columns import column, tabular
+from antennate.studies.columns import column, percent, tabular
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.tables import Table
 
@@ -41,8 +41,7 @@ class Spring:
     paper_n_mm_per_deg: float | None = column("  the paper prints", form=".3f")
     """Stiffness that the paper prints for so many coils; `null` if it prints none."""
     paper_exact_n_mm_per_deg: float | None
-    """Stiffness that follows from the paper's entry of three coils, before it is rounded; `null`
-    where the paper prints none."""
+    """Stiffness by the paper's entry of three coils, not rounded; `null` where it prints none."""
     stiffness_n_m_per_rad: float = column("stiffness", "N·m/rad", form=".5f")
     """Torque over angle, in SI units."""
     angle_deg: float = column("angle to bear", "deg", form="g")
@@ -58,9 +57,7 @@ class WoundSet:
     """A set of springs that could be wound of a stock wire."""
 
     wire_mm: float
-    """Diameter of the wire."""
     coil_mm: float
-    """Mean diameter of the coils."""
     mandrel_mm: float = column("mandrel", "mm", form=".1f")
     """Diameter of the mandrel, the inner one of the coils."""
     spring_index: float = column("spring index", form=".1f")
@@ -69,7 +66,7 @@ class WoundSet:
     """Active coils of each spring, in steps that can be wound."""
     stiffness_n_mm_per_deg: list[float]
     """Stiffness of each spring."""
-    largest_error: float = column("largest error", "%", form=".1f", scale=100.0)
+    largest_error: float = percent("largest error", form=".1f")
     """Largest distance of a stiffness from the wanted one, over the wanted one."""
     yield_angle_deg: float = column("yields at", "deg", form=".0f")
     """Smallest angle at which one of the springs yields."""

@@ -52,13 +52,13 @@ class Elementary(Effect):
     """Mean size of the effects, and its interval over trajectories; `null` without any."""
     mu_star95: Ends | None
     noise: float | None
-    """Noise limit of the sizes, one for all parameters; `null` of one trial a point."""
+    """Noise limit of the sizes, one for all parameters; `null` with one trial a point."""
     above_noise: bool | None
     """Whether the mean size exceeds it; `null` where either is not known."""
     mu: float | None
     """Mean of the effects."""
     sigma: float | None
-    """Standard deviation of the effects; `null` of fewer than two."""
+    """Standard deviation of the effects; `null` with fewer than two."""
 
     @property
     def size(self) -> tuple[float | None, Ends | None]:
@@ -75,9 +75,9 @@ class Slope(Effect):
     interval; `null` where the points do not tell it."""
     slope95: Ends | None
     noise: float | None
-    """Noise limit of this slope; `null` as the slope."""
+    """Noise limit of this slope; `null` where the slope is."""
     above_noise: bool | None
-    """Whether the slope exceeds it in size; `null` as the slope."""
+    """Whether the slope exceeds it in size; `null` where the slope is."""
 
     @property
     def size(self) -> tuple[float | None, Ends | None]:

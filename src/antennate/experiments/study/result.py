@@ -33,7 +33,6 @@ class Successes(Counts):
     """Trials, and how many succeeded; where rows have no `outcome` the first two keys alone."""
 
     successes: int
-    """Trials that succeeded."""
     success_share: float | None = column(interval="wilson95")
     """Successes over valid trials, and Wilson's interval; `null` without any."""
     wilson95: Ends | None
@@ -85,7 +84,6 @@ class StudyResult:
     interrupted: bool
     """Whether some are missing."""
     statuses: dict[str, int]
-    """Trials of each status."""
     response: str | None
     """Column that is compared between points; `null` where no row has a number."""
     conditions: dict[str, Successes | Counts]
@@ -93,8 +91,8 @@ class StudyResult:
     points: list[CellOfSuccesses | Cell]
     """Each point under each condition."""
     effects: list[Elementary | Slope]
-    """Each parameter's effect on each condition, and on the difference of each two; empty of a grid
-    and of a list."""
+    """Effects of each parameter on each condition, and on the difference of each two; empty for a
+    grid and a list."""
 
     @property
     def measure(self) -> Column:

@@ -19,9 +19,10 @@ from antennate.experiments.study.subject import (
     find,
 )
 from antennate.messages import shortened
-from antennate.studies.experiment import Done, OnRow, OnStep, Trial, no_row, no_step
+from antennate.studies.experiment import Done
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, chunk_of, gather
+from antennate.studies.trials import OnRow, OnStep, Trial, no_row, no_step
 from antennate.studies.work import Fail, Failure
 
 STATUS, REASON = "status", "reason"

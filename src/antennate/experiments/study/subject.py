@@ -23,9 +23,10 @@ from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
 from antennate.studies.columns import content
 from antennate.studies.engines import NO_BATCHES
-from antennate.studies.experiment import Experiment, Trial, no_row, no_step
+from antennate.studies.experiment import Experiment
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers
+from antennate.studies.trials import Trial, no_row, no_step
 
 Rows = list[dict[str, Any]]
 OUTCOME = "outcome"

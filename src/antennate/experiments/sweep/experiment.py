@@ -42,10 +42,11 @@ from antennate.experiments.sweep.result import (
 from antennate.params.bench import SweepParams
 from antennate.sim.bench import Watch
 from antennate.studies.columns import columns, shown
-from antennate.studies.experiment import Done, Experiment, OnRow, OnStep, no_row, no_step
+from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 
 MOTIONS = ("fixed", "moving")
 _TASK = 12

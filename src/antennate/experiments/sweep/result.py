@@ -38,13 +38,11 @@ class SweepRow(Swept):
     """
 
     seed: int
-    """Seed of the run."""
     trial: int
     """Number of the cell in its map, or of the trial."""
     kind: Literal["map", "estimate"]
     """`map` or `estimate`."""
     profile: str
-    """Springs of the antenna."""
     condition: str
     """Motion of the base, or condition of the estimates."""
     side: str
@@ -56,7 +54,6 @@ class SweepRow(Swept):
     peak_flex_rad: float | None = None
     """Largest flex: true in the map, felt in the estimates."""
     reason: str = ""
-    """Why it is invalid."""
 
 
 @tabular
@@ -152,7 +149,6 @@ class SweepResult:
     schema: int = 1
     command: str = "sweep"
     seed: int
-    """Seed of all chance."""
     length_m: float
     """Length of the antenna."""
     frequency_hz: float

@@ -61,8 +61,7 @@ class Ladder:
     base_over_tip: float
     """Stiffness of the first spring over that of the last."""
     distance_decades: float
-    """Root mean square distance of the stiffnesses from those of the stretches, in powers of
-    ten."""
+    """RMS distance of the stiffnesses from those of the stretches, in powers of ten."""
 
     @property
     def name(self) -> str:

@@ -32,9 +32,10 @@ from antennate.experiments.touch.result import (
 from antennate.experiments.touch.sensing import Comparison, compare, readings
 from antennate.sim.bench import Bench
 from antennate.studies.columns import column_of, shown
-from antennate.studies.experiment import Experiment, OnStep, no_step
+from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.tables import Table, few
+from antennate.studies.trials import OnStep, no_step
 from antennate.types import Floats
 
 if TYPE_CHECKING:

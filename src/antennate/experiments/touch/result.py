@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from antennate.studies.columns import Ends, column, tabular, tabular_row
+from antennate.studies.columns import Ends, column, percent, tabular, tabular_row
 
 
 @tabular
 class Touched:
     """How long the antenna touched."""
 
-    contact_share: float | None = column(
-        "time in contact", "%", form=".0f", scale=100.0, default=None
-    )
+    contact_share: float | None = percent("time in contact", default=None)
     """Share of ticks in contact."""
 
 
@@ -44,15 +42,12 @@ class TouchRow(Alarms, Touched):
     """A traverse, a row of trials.csv; what is measured is empty where it is invalid."""
 
     seed: int
-    """Seed of the run; with `trial` it decides all chance."""
     trial: int
-    """Number of the trial."""
     wall: str
     """Kind of wall."""
     speed_m_s: float
     """Speed of the carriage."""
     profile: str
-    """Springs of the antenna."""
     status: Literal["valid", "invalid"]
     """Whether the physics stayed valid."""
     overlap_m: float
@@ -62,7 +57,6 @@ class TouchRow(Alarms, Touched):
     largest_force_n: float | None = None
     """Largest contact force."""
     reason: str = ""
-    """Why the traverse is invalid."""
 
 
 @tabular
@@ -98,13 +92,12 @@ class Latency:
     n: int
     """Contacts that have this latency."""
     median_ms: float | None = column("median", "ms", form=".0f")
-    """Median."""
     median_95_ms: Ends | None
     """Interval of the median over trials."""
     p90_ms: float | None = column("  90 %", "ms", form=".0f")
     """90th percentile."""
     median_mm: float | None = column("  way until then", "mm", form=".0f")
-    """Median way of the carriage meanwhile."""
+    """Median travel of the carriage meanwhile."""
 
 
 @tabular
@@ -112,7 +105,7 @@ class Reaction:
     """How fast alarms answer, and how far apart their level lies with contact and without."""
 
     onset: Latency = column("onset latency")
-    """Begin of an alarm after that of its contact."""
+    """Start of an alarm after that of its contact."""
     release: Latency = column("release latency")
     """End of an alarm after that of its contact."""
     auc: float | None = column("area under ROC, level", form=".3f", interval="auc_95")
@@ -144,7 +137,7 @@ class Measures(Reaction, Missed, Score, Alarms, Touched):
     ticks: int
     """Ticks of the traverses."""
     metres: float
-    """Way of the traverses [m]."""
+    """Length of all traverses [m]."""
 
 
 @tabular
@@ -152,7 +145,6 @@ class ProfileMeasures(Measures):
     """Traverses of a profile."""
 
     profile: str
-    """Springs of the antenna."""
 
 
 @tabular
@@ -160,7 +152,6 @@ class SpeedMeasures(ProfileMeasures):
     """Traverses of a profile at a speed."""
 
     speed_m_s: float
-    """Speed of the carriage."""
 
 
 @tabular
@@ -168,7 +159,6 @@ class WallMeasures(ProfileMeasures):
     """Traverses of a profile along a wall."""
 
     wall: str
-    """Kind of wall."""
 
 
 @tabular
@@ -181,7 +171,6 @@ class Averaged(Reaction, Score):
     """All traverses, read with another T_avg."""
 
     averaging_time_s: float
-    """T_avg."""
 
 
 @tabular
@@ -189,9 +178,7 @@ class Truth(Score, Touched):
     """All traverses against another definition of the truth."""
 
     contact_force_n: float
-    """Force above which an obstacle presses."""
     merge_time_s: float
-    """Gaps between presses shorter than this are contact."""
 
 
 @tabular
@@ -201,8 +188,7 @@ class Needed:
     flex_rad: float | None
     """Least steady flex at which b reaches θ; `null` if none does."""
     tip_force_n: dict[str, float | None]
-    """Steady force, normal to the tip, that bends each profile so far; `null` if none up to 1 N
-    does."""
+    """Steady force, normal to the tip, that bends each profile so far; `null` beyond 1 N."""
 
 
 @tabular
@@ -225,7 +211,6 @@ class Point:
     false_positive_rate: float | None
     """Share of the free ticks at or above it."""
     f1: float | None
-    """F1 of ticks."""
 
 
 @tabular
@@ -259,7 +244,6 @@ class TouchResult:
     schema: int = 1
     command: str = "touch"
     seed: int
-    """Seed of the run."""
     trials: int
     """Trials of every wall, speed and profile."""
     invalid: int
@@ -267,7 +251,7 @@ class TouchResult:
     rate_hz: float
     """Ticks a second."""
     travel_m: float
-    """Way of a traverse."""
+    """Length of a traverse."""
     contact_force_n: float
     """Force above which an obstacle presses."""
     merge_time_s: float
@@ -281,7 +265,6 @@ class TouchResult:
     needed: Needed
     """What a contact must do to be felt."""
     profiles: dict[str, ProfileMeasures]
-    """Each profile."""
     by_speed: list[SpeedMeasures]
     """Each profile at each speed."""
     by_wall: list[WallMeasures]

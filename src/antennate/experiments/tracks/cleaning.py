@@ -32,7 +32,6 @@ class Handled:
     """Defects of the track of an animal, counted, and what is done about them."""
 
     unsorted: int = column("rows after one of a later frame, sorted", pool=total, form="d")
-    """Rows after one of a later frame: sorted."""
     duplicated: int = column("frames that stand twice, left out", pool=total, form="d")
     """Frames that stand again with the same points, and instances of SLEAP that were corrected by
     hand: the first counts, or what was corrected."""
@@ -46,7 +45,6 @@ class Handled:
     missing: int = column("points missing", pool=total, form="d")
     """Points without a value: left as a gap."""
     swapped: int = column("frames with left and right exchanged, put back", pool=total, form="d")
-    """Frames with left and right exchanged: put back."""
     outliers: int = column("points in wrong places, left out", pool=total, form="d")
     """Points far from their running median, and tips of antennae that are far too long: left as a
     gap."""

@@ -31,7 +31,6 @@ class TrackRow(Handled, Seen):
     """
 
     seed: int
-    """Seed of the run."""
     trial: int
     """Number of the animal."""
     file: str
@@ -77,11 +76,8 @@ class Unseen:
     """An antenna that was known in hardly any frame."""
 
     file: str
-    """Name of the file."""
     animal: str
-    """What the file calls the animal; empty if it has one alone."""
     side: str
-    """`left` or `right`."""
     frames: int
     """Frames of the animal."""
     known: int
@@ -99,7 +95,6 @@ class TracksResult:
     schema: int = 1
     command: str = "tracks"
     seed: int
-    """Seed of all chance."""
     source: Literal["files", "synthetic"]
     """`files`, or `synthetic` for the synthetic animal."""
     synthetic_shapes: str | None
@@ -113,7 +108,6 @@ class TracksResult:
     animals: int = column("animals", form="d")
     """Animals, each a trial."""
     skipped: int = column("animals known in too few frames, left out", form="d")
-    """Animals left out, as they were known in too few frames."""
     handled: Handled = column()
     """Defects, over all animals."""
     unseen: list[Unseen]

@@ -21,8 +21,8 @@ from antennate.experiments.tracks.result import Seen, TrackRow, TracksResult, Un
 from antennate.experiments.tracks.track import Track
 from antennate.messages import shortened
 from antennate.studies.columns import frame, mean, pooled
-from antennate.studies.experiment import OnRow, OnStep, no_row, no_step
 from antennate.studies.pool import Workers
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.types import Ints
 
 _RATES_AGREE = 0.02

@@ -19,7 +19,8 @@ from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
-from antennate.studies.experiment import Experiment, Trial, Trials
+from antennate.studies.experiment import Experiment
+from antennate.studies.trials import Trial, Trials
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Controller
 

@@ -142,9 +142,8 @@ class Measured:
     """What is measured of a walk, and of many: pooled over the valid ones."""
 
     stuck: int = column("stuck episodes", pool=total, form="d", least=0.0, default=0)
-    """Episodes of being stuck."""
     recovered: int = column("  recovered", pool=total, form="d", least=0.0, default=0)
-    """Those of them that ended by getting on."""
+    """Those of them after which the robot got on."""
     force_mean_n: float | None = column("contact force, mean", "N", mean, least=0.0, default=0.0)
     """Summed normal force on robot and antennae, mean over samples at 10 Hz."""
     force_max_n: float | None = column(
@@ -157,13 +156,11 @@ class Measured:
     spring_high_n_m: float | None = column(
         "spring torque, most", "N·mm", largest, scale=1e3, default=0.0
     )
-    """Largest torque of any antenna spring, of looks at every tick; the stop of its hinge bounds
-    it."""
+    """Largest torque of any antenna spring at any tick; the stop of its hinge bounds it."""
     spring_cycles: int | None = column(
         "  load cycles, most", pool=largest, form="d", least=0.0, default=0
     )
-    """Load cycles of that spring: half of its reversals that are larger than a tenth of its
-    range."""
+    """Load cycles of that spring: half of its reversals larger than a tenth of its range."""
 
 
 @tabular_row
@@ -171,9 +168,7 @@ class TrialResult(Measured):
     """One trial, a row of trials.csv."""
 
     seed: int
-    """Seed of the run."""
     trial: int
-    """Number of the trial from 0; with the seed it decides tunnel, start and disturbances."""
     controller: str
     """Name of the controller, with its readings if they are not its own."""
     outcome: Outcome
@@ -183,12 +178,11 @@ class TrialResult(Measured):
     )
     """Time to the exit; the limit for every failure."""
     limit_s: float = column("time limit", "s", form=".1f", least=0.0, default=TIME_LIMIT)
-    """Time limit of the trial."""
     progress_m: float = 0.0
     """How far the head came, within 0 and the length of the scene."""
     offset_m: float = column("off the middle", "m", form=".3f", least=0.0, default=math.nan)
     """Mean distance of the head from the centre line over the length that it came: each stretch of
-    5 cm counts alike, however long it took. None in a scene without one."""
+    5 cm counts alike, however long it took; empty in a scene without one."""
     share_forward: float = 0.0
     """Share of ticks in FORWARD; so `share_turn_l` and the others."""
     share_turn_l: float = 0.0
@@ -202,7 +196,6 @@ class TrialResult(Measured):
     overturned: bool = False
     """Whether the robot lies on its back at the end."""
     void_decisions: int = 0
-    """Decisions of a learned policy whose answer was no number, so that it held."""
     reason: str = ""
     """Why a trial is invalid, with the physics step."""
 

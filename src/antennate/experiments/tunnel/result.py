@@ -18,44 +18,25 @@ from antennate.studies.columns import (
     Frame,
     by,
     column,
-    count,
     mean,
+    percent,
     pooled,
-    share,
     tabular,
     total,
     valid,
 )
-from antennate.studies.statistics import PairedTest, wilson
+from antennate.studies.statistics import Outcomes, PairedTest
 from antennate.types import Floats
 
 
 @tabular
-class Ended:
+class Ended(Outcomes):
     """How the trials of a controller ended."""
 
-    trials: int = column("trials", form="d")
-    """Trials run."""
-    successes: int = column("successes", pool=count("outcome", "success"), form="d")
-    """Trials whose head crossed the exit from inside."""
-    success_share: float | None = column(
-        "  share", "%", share("outcome", "success"), form=".0f", scale=100.0
-    )
-    """Successes over valid trials; `null` without any."""
-    wilson95: Ends | None = wilson()
-    """Wilson's interval of that share."""
-    timeouts: int = column("out of time", pool=count("outcome", "timeout"), form="d")
-    """Trials that were not out within the time limit."""
-    left: int = column("left the scene", pool=count("outcome", "left"), form="d")
-    """Trials that left by another way than the exit."""
     overturned: int | None = column("overturned", form="d", default=None)
     """Robots on their backs; only where there are any, and then part of the sum of all trials."""
     fell: int | None = column("fell", form="d", default=None)
     """Robots that fell, likewise."""
-    invalid: int = column("invalid", form="d")
-    """Trials that say nothing; they do not count in what follows."""
-    first_reason: str | None
-    """Why the first of those is invalid; `null` if none is."""
     speed_m_s: float | None = column("speed over successes", "m/s", form=".3f", interval="speed_95")
     """Mean speed over successes, progress over time, and its interval by Student's t."""
     speed_95: Ends | None
@@ -66,22 +47,17 @@ class Ended:
     restricted_mean_time_s: float | None = column(
         "restricted mean time", "s", form=".1f", interval="restricted_mean_time_95"
     )
-    """Mean time with failures counted as the limit; its interval joins Wilson's of the failures
-    with Student's of the times. `null` where trials have limits of their own."""
+    """Mean time, a failure counted as the limit; `null` where trials have limits of their own."""
     restricted_mean_time_95: Ends | None
-    restricted_mean_share: float | None = column(
-        "restricted mean time",
-        "% of limit",
-        form=".1f",
-        scale=100.0,
-        interval="restricted_mean_share_95",
+    restricted_mean_share: float | None = percent(
+        "restricted mean time", "% of limit", form=".1f", interval="restricted_mean_share_95"
     )
-    """Mean of the shares of the limits that were used."""
+    """Mean time as a share of the limit of each trial, 1 for a failure."""
     restricted_mean_share_95: Ends | None
 
 
 def _of_time(label: str) -> Any:
-    return column(label, "% of time", mean, form=".1f", scale=100.0, least=0.0, most=1.0)
+    return percent(label, "% of time", mean, form=".1f", least=0.0, most=1.0)
 
 
 @tabular
@@ -89,15 +65,10 @@ class Shares:
     """Shares of the time in each maneuver, means over trials."""
 
     forward: float | None = _of_time("forward")
-    """FORWARD."""
     turn_l: float | None = _of_time("turn left")
-    """TURN_L."""
     turn_r: float | None = _of_time("turn right")
-    """TURN_R."""
     reverse: float | None = _of_time("reverse")
-    """REVERSE."""
     hold: float | None = _of_time("hold")
-    """HOLD."""
 
 
 @tabular
@@ -120,13 +91,8 @@ class ControllerSummary(Measured, Ended):
 class Pair(PairedTest):
     """Two controllers on the trials that are valid in both, the first minus the second."""
 
-    share_difference: float | None = column(
-        "difference",
-        "% of limit",
-        form="+.1f",
-        scale=100.0,
-        interval="share_difference_95",
-        default=None,
+    share_difference: float | None = percent(
+        "difference", "% of limit", form="+.1f", interval="share_difference_95", default=None
     )
     """Mean of restricted time as shares of the limit, in place of `time_difference_s` where trials
     have limits of their own."""
@@ -145,7 +111,6 @@ class TunnelResult:
     schema: int = 2
     command: str = "tunnel"
     seed: int
-    """Seed of the run."""
     scene: str
     """Name of the scene, or its MJCF file."""
     knows: list[str] | tuple[str, ...] = ()
@@ -155,7 +120,6 @@ class TunnelResult:
     length_m: float | None
     """Length of the centre line; `null` in a scene that is no tunnel."""
     interrupted: bool = False
-    """Whether the run was interrupted; the rest then speaks of the trials that had ended."""
     controllers: dict[str, ControllerSummary]
     """Each controller, by name; with other readings than its own as `closed@yoked`."""
     paired: dict[str, Pair]

@@ -31,9 +31,10 @@ from antennate.studies.columns import (
     tabular,
     valid,
 )
-from antennate.studies.experiment import Experiment, Found, OneByOne, Trials
-from antennate.studies.statistics import Discordance, mcnemar, wilson
+from antennate.studies.experiment import Experiment, Found
+from antennate.studies.statistics import Discordance, Matched, mcnemar, wilson
 from antennate.studies.tables import Table, few, successes
+from antennate.studies.trials import OneByOne, Trials
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +49,6 @@ class Passed:
     """How the trials of a profile ended, over a part of the travel."""
 
     trials: int = column("trials", form="d")
-    """Trials run."""
     successes: int = column("successes", pool=count("outcome", "success"), form="d")
     """Trials that passed."""
     wilson95: Ends | None = wilson()
@@ -70,7 +70,7 @@ class ProfileSummary(Measured, Passed):
 
 
 @tabular
-class Pair(Discordance):
+class Pair(Matched):
     """`descending` against another profile."""
 
     after_start: Discordance = column("after")
@@ -96,17 +96,15 @@ class WallResult:
     schema: int = 2
     command: str = "wall"
     seed: int
-    """Seed of the run."""
     gravity: str
-    """Way of gravity in the plane."""
+    """Direction of gravity in the plane."""
     start_m: float
     """Travel that the counts of `after_start` leave out."""
     profiles: dict[str, ProfileSummary]
-    """Each profile."""
     border: Border
     """The border of a jam."""
     paired: dict[str, Pair]
-    """`descending` against each other one, as `descending-stiff`."""
+    """`descending` against each other profile, as `descending-stiff`."""
 
 
 def summarise(config: WallConfig, rows: Frame) -> WallResult:
@@ -148,12 +146,12 @@ def _paired(by_profile: Mapping[str, Frame]) -> dict[str, Pair]:
             continue
         both = valid(first).merge(valid(rows), on="trial", suffixes=("", "_other"))
         if len(both):
-            whole, late = (_discordance(both, of) for of in ("outcome", "outcome_after_start"))
+            whole, late = (_matched(both, of) for of in ("outcome", "outcome_after_start"))
             tests[f"{REFERENCE}-{name}"] = Pair(**vars(whole), after_start=late)
     return tests
 
 
-def _discordance(both: Frame, outcome: str) -> Discordance:
+def _matched(both: Frame, outcome: str) -> Matched:
     return mcnemar((both[[outcome, f"{outcome}_other"]] == "success").to_numpy())
 
 

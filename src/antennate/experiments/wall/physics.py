@@ -94,9 +94,7 @@ class Measured:
     force_mean_n: float | None = column(
         "contact force, mean", "N", median, form=".3f", default=None
     )
-    """Contact force, mean."""
     force_max_n: float | None = column("contact force, largest", "N", largest, default=None)
-    """Largest contact force."""
     flex_max_deg: float | None = column("flex, largest", "deg", largest, form=".0f", default=None)
     """Largest flex under the flex sensor."""
     hinge_max_deg: float | None = column(
@@ -110,17 +108,13 @@ class WallTrial(Measured):
     """One trial, a row of trials.csv; what is measured is empty where it is invalid."""
 
     seed: int
-    """Seed of the run; with `trial` it decides all chance."""
     trial: int
-    """Number of the trial."""
     profile: str
-    """Springs of the antenna."""
     outcome: Outcome
     """Success, jam, slip or invalid, over the whole travel."""
     outcome_after_start: Outcome
     """The same without the start."""
     reason: str = ""
-    """Why it is invalid."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,8 @@
-"""What a scene is: the protocols, a base for scenes with a route, and the simplest of them."""
+"""What a scene is: the protocols, a base for scenes with a route, and the simplest of them.
+
+A scene is a class with `random` and `draw`. One of ours has its name in `sim/scenes/registry.py`;
+one of your own is given as FILE.py:CLASS (docs/scenes.md).
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,7 @@ from antennate.sim.scenes import geometry
 from antennate.types import Floats
 
 LEFT_BEHIND = 0.8
-"""Distance from the start, or from all walls, at which the robot has left [m]: its length and more.
-"""
+"""Distance outside of a scene at which the robot has left it [m]: more than the robot's length."""
 TIME_LIMIT = 100.0
 """Time after which a trial has failed, where its scene does not say another [s].
 
@@ -25,12 +28,12 @@ EXIT_HALF_WIDTH = 0.5
 
 
 class SceneInstance(Protocol):
-    """One drawn scene. Positions are in plan, x and y [m]; the floor at the start is at z = 0.
+    """One scene as chance has drawn it. Positions are seen from above, x and y [m].
 
     It may have more: `succeeded(head)`, see `exit`; `route`, corner points from the start to the
-    exit [m], shape (n, 2); `time_limit`, after which a trial has failed [s]; `top`, height of its
-    highest ground [m]; `ground`, that of the ground under the robot at the start [m]. The lowest
-    ground is at 0.
+    exit [m], shape (n, 2); `time_limit`, after which a trial has failed [s]; `ground`, height of
+    the ground under the robot at the start [m], and `top`, that of the highest ground [m], above
+    the lowest at z = 0. With `ground` a robot that falls or lies on its back ends the trial.
     """
 
     @property
@@ -47,8 +50,8 @@ class SceneInstance(Protocol):
     def exit(self) -> Floats:
         """Ends of the line that the head crosses at the exit [m], shape (2, 2).
 
-        The first is on the left of who goes out. A trial succeeds when the head crosses the line
-        outwards between them, unless the instance has a rule of its own: a method
+        The first is on the left of a robot that goes out. A trial succeeds when the head crosses
+        the line outwards between them, unless the instance has a rule of its own: a method
         `succeeded(head)` that says whether a head at this position, shape (2,), is past the exit.
         """
         ...
@@ -69,8 +72,8 @@ class SceneInstance(Protocol):
 class Scene(Protocol):
     """Draws instances. The same state of the generator gives the same instance.
 
-    A scene may change what differs between its trials: an attribute `variation`, a mapping of
-    fields of `VariationParams` to values.
+    A scene may set what chance changes from trial to trial: an attribute `variation`, a mapping
+    of fields of `VariationParams` to values.
     """
 
     @property
@@ -124,7 +127,7 @@ class Route:
         add_floor(spec)
 
     def progress(self, head: Floats) -> float:
-        """Arc length of the nearest point of the route [m]."""
+        """Arc length of the nearest point of the route [m], which goes on straight at its ends."""
         return geometry.progress(self.route, head)
 
     def left(self, head: Floats) -> bool:
