@@ -113,7 +113,7 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
 
 
 def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
-    return _episode(
+    return _ended(
         draw,
         outcome=row.outcome,
         time_s=row.time_s,
@@ -130,10 +130,10 @@ def lost(draw: Draw, reason: str) -> Episode:
     """The row of an episode whose process died, failed, or did not end."""
     config = tunnel_config(draw.scene, draw.controller, draw.seed)
     limit = time_limit_of(draw_scene(config, scene_of(config), draw.trial), config.time_limit)
-    return _episode(draw, outcome="invalid", time_s=limit, limit_s=limit, reason=reason)
+    return _ended(draw, outcome="invalid", time_s=limit, limit_s=limit, reason=reason)
 
 
-def _episode(draw: Draw, **ended: Any) -> Episode:
+def _ended(draw: Draw, **ended: Any) -> Episode:
     return Episode(
         controller=draw.controller,
         scene=draw.scene,
