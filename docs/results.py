@@ -46,7 +46,7 @@ WORDS = {
 def texts(kind: type, others: Iterable[type]) -> dict[str, str]:
     """What each field is, by name.
 
-    It is its docstring, else a word that all know, its label, or what it is in the first other
+    It is its docstring, else one of `WORDS`, else its label, else what it is in the first other
     class of the experiment.
     """
     found = dict[str, str]()
