@@ -13,6 +13,7 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,12 +23,13 @@ from antennate.control.gait import DIRECTION, STEER, targets
 from antennate.control.kind import ControllerKind, all_but
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE
 from antennate.errors import ConfigError
-from antennate.mechanics.twist import Wave
 from antennate.params.control import ControlParams, SearchParams
 from antennate.params.gaits import GaitParams
-from antennate.robots.mechanics import cycles
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
+
+if TYPE_CHECKING:
+    from antennate.mechanics.twist import Wave
 
 NUMBER_RATE = 0.25
 """Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
@@ -41,6 +43,9 @@ _SIZES = ("reverse_time", "reverse_most", "turn_time", "lost_turn", "return_time
 @lru_cache
 def _speeds(robot: str, frequency: float, *waves: Wave) -> tuple[Floats, Floats]:
     """Speed [m/s] and rate of yaw [rad/s] of body waves on a robot, which is given as JSON."""
+    from antennate.mechanics.twist import Wave  # only where the model is asked
+    from antennate.robots.mechanics import cycles
+
     columns = (np.array(part, float) for part in zip(*waves, strict=True))
     gait = GaitParams(frequency=frequency)
     walked = cycles(RobotSpec.model_validate_json(robot), gait, Wave(*columns))
@@ -67,6 +72,8 @@ class TwoGaits:
     """
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
+        from antennate.mechanics.twist import Wave  # only where the model is asked
+
         if robot.legs.kind != "rolling":
             raise ConfigError("expected a robot with rolling legs, found lifting ones")
         gait, own, most = control.gait, control.geometric, robot.yaw_limit

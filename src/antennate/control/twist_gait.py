@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antennate.control.gait import targets
-from antennate.mechanics.twist import TwistMap
 from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
+
+if TYPE_CHECKING:
+    from antennate.mechanics.twist import TwistMap
 
 AMPLITUDE_RATE = 0.5
 """Largest change of the amplitude [rad/s]; a second from legs alone to the largest wave."""

@@ -12,7 +12,6 @@ from antennate import checks, experiments
 from antennate.control.registry import CONTROLLERS, KINDS, ControllerFactory
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
-from antennate.notebook import html
 from antennate.params.base import Params, from_values
 from antennate.studies.columns import content, frame
 from antennate.studies.engines import LOCAL, Device, make_engine
@@ -53,6 +52,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         """A sentence, the first table and the first figure, for a notebook."""
+        from antennate.notebook import html  # only in a notebook
+
         tables, figures = self.experiment.tables(self.found), self.figures()
         table = tables[0] if tables else Table("", (), ())
         first = next(iter(self.experiment.view.ordered(figures)), "")

@@ -8,7 +8,6 @@ from typing import Any
 
 from antennate.errors import ConfigError
 from antennate.messages import shown
-from antennate.studies.submitted import Submitted
 from antennate.studies.work import Call, Engine, processor
 
 LOCAL = "local"
@@ -54,6 +53,8 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
         raise ConfigError(
             f"engine: expected a name or an object with submit, found {type(name).__name__}"
         )
+    from antennate.studies.submitted import Submitted  # only where workers are elsewhere
+
     return Submitted("executor", name.submit)
 
 

@@ -12,14 +12,16 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from antennate.errors import WorkerError
 from antennate.studies.formats import decoded, encoded
-from antennate.studies.processes import Processes
 from antennate.studies.sending import IMPORTING
 from antennate.studies.store import Store, key_of
 from antennate.studies.work import Call, Engine, Failure, Here, Work
+
+if TYPE_CHECKING:
+    from antennate.studies.processes import Processes
 
 Result = TypeVar("Result")
 TIMEOUT = 3600.0
@@ -79,6 +81,8 @@ class Workers:
     @contextlib.contextmanager
     def stay(self) -> Iterator[Workers]:
         """The same, whose processes of this machine serve one call after the other."""
+        from antennate.studies.processes import Processes  # only where there are some
+
         staying = Processes(stay=True)
         try:
             yield replace(self, _staying=staying)
@@ -91,6 +95,8 @@ class Workers:
             return self.engine
         if not self.apart and self.timeout is None and (self.count == 1 or parts <= 1):
             return Here()
+        from antennate.studies.processes import Processes  # only where there are some
+
         return self._staying or Processes()
 
     def mine(self, place: int) -> bool:
