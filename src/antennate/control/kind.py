@@ -24,7 +24,7 @@ ControllerFactory = Callable[[ControlParams, RobotSpec, int], Controller]
 
 Reads = tuple[str, ...] | Callable[[ControlParams, Collection[str]], tuple[str, ...]]
 """Parameters of the control, dotted, or groups of them; a function where they depend on others, and
-on what a simulation tells the controller."""
+on the knowledge, such as the side of a turn, that a simulation may give to a controller."""
 
 _COLOUR = re.compile("(#[0-9A-Fa-f]{6})?").fullmatch
 _SWEEP = tuple(f"gait.antenna_{name}" for name in ("mean", "amplitude", "frequency"))
@@ -41,8 +41,8 @@ _SHARED = tuple(
 class ControllerKind:
     """Controller with a name. The module of a controller lists its kinds as a tuple `KINDS`.
 
-    One in a file of your own is taken, too. Of that one `about`, `colour` and `line` are used; it
-    may read all parameters, and its controller has `needs` itself if it has some.
+    One in a file of your own is taken, too. Its `reads` and `needs` are not used: it may read all
+    parameters, and what it needs is asked of its controller (docs/controllers.md).
 
     Attributes:
         name: Name, as commands take it.

@@ -23,8 +23,8 @@ from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.types import Floats
 
 Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
-"""How a trial ends. The judge says all but `invalid`, which says nothing of the controller's walk:
-the physics or the controller failed, or the worker process died."""
+"""How a trial ends. The judge says all but `invalid`, which is that of a trial without an end: the
+physics became invalid, the controller raised an exception, or the worker process died."""
 LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 FALL = 0.175
@@ -54,8 +54,8 @@ class Judge:
     """Judge of one episode: says how it ends, from one look at the robot to the next.
 
     The head succeeds when it has crossed the exit between its ends more often outwards than
-    inwards. A scene with a rule of its own, `succeeded(head)`, is asked instead. In a scene that
-    has `ground`, which is not flat, a robot on its back ends the episode, and so does a fall.
+    inwards. A scene with a rule of its own, `succeeded(head)`, is asked instead. In a scene
+    that has `ground` a robot on its back ends the episode, and so does a fall.
 
     Args:
         scene: The scene of the episode.
@@ -136,7 +136,7 @@ def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
 
 
 def require_times(time: float, limit: float, close: float = 0.0) -> None:
-    """Check that a time and a time limit [s] can stand in a row; `close` is allowed beyond it [s].
+    """Check a time and a time limit of a table [s]; the time may exceed the limit by `close` [s].
 
     Raises:
         ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.

@@ -78,8 +78,8 @@ class Found(Generic[Config, Result, Drawn]):
         drawn: What figures draw of a trial, by its condition and its number.
         interrupted: Whether trials are missing.
         row: Class of the rows.
-        summarise: summarise(config, rows) -> result, an object that has `interrupted` if a run of
-            these trials may end early (`Trials.interruptible`).
+        summarise: summarise(config, frame) -> result, an object. It has a field `interrupted` if
+            the trials are `interruptible`: a person may then end the run before the last one.
     """
 
     config: Config
@@ -107,18 +107,18 @@ class Experiment(Generic[Config, Out]):
     Attributes:
         name: Name of the command.
         description: What `--help` says; its first sentence is the summary in the list of commands.
-        config: Its configuration.
+        config: Class of its configuration.
         run: run(config, workers, on_step, on_row) -> outcome, which does not depend on the number
-            of worker processes. An experiment with `logs` is also given a folder `logs`, one that
-            can be `shown` a page `view`, with which all runs in this process.
+            of worker processes. If the experiment has `logs`, run may also get a folder, `logs`; if
+            it can be `shown`, a page, `view`: then all runs in this process.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
         result: Class of its results, a dataclass; without one they are dictionaries.
         row: Class of its rows, a dataclass; those of `trials` have `trial` and the condition.
         figures: Figures of an outcome by name.
         files: Further files of an outcome by name.
-        names: names(config) -> the names of those files: where the folder holds such a file that
-            no run made, it is refused before the run.
+        names: names(config) -> the names of those files. A folder that holds one of them, not
+            listed in its files.txt, is refused before the run.
         settled: settled(config, folder) -> the configuration with its seed drawn, if it asks for a
             drawn one; `folder` holds the run that goes on and has drawn it, None for a new run.
         check: Raises if a configuration cannot be run; called before anything is written.
@@ -131,15 +131,15 @@ class Experiment(Generic[Config, Out]):
         body: body(result, images) -> HTML that stands in its report in place of tables and figures.
         trials: Its trials one by one, for studies (`antennate study`, which varies parameters);
             without them a study runs it as a whole.
-        continued: Whether a run goes on with its folder without --resume, and keeps its trials.
+        continued: Whether a run goes on with what its folder holds, without --resume.
         explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
         on_workers: Whether it runs trials on workers; without them there is no engine to choose.
         anywhere: Whether workers may be on other machines.
         foretold: foretold(config, workers) -> one line on how long it will take, said before the
             first trial; empty for nothing.
-        tasks: tasks(config) -> a name for each task of `run`, the same with more trials, so that a
-            run can go on with more; None if the list of `trials` is that, or no run goes on.
+        tasks: tasks(config) -> an identity for each task of `run`. Tasks that stay the same with
+            more trials have the same, so a finished run can go on with more. None: that of `trials`.
         in_shards: Whether its trials are known from the start, so that several machines can each
             run a share of them, a shard.
         undivided: undivided(config) -> why shards cannot divide its trials; empty if they can.

@@ -22,7 +22,7 @@ LEFT_BEHIND = 0.8
 TIME_LIMIT = 100.0
 """Time after which a trial has failed, where its scene does not say another [s].
 
-Paper: 0.04 m/s without feedback; half of that on 2 m."""
+Twice as long as 2 m take at 0.04 m/s, the paper's speed without feedback."""
 EXIT_HALF_WIDTH = 0.5
 """Half the width of an exit that no walls bound [m]."""
 
