@@ -139,7 +139,7 @@ class Experiment(Generic[Config, Out]):
         foretold: foretold(config, workers) -> one line on how long it will take, said before the
             first trial; empty for nothing.
         tasks: tasks(config) -> an identity for each task of `run`. Tasks that stay the same with
-            more trials have the same, so a finished run can go on with more. None: that of `trials`.
+            more trials have the same, so a finished run can take more. None: that of `trials`.
         in_shards: Whether its trials are known from the start, so that several machines can each
             run a share of them, a shard.
         undivided: undivided(config) -> why shards cannot divide its trials; empty if they can.
