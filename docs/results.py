@@ -84,6 +84,7 @@ def table(kind: type, without: Collection[str], others: Iterable[type], pooled: 
         for each in columns(kind)
         if each.unit and each.scale == 1.0
     }
+    hints = get_type_hints(kind)
     for field in fields(kind):
         if field.name in without or field.name in beside.values():
             continue
@@ -96,7 +97,8 @@ def table(kind: type, without: Collection[str], others: Iterable[type], pooled: 
         pool = pools.get(field.name)
         if pooled and pool in POOLS and not text.endswith(f", {pool}"):
             text += f" ({pool})"
-        of_name = "" if field.name.startswith("per_") else named(field.name).unit
+        no_unit = field.name.startswith("per_") or hints[field.name] is bool
+        of_name = "" if no_unit else named(field.name).unit
         unit = units.get(field.name, of_name)
         lines.append(row(", ".join(f"`{key}`" for key in keys), unit, text))
     return "\n".join([heads("key", "unit", "meaning"), *lines]) + "\n"
@@ -128,14 +130,23 @@ def tables(kind: type, name: str, seen: dict[type, str], rows: list[type]) -> It
         yield table(kind, hidden, [*rows, *seen])
     for where, keys in told:
         yield f"Keys as in `{where}`: {keys}.\n"
+    same: dict[str, list[str]] = {}
     for name, hint in get_type_hints(kind).items():
         parts = list(parts_of(hint))
         for how, inner in parts:
             wider = [kind, *(other for _, other in parts if other is not inner)]
-            if inner in seen or any(issubclass(each, inner) for each in wider):
+            if inner in seen:
+                same.setdefault(seen[inner], []).append(name)
+                continue
+            if any(issubclass(each, inner) for each in wider):
+                keys = ", ".join(f"`{field.name}`" for field in fields(inner))
+                yield f"{how} `{name}`: as above, {keys}.\n"
                 continue
             yield f"{how} `{name}`: {' '.join((inner.__doc__ or '').split())}\n"
             yield from tables(inner, name, seen, rows)
+    for where, names in same.items():
+        if others := ", ".join(f"`{name}`" for name in names if name != where):
+            yield f"The keys of {others} are those of `{where}`.\n"
 
 
 def results(name: str) -> str:
@@ -155,7 +166,8 @@ def results(name: str) -> str:
             parts += ["A row of `trials.csv`:\n", table(experiment.row, known, seen, pooled=False)]
             said = "And of this trial what `{}` has of many: {}.\n"
         parts += [said.format(*told) for told in keys_above(known, seen)]
-    return "\n".join(parts)
+    again = [i for i, part in enumerate(parts) if part in parts[:i] and part.startswith("The keys")]
+    return "\n".join(part for i, part in enumerate(parts) if i not in again)
 
 
 def main() -> None:

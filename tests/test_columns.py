@@ -8,11 +8,13 @@ from dataclasses import asdict
 import pytest
 
 from antennate import experiments
+from antennate.errors import ConfigError
 from antennate.studies.columns import (
     Column,
     Ends,
     by,
     column,
+    column_of,
     columns,
     content,
     count,
@@ -156,3 +158,25 @@ def test_every_column_of_the_wall_is_said_once() -> None:
     assert experiment.row is not None
     of_row = {each.name: each for each in columns(experiment.row)}
     assert of_row["longest_stick_mm"].title == "longest stick [mm]"
+
+
+def test_what_cannot_be_pooled_is_told_by_class_and_field() -> None:
+    @tabular
+    class Odd:
+        way_m: float | None = column("way", pool=mean)
+
+    for rows, said in (
+        (frame([{"way_m": "far"}]), r"Odd\.way_m: expected rows with numbers in a column way_m"),
+        (frame([{"other": 1.0}]), r"Odd\.way_m: .* found .*way_m"),
+    ):
+        with pytest.raises(ConfigError, match=said):
+            pooled(Odd, rows)
+    with pytest.raises(ConfigError, match=r"Thrown: expected a column, one of .*, found wy"):
+        column_of(Thrown, "wy")
+
+
+def test_whole_numbers_stay_whole_where_some_are_not_known() -> None:
+    rows = frame([{"x": 3}, {"x": None}])
+    assert [repr(pool(rows, "x")) for pool in (largest, smallest, total)] == ["3"] * 3
+    assert shown(3.0, "d") == "3"
+    assert list(by(frame([{"c": None, "x": 1}, {"c": "a", "x": 2}]), "c")) != ["a"]

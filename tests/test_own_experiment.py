@@ -117,7 +117,7 @@ def test_numbers_of_numpy_are_kept_and_other_objects_refused(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = DICE.replace("eyes=int(n)", "eyes=n").replace("schema: int = 1", "a: Any = 1")
-    text = text.replace("frame(rows))", "frame(rows), a=np.eye(1))")
+    text = text.replace("frame(rows, Row))", "frame(rows, Row), a=np.eye(1))")
     (dice / "site" / "dice_study.py").write_text(
         f"{text}\n".replace("import numpy", "from typing import Any\nimport numpy", 1)
     )

@@ -31,7 +31,6 @@ from antennate.experiments import FITTED, fitted
 from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import command_words, shortened, typed
 from antennate.params.base import Params
-from antennate.studies.columns import content
 from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
@@ -353,7 +352,7 @@ def _end(
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
     found, title = outcome.result(), experiment.view.title
-    result = content(found)
+    result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
     if argv is not None and interrupted and run.store is not None and run.store.holds_trials:

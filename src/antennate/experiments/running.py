@@ -221,7 +221,7 @@ def keep(
     """
     for name, text in experiment.files(outcome).items():
         directory.write(name, text)
-    directory.finish(content(outcome.result()), outcome.rows)
+    directory.finish(experiment.content(outcome.result()), outcome.rows)
     if figures:
         directory.write_figures(experiment.figures(outcome))
 

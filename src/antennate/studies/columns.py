@@ -21,9 +21,21 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from inspect import get_annotations
-from typing import Any, TypeVar, cast, dataclass_transform, get_type_hints
+from types import NoneType, UnionType
+from typing import (
+    Any,
+    TypeVar,
+    Union,
+    cast,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
+
+from antennate.errors import ConfigError, in_one_line
 
 NONE = "-"
 """Shown where there is no number."""
@@ -54,6 +66,7 @@ _UNITS = {
     "mm": "mm",
     "m_s": "m/s",
     "deg": "deg",
+    "deg_per_cycle": "deg",
     "n": "N",
     "n_mm": "N·mm",
     "n_mm_per_deg": "N·mm/deg",
@@ -163,8 +176,17 @@ def tabular_row(kind: type[Kind]) -> type[Kind]:
 
 
 def column_of(kind: type, name: str) -> Column:
-    """The column of this name."""
-    return next(each for each in columns(kind) if each.name == name)
+    """The column of this name.
+
+    Raises:
+        ConfigError: The class has none.
+    """
+    found = {each.name: each for each in columns(kind)}
+    if name not in found:
+        raise ConfigError(
+            f"{kind.__name__}: expected a column, one of {', '.join(found)}, found {name}"
+        )
+    return found[name]
 
 
 @functools.cache
@@ -189,10 +211,19 @@ def _of(inner: Column, outer: Column) -> str:
 @functools.cache
 def _declared(kind: type) -> tuple[tuple[str, Column | None, type | None], ...]:
     """Name and column of each field, and the class of its parts where it has some."""
-    hints = get_type_hints(kind)
+    try:
+        hints = get_type_hints(kind)
+    except NameError as error:
+        raise ConfigError(
+            f"{kind.__name__}: expected types that are known when the program runs, found "
+            f"{error}; import them outside of TYPE_CHECKING, and define classes in a module"
+        ) from None
     found: list[tuple[str, Column | None, type | None]] = []
     for each in fields(cast("Any", kind)):
         hint: Any = hints[each.name]
+        if get_origin(hint) in (Union, UnionType):  # a part that may be missing
+            (hint, *others) = [of for of in get_args(hint) if of is not NoneType]
+            hint = None if others else hint
         part: Any = hint if is_dataclass(hint) else None
         found.append((each.name, each.metadata.get(_KEY), part))
     return tuple(found)
@@ -216,15 +247,24 @@ def frame(rows: Iterable[Any], kind: type | None = None) -> Frame:
 
     some = list(rows)
     if kind is None and some and isinstance(some[0], Mapping):
-        return pandas.DataFrame({name: [row[name] for row in some] for name in some[0]})
+        return pandas.DataFrame({name: _series([row[name] for row in some]) for name in some[0]})
     kind = kind or (type(some[0]) if some else None)
     names = [each.name for each in fields(kind)] if kind else []
-    return pandas.DataFrame({name: [getattr(row, name) for row in some] for name in names})
+    return pandas.DataFrame({name: _series([getattr(row, name) for row in some]) for name in names})
+
+
+def _series(values: list[Any]) -> Any:
+    """Values of a column; whole numbers of which some are not known stay whole."""
+    from pandas import Series
+
+    known = [value for value in values if value is not None]
+    whole = len(known) < len(values) and known and all(type(value) is int for value in known)
+    return Series(values, dtype=object) if whole else values
 
 
 def by(rows: Frame, name: str, values: Iterable[Any] = ()) -> dict[Any, Frame]:
     """Rows by their value in a column: these values first, even without rows, then all others."""
-    groups = dict(iter(rows.groupby(name, sort=False))) if len(rows) else {}
+    groups = dict(iter(rows.groupby(name, sort=False, dropna=False))) if len(rows) else {}
     return {value: groups.get(value, rows.iloc[:0]) for value in dict.fromkeys([*values, *groups])}
 
 
@@ -242,6 +282,9 @@ def pooled(kind: type[Kind], rows: Frame, **given: Any) -> Kind:
         kind: Class of the summary.
         rows: Rows with an `outcome`, or rows that are all valid.
         given: Fields that are computed elsewhere.
+
+    Raises:
+        ConfigError: A field cannot be made of these rows, and is not given.
     """
     sound = valid(rows) if "outcome" in rows else rows
     lost = rows.drop(sound.index)
@@ -263,8 +306,17 @@ def _fill(kind: type[Kind], rows: Frame, given: Mapping[str, Any], path: str) ->
         if part is not None:
             values[name] = _fill(part, rows, {}, f"{path}{name}_")
         elif said.pool is not None:
-            values[name] = said.pool(rows, f"{path}{name}")
-    return kind(**values)
+            try:
+                values[name] = said.pool(rows, f"{path}{name}")
+            except (KeyError, TypeError, ValueError) as error:
+                raise ConfigError(
+                    f"{kind.__name__}.{name}: expected rows with numbers in a column "
+                    f"{path}{name}, found {in_one_line(error)}"
+                ) from error
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise ConfigError(f"{kind.__name__}: expected a pool or a value, found {error}") from None
 
 
 def _known(values: Any) -> Any:
@@ -320,14 +372,21 @@ def typed(kind: type[Kind], data: Any) -> Kind:
     Raises:
         ValueError: It is not of this class: another version wrote it, or it is damaged.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     try:
-        return TypeAdapter(kind).validate_python(data)
+        return _adapter(kind).validate_python(data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "all of it"
         raise ValueError(f"{where}: {first['msg'].lower()}") from None
+
+
+@functools.cache
+def _adapter(kind: type) -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ") -> str:
@@ -345,5 +404,5 @@ def shown(value: Any, form: str = ".2f", scale: float = 1.0, join: str = " to ")
 
 def _written(value: Any, form: str) -> str:
     """A number in digits; what rounds to zero has no sign."""
-    text = format(value, form)
+    text = format(round(value) if form.endswith("d") else value, form)
     return text if text.strip("-0.") else text.lstrip("-")

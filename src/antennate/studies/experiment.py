@@ -18,13 +18,16 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from antennate.studies.columns import Frame, frame, typed
+from antennate.errors import ConfigError
+from antennate.studies.columns import Frame, content, frame, typed
+from antennate.studies.formats import strict
 from antennate.studies.pool import Workers
 from antennate.studies.report import View
 from antennate.studies.tables import Table
@@ -94,10 +97,14 @@ class Found(Generic[Config, Result, Drawn]):
         """The rows as a pandas DataFrame."""
         return frame(self.rows, self.row)
 
-    def result(self) -> Result:
-        """What they come to; `interrupted` is true in it if trials are missing."""
+    @functools.cached_property
+    def _result(self) -> Any:
         found: Any = self.summarise(self.config, self.frame)
         return replace(found, interrupted=True) if self.interrupted else found
+
+    def result(self) -> Result:
+        """What they come to; `interrupted` is true in it if trials are missing."""
+        return self._result
 
 
 @dataclass(frozen=True)
@@ -195,6 +202,34 @@ class Experiment(Generic[Config, Out]):
         """
         return data if self.result is None else typed(self.result, data)
 
+    def content(self, found: Any) -> dict[str, Any]:
+        """What result.json holds of a result.
+
+        Raises:
+            ConfigError: The result is not what the experiment says, so that none could read it.
+        """
+        if self.result is None and not isinstance(found, dict):
+            raise ConfigError(
+                f"{self.name}: expected a dictionary as result, or its class as `result` of the "
+                f"experiment, found {type(found).__name__} without it"
+            )
+        if self.result is None:
+            return found
+        if not isinstance(found, self.result):
+            raise ConfigError(
+                f"{self.name}: expected a result of the class {self.result.__name__}, found "
+                f"{type(found).__name__}"
+            )
+        held = content(found)
+        try:
+            self.read(strict(held))
+        except ValueError as error:
+            raise ConfigError(
+                f"{self.name}: expected values of the types that {self.result.__name__} says, "
+                f"found {error}; what may be missing is `float | None`"
+            ) from None
+        return held
+
     @property
     def grows(self) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
         """`tasks` of a configuration read from JSON; None if no run goes on with more trials."""
@@ -216,10 +251,11 @@ class Experiment(Generic[Config, Out]):
         """An experiment with a folder of its own: a package that has its name and describes it.
 
         `module` is the `__name__` of a module in the folder. If `figures` is not given, it is the
-        function `figures(outcome)` of the module `figure` beside it, imported when it is needed.
+        function `figures(outcome)` of the module `figure` beside it, imported when it is needed;
+        without that module there are none.
         """
         folder = module.rpartition(".")[0]
-        if "figures" not in more:
+        if "figures" not in more and importlib.util.find_spec(f"{folder}.figure"):
             more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
                 outcome
             )
@@ -244,7 +280,16 @@ class Experiment(Generic[Config, Out]):
         """An experiment with a folder whose run is its trials, which `summarise` makes a result of.
 
         Arguments are those of `of_folder` and of `Found`.
+
+        Raises:
+            ConfigError: A run may end early, and the result cannot say so.
         """
+        result = more.get("result")
+        if trials.interruptible and not hasattr(result, "interrupted"):
+            raise ConfigError(
+                f"{module}: expected a class with a field `interrupted = False` as `result` beside "
+                f"interruptible trials, found {getattr(result, '__name__', result)}"
+            )
 
         def run(
             config: Config,

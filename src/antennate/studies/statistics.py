@@ -330,7 +330,7 @@ class PairedTest(Matched):
     time_difference_s: float | None = column(
         "difference", "s", form="+.1f", interval="time_difference_95", default=None
     )
-    """Mean of restricted time, first minus second, and its interval, see `difference95`."""
+    """Mean of restricted time, first minus second, and its interval."""
     time_difference_95: Ends | None = None
     wilcoxon_p: float | None = column("Wilcoxon p", form=".3g")
     """Two-sided signed-rank test on restricted times, see `signed_rank`; `null` with one trial."""

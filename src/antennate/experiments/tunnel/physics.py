@@ -7,7 +7,6 @@ the episode ends, recovered, with the next such gain.
 
 from __future__ import annotations
 
-import math
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -180,7 +179,7 @@ class TrialResult(Measured):
     limit_s: float = column("time limit", "s", form=".1f", least=0.0, default=TIME_LIMIT)
     progress_m: float = 0.0
     """How far the head came, within 0 and the length of the scene."""
-    offset_m: float = column("off the middle", "m", form=".3f", least=0.0, default=math.nan)
+    offset_m: float | None = column("off the middle", "m", form=".3f", least=0.0, default=None)
     """Mean distance of the head from the centre line over the length that it came: each stretch of
     5 cm counts alike, however long it took; empty in a scene without one."""
     share_forward: float = 0.0
@@ -332,7 +331,7 @@ class TrialMonitor:
             force_mean_n=round(float(forces.mean()), 6),
             force_max_n=round(float(forces.max()), 6),
             limit_s=self.time_limit,
-            offset_m=round(float(np.mean(offsets)), 6) if offsets else math.nan,
+            offset_m=round(float(np.mean(offsets)), 6) if offsets else None,
             spring_low_n_m=round(load.low, 9),
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,

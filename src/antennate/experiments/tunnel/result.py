@@ -113,7 +113,7 @@ class TunnelResult:
     seed: int
     scene: str
     """Name of the scene, or its MJCF file."""
-    knows: list[str] | tuple[str, ...] = ()
+    knows: tuple[str, ...] = ()
     """What the simulation gave to the controllers."""
     time_limit_s: float | None
     """Time after which a trial has failed; `null` where each has its own."""
