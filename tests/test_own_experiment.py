@@ -113,6 +113,27 @@ def test_tables_and_a_sentence_of_another_form_are_one_line(
     assert len(RunDirectory.open(dice / "run").rows()) == 2
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("    result=Result,\n", "", "its class as `result` of the experiment, found Result"),
+        ("eyes: float | None =", "eyes: str =", "that Result says, found eyes: input should"),
+        ("frame(rows, Row)))", "frame(rows, Row), eyes=[]))", "found eyes: input should be"),
+    ],
+)
+def test_a_result_that_is_not_of_its_class_is_one_line(
+    old: str, new: str, told: str, dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It could not be read again. The rows are kept."""
+    assert old in DICE
+    (dice / "site" / "dice_study.py").write_text(DICE.replace(old, new))
+    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert "Traceback" not in err
+    assert len(RunDirectory.open(dice / "run").rows()) == 2
+
+
 def test_numbers_of_numpy_are_kept_and_other_objects_refused(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
