@@ -225,21 +225,20 @@ def carry_out(
             view.results = str(run.path)
         films = options.video_trial if options.video else None
         run.require_free(names_of(experiment, config, not options.no_figures, films))
-        run.keeps_store = experiment.on_workers
-        workers = replace(workers, store=run.store, shared=environment(kind, config))
+        run.keeps_trials = experiment.on_workers
+        workers = replace(workers, trials=run.trials, shared=environment(kind, config))
         try:
-            if shards and run.store is not None:
-                run.store.take(shards.records, shards.processors)
+            if shards and run.trials is not None:
+                run.trials.take(shards.records, shards.processors)
             outcome = _outcome(experiment, config, options, workers, run, view)
         except KeyboardInterrupt:
-            if shards is None and run.store is not None and run.store.holds_trials:
+            if shards is None and run.can_go_on:
                 again = _go_on(experiment.name, argv, run.path)
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
             raise
         except (LogError, OutputError, WorkerError):
-            if shards:
-                run.discard()
-            run.keep_logs()
+            if run.made(LOGS, ".mcap"):
+                run.keep()
             raise
         except ShardEnd as end:
             part = {"shard": options.shard, "trials": end.count, "of": end.total}
@@ -356,7 +355,7 @@ def _end(
     result = content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
-    if argv is not None and interrupted and run.store is not None and run.store.holds_trials:
+    if argv is not None and interrupted and run.can_go_on:
         again = f"to go on: {_go_on(experiment.name, argv, run.path)}\n"
     if interrupted and (options.shard is not None or not outcome.rows):
         sys.stderr.write(again)
@@ -378,7 +377,7 @@ def _end(
             with progress("% of the films") as step:
                 write_films(experiment, config, options.video_trial, run, step, options.video_view)
         except KeyboardInterrupt:
-            run.keep_trials()
+            run.keeps_trials = True
             sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
             return INTERRUPTED
     return BAD_INPUT if experiment.failed(found) else OK

@@ -66,15 +66,6 @@ def sound_json(text: str) -> str:
     return text
 
 
-def from_lines(text: str) -> list[Any]:
-    """Rows that stand as JSON on a line each.
-
-    Raises:
-        ValueError: A line is no JSON.
-    """
-    return list(map(json.loads, text.splitlines()))
-
-
 def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
     """The content of a file, piece by piece.
 
@@ -100,15 +91,6 @@ def as_mapping(row: Any) -> Mapping[str, Any]:
     if not is_dataclass(row) or isinstance(row, type):
         raise ConfigError(f"row: expected a dictionary or a dataclass, found {shown(row)}")
     return asdict(row)
-
-
-def to_line(row: Mapping[str, Any]) -> str:
-    """A row as strict JSON on one line.
-
-    Raises:
-        BadInputError: It holds an object of another kind.
-    """
-    return json.dumps(strict(row), allow_nan=False, default=_refuse) + "\n"
 
 
 def _refuse(value: Any) -> Any:
@@ -324,6 +306,35 @@ def _class(name: str, packages: Collection[str]) -> type:
     return kind
 
 
+def plain_row(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A row as a table has it, from what `encoded` made of its dataclass."""
+    return {key: _plain(item) for key, item in data.items() if key != _KIND}
+
+
+def _plain(data: Any) -> Any:
+    """What `encoded` made, in numbers, texts, lists and dictionaries; no class need be known."""
+    if isinstance(data, list):
+        return [_plain(item) for item in data]
+    if not isinstance(data, dict):
+        return strict(data)
+    match data.get(_KIND):
+        case None:
+            return {key: _plain(item) for key, item in data.items()}
+        case "tuple":
+            return _plain(data["of"])
+        case "dict":
+            return {_plain(key): _plain(item) for key, item in data["of"]}
+        case "array" | "scalar":
+            return strict(decoded(data, ()))
+    if data.keys() == {_KIND, "value"}:
+        return data["value"]
+    return json.loads(data["fields"]) if data.keys() == {_KIND, "fields"} else plain_row(data)
+
+
 def dumped(value: Any) -> str:
-    """JSON on one line; NaN and infinities are kept."""
-    return json.dumps(value, separators=(",", ":"))
+    """JSON on one line; NaN and infinities are kept.
+
+    Raises:
+        BadInputError: It holds an object of another kind.
+    """
+    return json.dumps(value, separators=(",", ":"), default=_refuse)

@@ -29,14 +29,14 @@ from antennate.studies.run_files import (
     FIGURES,
     FILMS,
     LARGEST,
-    PARTIAL,
     REPORT,
     RESULT,
     TABLE,
     VERSIONS,
-    when_run,
 )
+from antennate.studies.run_times import when_run
 from antennate.studies.tables import FEW, Table
+from antennate.studies.trial_file import TRIALS
 
 _MOST_REASONS = 20
 """Most trials whose failure is quoted."""
@@ -122,7 +122,7 @@ def report(run: RunDirectory, view: View) -> str:
     Raises:
         BadInputError: The directory is damaged.
     """
-    ended = (run.path / TABLE).exists() and not (run.path / PARTIAL).exists()
+    ended = (run.path / TABLE).exists() and not (run.path / TRIALS).exists()
     result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>{page.escape(view.title)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
@@ -260,7 +260,7 @@ def _known_versions(run: RunDirectory) -> dict[str, str]:
 def _versions(run: RunDirectory) -> str:
     found = ", ".join(f"{name} {value}" for name, value in _known_versions(run).items())
     rows = len(run.rows())
-    kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else PARTIAL}." if rows else ""
+    kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else TRIALS}." if rows else ""
     return f"<h2>Versions</h2>{page.paragraphs(f'{found}.{kept}', 'muted')}" if found else ""
 
 
