@@ -238,12 +238,12 @@ def carry_out(
             raise
         except (LogError, OutputError, WorkerError):
             if run.made(LOGS, ".mcap"):
-                run.keep()
+                run.kept = True
             raise
         except ShardEnd as end:
             part = {"shard": options.shard, "trials": end.count, "of": end.total}
             run.write(SHARD, to_json(part))
-            run.keep()
+            run.kept = True
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
         say_by_hand(() if view is None else view.by_hand, run)

@@ -20,7 +20,7 @@ from antennate.params.base import Params
 from antennate.studies.identity import differences
 from antennate.studies.pool import places_of
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import SHARD, VERSIONS, read_as
+from antennate.studies.run_files import SHARD, read_as
 from antennate.studies.trial_file import TRIALS, read_trials
 
 DESCRIPTION = """\
@@ -92,7 +92,7 @@ def _gathered(shards: Sequence[Path]) -> Shards:
         if not (shard / SHARD).is_file():
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
         parts.append(read_as(shard / SHARD, _part))
-        RunDirectory.open(shard).text(VERSIONS)  # one that was cut is refused
+        RunDirectory.open(shard).versions()  # one that was cut is refused
         content = read_trials(shard / TRIALS)
         if identity is not None and (changes := differences(identity, content.identity)):
             raise BadInputError(

@@ -56,16 +56,6 @@ def to_json(value: Any) -> str:
     return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
 
 
-def sound_json(text: str) -> str:
-    """The text of a JSON file as it is.
-
-    Raises:
-        ValueError: It is no JSON.
-    """
-    json.loads(text)
-    return text
-
-
 def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
     """The content of a file, piece by piece.
 
@@ -248,12 +238,13 @@ def encoded(value: Any) -> Any:
     raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
 
 
-def decoded(data: Any, packages: Collection[str]) -> Any:
+def decoded(data: Any, packages: Collection[str] | None) -> Any:
     """Back from `encoded`.
 
     Args:
         data: What JSON held.
-        packages: Top-level packages whose classes may be named.
+        packages: Top-level packages whose classes may be named; None for what objects of any class
+            say in place of them.
 
     Raises:
         ValueError: It is nothing that `encoded` makes.
@@ -274,6 +265,8 @@ def decoded(data: Any, packages: Collection[str]) -> Any:
             flat = np.frombuffer(base64.b64decode(data["data"]), np.dtype(data["dtype"]))
             array = flat.reshape(data["shape"]).copy()
             return array if kind == "array" else array[()]
+        if packages is None:
+            return _plain(data)
         return _object(_class(kind, packages), data, packages)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"expected a result, found {error}") from None
@@ -308,24 +301,11 @@ def _class(name: str, packages: Collection[str]) -> type:
 
 def plain_row(data: Mapping[str, Any]) -> dict[str, Any]:
     """A row as a table has it, from what `encoded` made of its dataclass."""
-    return {key: _plain(item) for key, item in data.items() if key != _KIND}
+    return {key: strict(decoded(item, None)) for key, item in data.items() if key != _KIND}
 
 
-def _plain(data: Any) -> Any:
-    """What `encoded` made, in numbers, texts, lists and dictionaries; no class need be known."""
-    if isinstance(data, list):
-        return [_plain(item) for item in data]
-    if not isinstance(data, dict):
-        return strict(data)
-    match data.get(_KIND):
-        case None:
-            return {key: _plain(item) for key, item in data.items()}
-        case "tuple":
-            return _plain(data["of"])
-        case "dict":
-            return {_plain(key): _plain(item) for key, item in data["of"]}
-        case "array" | "scalar":
-            return strict(decoded(data, ()))
+def _plain(data: Mapping[str, Any]) -> Any:
+    """What an object of any class says: an enumeration, a model, or the fields of a dataclass."""
     if data.keys() == {_KIND, "value"}:
         return data["value"]
     return json.loads(data["fields"]) if data.keys() == {_KIND, "fields"} else plain_row(data)

@@ -32,7 +32,6 @@ from antennate.studies.run_files import (
     REPORT,
     RESULT,
     TABLE,
-    VERSIONS,
 )
 from antennate.studies.run_times import when_run
 from antennate.studies.tables import FEW, Table
@@ -253,12 +252,8 @@ def _table(text: str) -> dict[str, Any]:
         raise BadInputError(f"{CONFIG}: expected TOML, found: {error}") from None
 
 
-def _known_versions(run: RunDirectory) -> dict[str, str]:
-    return {name: str(value) for name, value in json.loads(run.text(VERSIONS) or "{}").items()}
-
-
 def _versions(run: RunDirectory) -> str:
-    found = ", ".join(f"{name} {value}" for name, value in _known_versions(run).items())
+    found = ", ".join(f"{name} {value}" for name, value in run.versions().items())
     rows = len(run.rows())
     kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else TRIALS}." if rows else ""
     return f"<h2>Versions</h2>{page.paragraphs(f'{found}.{kept}', 'muted')}" if found else ""
@@ -281,7 +276,7 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
         parts.append(page.block(_command(run, view), wrap=True))
     parts.append(page.paragraphs(FEW if any(FEW in text for text in sentences) else ""))
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
-    parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
+    parts.append(_differing("Versions", names, [run.versions() for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
     parts += [
         _pairs("Films", names, [_films(run) for run in runs], str, "pair"),

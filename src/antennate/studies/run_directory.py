@@ -26,7 +26,7 @@ from antennate import checks
 from antennate.errors import BadInputError, OutputError
 from antennate.files import writing_whole
 from antennate.params.base import Config, Params, read_file
-from antennate.studies import formats
+from antennate.studies import formats, run_files
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
@@ -38,19 +38,8 @@ from antennate.studies.run_files import (
     ROOM,
     TABLE,
     VERSIONS,
-    add_to_list,
-    files_of,
-    inside,
-    is_finished,
-    listed,
-    read_as,
-    remove_run,
-    sweep,
-    trim_list,
-    writing,
 )
 from antennate.studies.run_times import begun_line, with_end
-from antennate.studies.taking import before_this_version, give_back, goes_on, place_of, set_aside
 from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
@@ -67,6 +56,7 @@ class RunDirectory:
         trials: The file of its trials, None if there is none.
         keeps_trials: Whether that file stays when the run is complete.
         finished: Whether the run was finished already when it was taken.
+        kept: Whether it stays when the run ends, though it may hold no trials.
         untouched: Whether no file of such a run was missing so far.
         old: The new name of the folder that it replaces, None if it replaces none.
     """
@@ -76,7 +66,7 @@ class RunDirectory:
         self.keeps_trials = self.finished = self.untouched = False
         self._created: Sequence[Path] = ()
         self._lock: int | None = None
-        self._kept = self._complete = False
+        self.kept = self._complete = False
         self._described: dict[str, str] = {}
 
     @classmethod
@@ -111,16 +101,16 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it; or, to overwrite it, it holds no run.
         """
-        run, before = cls(place_of(command, path)), False
+        run, before = cls(run_files.place_of(command, path)), False
         place, resume = run.path, resume if identity is not None else None
-        with writing(place):
+        with run_files.writing(place):
             run._created = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
-            sweep(place)
-            run.old = set_aside(place) if overwrite and any(place.iterdir()) else None
+            run_files.sweep(place)
+            run.old = run_files.set_aside(place) if overwrite and any(place.iterdir()) else None
             try:
                 place.mkdir(exist_ok=True)
-                before = goes_on(place, resume)
+                before = run_files.goes_on(place, resume)
                 run._begin(identity, tasks, before, retry)
             except BaseException:
                 run._leave(stays=before)
@@ -133,16 +123,18 @@ class RunDirectory:
         """Begin a run in a folder that is there, or go on with the one before."""
         place = self.path
         if not before:
-            add_to_list(place, (TRIALS, ROOM))
+            run_files.add_to_list(place, (TRIALS, ROOM))
         self._lock = locked(place / FILES)
         if identity is not None:
             self.trials = TrialFile(place / TRIALS)
             self.trials.begin(identity, tasks if before else None)
             whole = not self.trials.damaged and self.trials.holds_all(tasks)
-            self.finished = before and not retry and whole and is_finished(place)
-            self.untouched = self._kept = self.finished
+            self.finished = before and not retry and whole and run_files.is_finished(place)
+            self.untouched = self.kept = self.finished
         if before and not self.finished:
-            remove_run(place, lambda file: file.parent.name != LOGS and file.name != TRIALS)
+            run_files.remove_run(
+                place, lambda file: file.parent.name != LOGS and file.name != TRIALS
+            )
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -162,7 +154,7 @@ class RunDirectory:
         Raises:
             BadInputError: There is none, or it is damaged.
         """
-        return read_as(self.path / RESULT, json.loads)
+        return run_files.read_as(self.path / RESULT, json.loads)
 
     def rows(self) -> list[dict[str, Any]]:
         """The finished trials: those of trials.csv, or of a run that was stopped.
@@ -171,8 +163,8 @@ class RunDirectory:
             BadInputError: The file is damaged, or is of a run that a version before did not end.
         """
         if (self.path / TABLE).exists():
-            return read_as(self.path / TABLE, formats.from_csv)
-        if old := before_this_version(self.path):
+            return run_files.read_as(self.path / TABLE, formats.from_csv)
+        if old := run_files.before_this_version(self.path):
             raise BadInputError(
                 f"{self.path}: expected {TRIALS}, found {old} of a version before; go on with that "
                 "version, which writes its result"
@@ -193,14 +185,23 @@ class RunDirectory:
         Raises:
             BadInputError: The file is damaged, or no file of a run has such a name.
         """
-        path = inside(self.path, name)
-        decode = formats.sound_json if name.endswith(".json") else str
-        return read_as(path, decode) if path.exists() else ""
+        path = run_files.inside(self.path, name)
+        return run_files.read_as(path, str) if path.exists() else ""
+
+    def versions(self) -> dict[str, str]:
+        """What versions.json says; empty if there is none.
+
+        Raises:
+            BadInputError: It is damaged.
+        """
+        path = self.path / VERSIONS
+        found = run_files.read_as(path, json.loads) if path.exists() else {}
+        return {name: str(value) for name, value in found.items()}
 
     def made(self, folder: str, ending: str) -> list[Path]:
         """Files of the run in a folder of it; of a run of an older version all that are there."""
         files = sorted((self.path / folder).glob(f"*{ending}"))
-        own = files_of(self.path)
+        own = run_files.files_of(self.path)
         return [file for file in files if file in own or not own]
 
     @property
@@ -235,7 +236,7 @@ class RunDirectory:
 
     def keep_room(self) -> None:
         """Keep room for the result, so that a disk that fills meanwhile does not cost it."""
-        with writing(self.path / ROOM):
+        with run_files.writing(self.path / ROOM):
             (self.path / ROOM).write_bytes(bytes(_KEPT_FREE))
 
     def append(self, row: Any) -> None:
@@ -264,7 +265,7 @@ class RunDirectory:
         checks.instance("rows", rows, Iterable)
         if table := formats.to_csv(formats.as_mapping(row) for row in rows):
             self.write(TABLE, table)
-        with writing(self.path / ROOM):
+        with run_files.writing(self.path / ROOM):
             (self.path / ROOM).unlink(missing_ok=True)
         for name, text in self._described.items():
             if not (self.path / name).exists():
@@ -274,12 +275,8 @@ class RunDirectory:
         self.write(RESULT, formats.to_json(result))
         if text := self.text(COMMAND):
             self.write(COMMAND, with_end(text))
-        self.keep()
+        self.kept = True
         self._complete = not result.get("interrupted") or self.trials is None
-
-    def keep(self) -> None:
-        """Let it stay when the run ends."""
-        self._kept = True
 
     def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
         """Put one file into the directory, whole or not at all; a long text comes in pieces.
@@ -291,11 +288,11 @@ class RunDirectory:
                 bytes nor pieces of text.
             OutputError: It cannot be written.
         """
-        path = inside(self.path, name)
+        path = run_files.inside(self.path, name)
         if self.finished and path.exists() and (name != REPORT or self.untouched):
             return
         self.untouched = False
-        with writing(path):
+        with run_files.writing(path):
             self.path.mkdir(exist_ok=True)
             self.claim_names([name])
             path.parent.mkdir(exist_ok=True)
@@ -310,8 +307,8 @@ class RunDirectory:
         """
         names = list(names)
         self.require_free(names)
-        with writing(self.path / FILES):
-            add_to_list(self.path, names)
+        with run_files.writing(self.path / FILES):
+            run_files.add_to_list(self.path, names)
 
     def require_free(self, names: Iterable[str]) -> None:
         """Find out, before a run, whether names that it will write are those of somebody else.
@@ -319,7 +316,7 @@ class RunDirectory:
         Raises:
             OutputError: There is such a file, which this run has not made.
         """
-        own = listed(self.path) or ()
+        own = run_files.listed(self.path) or ()
         for name in names:
             if name not in own and os.path.lexists(self.path / name):
                 raise OutputError(
@@ -334,8 +331,8 @@ class RunDirectory:
             ConfigError: The name leads out of the directory.
             OutputError: It cannot be made.
         """
-        path = inside(self.path, name)
-        with writing(path):
+        path = run_files.inside(self.path, name)
+        with run_files.writing(path):
             path.mkdir(exist_ok=True)
         return path
 
@@ -356,7 +353,7 @@ class RunDirectory:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        stays = self._kept or self.can_go_on or bool(self.trials and self.trials.others)
+        stays = self.kept or self.can_go_on or bool(self.trials and self.trials.others)
         complete = kind is None and self._complete  # else what is missing can be written again
         self._leave(stays, spent=complete and not self.keeps_trials)
 
@@ -366,11 +363,15 @@ class RunDirectory:
             self.trials.close(remove=spent or not stays)
         with contextlib.suppress(OSError):
             if self._lock is not None and stays:
-                trim_list(self.path, self._lock)
+                run_files.trim_list(self.path, self._lock)
             elif self._lock is not None:
-                remove_run(self.path, lambda file: self.old is not None or _is_before(file))
-            if not stays:
-                give_back(self.path, self._created, self.old)
+                run_files.remove_run(
+                    self.path, lambda file: self.old is not None or _is_before(file)
+                )
+            if not stays and self.old is not None:
+                self.old.rename(self.path)
+            for folder in () if stays else self._created:
+                folder.rmdir()
         if self._lock is not None:
             os.close(self._lock)
         self._lock = None

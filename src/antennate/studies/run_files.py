@@ -1,12 +1,16 @@
-"""The names of the files of a run, and which of them a folder holds.
+"""Which files of a run a folder holds, and whether another run may take it.
 
 `files.txt` lists the files that a run writes, each before it is made. Without that list a folder
-holds no run of this program, and is never overwritten.
+holds no run of this program, and is never overwritten. With `--overwrite`, NAME is renamed to
+NAME.old, and where there is one to NAME.old2, and so on: nothing is removed. The rename is one
+step, so a process that is killed at any moment leaves the old run whole, under one of the two
+names.
 """
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -16,7 +20,7 @@ from typing import TypeVar
 from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
-from antennate.studies.trial_file import TRIALS
+from antennate.studies.trial_file import TRIALS, locked
 from antennate.telemetry.header import MOST_PARTS, part
 
 T = TypeVar("T")
@@ -49,6 +53,10 @@ _NAMES = (
 """Every file that a run may write beside its figures."""
 
 
+_BEFORE = ("trials.store.jsonl", "trials.partial.jsonl")
+"""Files of the trials of versions before, which are not gone on with."""
+
+
 def listed(place: Path) -> list[str] | None:
     """Names of files that the run of a folder wrote; None if it holds no run of this program."""
     if (place / FILES).is_symlink():
@@ -77,11 +85,7 @@ def add_to_list(place: Path, names: Iterable[str]) -> None:
 
 
 def trim_list(place: Path, handle: int) -> None:
-    """Leave in the list of a run that ends the files that are there.
-
-    Args:
-        place: The folder.
-        handle: The list, open for writing; the lock on it stays.
+    """Leave in the list of a run, which is open to write, the files that are there.
 
     Raises:
         OSError: It cannot be written.
@@ -108,13 +112,6 @@ def _is_file_within(place: Path, name: str) -> bool:
     folders = [place / each for each in path.parents if each != Path()]
     sound = not path.is_absolute() and ".." not in path.parts and all(map(is_folder, folders))
     return sound and os.path.lexists(place / path) and not is_folder(place / path)
-
-
-def others_of(place: Path) -> list[Path]:
-    """Files with names that a run writes, which are none of the run that a folder holds."""
-    own = files_of(place)
-    paths = [place / name for name in _NAMES]
-    return [path for path in paths if os.path.lexists(path) and path not in own]
 
 
 def sweep(place: Path) -> None:
@@ -145,6 +142,103 @@ def remove_run(place: Path, goes: Callable[[Path], bool] = lambda file: True) ->
                 folder.rmdir()
     if files_of(place) == [last]:
         last.unlink()
+
+
+def place_of(command: str, path: str | Path | None) -> Path:
+    """The folder for a run of a command: the one of a path, or the next that nobody has named.
+
+    Raises:
+        BadInputError: The path is none, or leads to no folder, or no folder can have such a name.
+    """
+    if path == "":
+        raise OutputError("expected the name of a folder, found an empty one")
+    if "/" in checks.text("command", command):
+        raise ConfigError(f"command: expected a name without a slash, found {command}")
+    if path is None:
+        places = (Path("runs") / f"{command}-{number}" for number in itertools.count(1))
+        return next(place for place in places if not place.exists())
+    place = checks.path("path", path)
+    if os.path.lexists(place) and not place.is_dir():
+        what = "a file" if place.exists() else "a link to nothing"
+        raise OutputError(f"{place}: expected a folder, found {what}; give another --out")
+    return place
+
+
+def goes_on(place: Path, resume: bool | None) -> bool:
+    """Whether a folder holds a run that is to go on; False if it holds nothing of a run.
+
+    Args:
+        place: The folder.
+        resume: Whether a run that it holds is to go on; None if the command goes on with none.
+
+    Raises:
+        OutputError: It holds another run, or files of somebody with names that a run writes.
+    """
+    for folder in FOLDERS:
+        if (place / folder).is_symlink():
+            raise OutputError(f"expected {place / folder} within its run, found a link")
+    held = files_of(place)
+    named = (place / name for name in _NAMES)
+    others = [file for file in named if os.path.lexists(file) and file not in held]
+    if not others and held in ([], [place / FILES]):
+        return False  # what a process leaves that is killed as it begins
+    begun = place / TRIALS in held
+    if resume and begun and not others:
+        return True
+    if resume and (old := [name for name in _BEFORE if place / name in held]) and not begun:
+        raise OutputError(
+            f"{place}: expected a run of this version to go on with, found {old[0]} of one before; "
+            "go on with that version, choose another folder, or give --overwrite"
+        )
+    if resume and place / RESULT in held:
+        raise OutputError(
+            f"{place}: expected an unfinished run, found a finished one, which takes no more "
+            "trials; choose another folder, or give --overwrite to run all of them anew"
+        )
+    first = place / RESULT if place / RESULT in held else [*others, *held][0]
+    raise OutputError(
+        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {first}; "
+        "choose another"
+        + (" or give --overwrite" if place / FILES in held else "")
+        + (" or --resume" if begun and resume is False else "")
+    )
+
+
+def before_this_version(place: Path) -> str:
+    """File of trials of a version before, of a run without a result; empty if there is none."""
+    names = (name for name in _BEFORE if (place / name).exists())
+    return "" if (place / RESULT).exists() else next(names, "")
+
+
+def set_aside(place: Path) -> Path:
+    """Rename a folder that holds a run; its new name.
+
+    Raises:
+        OutputError: It holds no run of ours, cannot have another name, or a process works on it.
+        OSError: It cannot be renamed.
+    """
+    if listed(place) is None and {path.name for path in place.iterdir()} != {JOBS}:
+        first = min((path.name for path in place.iterdir()), default="none")
+        raise OutputError(
+            f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
+            f"found {first}, which is of none; choose another folder"
+        )
+    if place.is_symlink():
+        raise OutputError(f"{place}: expected a folder to rename, found a link; give its own name")
+    if place.resolve() in (Path.cwd(), *Path.cwd().parents):
+        raise OutputError(
+            f"{place}: expected a folder to rename, found the working directory or one above it; "
+            "go to another directory, or choose another folder"
+        )
+    numbers = itertools.count(2)
+    old = place.parent / f"{place.name}.old"
+    while os.path.lexists(old):
+        old = place.parent / f"{place.name}.old{next(numbers)}"
+    lock = locked(place / FILES) if (place / FILES).exists() else None
+    place.rename(old)
+    if lock is not None:
+        os.close(lock)
+    return old
 
 
 def is_finished(place: Path) -> bool:

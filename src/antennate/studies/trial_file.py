@@ -22,6 +22,7 @@ import fcntl
 import json
 import os
 import re
+import sys
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.errors import BadInputError, OutputError
-from antennate.files import open_regular
+from antennate.files import read_limited
 from antennate.studies.formats import as_mapping, dumped, encoded, plain_row, strict
 from antennate.studies.identity import but_trials, differences
 
@@ -90,7 +91,10 @@ class Content:
         self.records = {key: {**record, "key": key} for key, record in moved.items()}
 
     def rows(self) -> list[dict[str, Any]]:
-        """Rows of all trials, as a table has them, and those of no trial."""
+        """Rows of all trials, as a table has them, and those of none.
+
+        A trial that was first shown on a page, which keeps its row alone, is a trial since.
+        """
         found: list[dict[str, Any]] = []
         for record in self.records.values():
             match record.get("rows", ()):
@@ -100,7 +104,7 @@ class Content:
                     found.append(plain_row(record["result"]["of"][0]))
                 case listed:
                     found += listed
-        return [*found, *self.others.values()]
+        return [*found, *(row for row in self.others.values() if row not in found)]
 
 
 class TrialFile(Content):
@@ -126,12 +130,12 @@ class TrialFile(Content):
             raise OutputError(f"expected to write {path}, found: {error.strerror}") from None
         self._synced, self._seen, self._count = 0.0, list[str](), 0
         self._rows: list[Any] | None = None
-        data = _data(path)
+        data = read_limited(path, sys.maxsize)
         self._end = len(data)
         self.read(data)
         self.holds_trials = bool(self.records)
-        if data and not data.endswith(b"\n"):  # what a killed process left is a line of its own
-            self._write(b"\n")
+        if data and not data.endswith(b"\n"):
+            self._write(b"\n")  # what a killed process left is a line of its own
 
     def begin(self, identity: Mapping[str, Any], tasks: Tasks | None = None) -> None:
         """Say what is run, or find that it is what the file was begun with, or more trials of it.
@@ -152,7 +156,7 @@ class TrialFile(Content):
             )
         if before is None:
             self._write(line({"identity": identity}))
-            self.identity = identity
+            self._turn_to(identity, {})
         elif not (changes := differences(before, identity)):
             return
         elif tasks is None or but_trials(before) != but_trials(identity):
@@ -205,13 +209,21 @@ class TrialFile(Content):
         finally:
             self._rows = None
 
-    def append(self, key: str, content: Mapping[str, Any]) -> None:
-        """Keep one trial.
+    def append(self, key: str, content: Mapping[str, Any], elsewhere: bool = False) -> None:
+        """Keep one trial, and its processor, if that is a new one.
+
+        Args:
+            key: Its key.
+            content: What else its line says.
+            elsewhere: Whether it stays in another file, too.
 
         Raises:
             OutputError: The disk is full, or the like; what was kept before stays whole.
         """
-        self._keep({"key": key, **content}, promised=True)
+        new = b"".join(line({"processor": model}) for model in self._seen)
+        self._write(new + line({"key": key, **content}), is_trial=not elsewhere)
+        self.processors += self._seen
+        self._seen.clear()
 
     def add_row(self, row: Any) -> None:
         """Keep a row, a dataclass or a mapping, unless the file has it from a process before.
@@ -242,47 +254,27 @@ class TrialFile(Content):
         for model in processors:
             self.saw(model)
         for key, content in records.items():
-            self._keep({"key": key, **content})
+            self.append(key, content, elsewhere=True)
             self.records[key] = content
 
-    def _keep(self, trial: Mapping[str, Any], promised: bool = False) -> None:
-        """Keep a trial and its processor, if that is a new one."""
-        data = b"".join(line({"processor": model}) for model in self._seen)
-        self._append(data + line(trial))
-        self.holds_trials |= promised  # before the disk is waited for, where a signal may come
-        self.processors += self._seen
-        self._seen.clear()
-        self._sync()
-
-    def _write(self, data: bytes) -> None:
-        self._append(data)
-        self._sync()
-
-    def _append(self, data: bytes) -> None:
+    def _write(self, data: bytes, is_trial: bool = False) -> None:
         try:
             left = data
             while left:  # a disk that is almost full takes a part
                 left = left[os.write(self._file, left) :]
             self._end += len(data)
+            self.holds_trials |= is_trial  # before the disk is waited for, where a signal may come
+            if time.monotonic() - self._synced > _SYNC:
+                os.fsync(self._file)
+                self._synced = time.monotonic()
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            raise self._refused(error) from None
-
-    def _sync(self) -> None:
-        if time.monotonic() - self._synced > _SYNC:
-            try:
-                os.fsync(self._file)
-            except OSError as error:
-                raise self._refused(error) from None
-            self._synced = time.monotonic()
-
-    def _refused(self, error: OSError) -> OutputError:
-        kept = "; what was finished is kept, and the run can be resumed"
-        return OutputError(
-            f"expected to write {self.path}, found: {error.strerror}"
-            f"{kept if self.holds_trials else ''}"
-        )
+            kept = "; what was finished is kept, and the run can be resumed"
+            raise OutputError(
+                f"expected to write {self.path}, found: {error.strerror}"
+                f"{kept if self.holds_trials else ''}"
+            ) from None
 
     def close(self, remove: bool = False) -> None:
         """Let others append; `remove` deletes the file first."""
@@ -301,7 +293,7 @@ def read_trials(path: Path) -> Content:
     Raises:
         BadInputError: It cannot be read.
     """
-    return Content().read(_data(path))
+    return Content().read(read_limited(path, sys.maxsize))
 
 
 def key_of(call: int, place: int) -> str:
@@ -350,11 +342,3 @@ def _sound(text: bytes) -> dict[str, Any] | None:
     head = _HEAD.match(text)
     body = b"{" + text[head.end() :] if head else b""
     return json.loads(body) if head and zlib.crc32(body) == int(head[1], 16) else None
-
-
-def _data(path: Path) -> bytes:
-    try:
-        with open_regular(path) as file:
-            return file.read()
-    except OSError as error:
-        raise BadInputError(f"{path}: expected a readable file: {error.strerror}") from None
