@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 
 from antennate.cli import main
 from antennate.errors import BadInputError, OutputError
+from antennate.studies.pool import Workers, gather
 from antennate.studies.run_directory import RunDirectory
 
 WALL = ["bench", "wall", "--trials", "2", "--profiles", "stiff", "--wall.travel", "0.03"]
@@ -59,6 +62,7 @@ def test_rows_of_a_run_that_was_killed_are_those_of_its_table(name: str, once: i
     """A row that is the first of what a trial returned stands there, and nowhere else."""
     table = RunDirectory.open(name).rows()
     assert [line["rows"] for line in lines(name) if "key" in line].count("first") == once
+    assert not any("row" in line for line in lines(name))
     assert cells(stopped(name).rows()) == cells(table)
 
 
@@ -111,6 +115,38 @@ def test_rows_of_no_trial_are_lines_of_their_own_and_come_once() -> None:
     with Path("dice/trials.jsonl").open("ab") as file:
         file.write(b'{"crc":"00000000","row":4,"values":{"trial":4,"eyes":1.0}}\n{"crc":')
     assert RunDirectory.open("dice").rows() == rows
+
+
+@dataclass(frozen=True)
+class Throw:
+    """A row that is all that a trial returns."""
+
+    trial: int
+    eyes: float
+
+
+def throw(trial: int) -> Throw:
+    return Throw(trial, float("nan") if trial == 1 else trial / 3)
+
+
+def test_a_row_that_a_trial_returns_stands_once_also_where_a_page_had_shown_it() -> None:
+    what = {"command": "dice", "versions": {}, "code": {}, "config": {}}
+    tasks = [(trial,) for trial in range(3)]
+
+    def stop(run: Callable[[RunDirectory], Any]) -> None:
+        with RunDirectory.create("dice", "dice", identity=what, resume=True) as directory:
+            run(directory)
+            raise KeyboardInterrupt
+
+    def on_workers(run: RunDirectory) -> None:
+        found = gather(throw, tasks, Workers(1, trials=run.trials), lambda *_: None, run.append)
+        assert [row.eyes for row in found[::2]] == [0.0, 2 / 3]
+
+    for shown_or_run in (lambda run: run.append(throw(0)), on_workers, on_workers):
+        with pytest.raises(KeyboardInterrupt):
+            stop(shown_or_run)
+    assert [line.get("rows") for line in lines("dice") if "key" in line] == ["result"] * 3
+    assert [row["eyes"] for row in RunDirectory.open("dice").rows()] == [0.0, None, 2 / 3]
 
 
 @pytest.mark.parametrize("old", ["trials.store.jsonl", "trials.partial.jsonl"])

@@ -237,8 +237,7 @@ def carry_out(
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
             raise
         except (LogError, OutputError, WorkerError):
-            if run.made(LOGS, ".mcap"):
-                run.kept = True
+            run.kept = shards is None and (run.kept or bool(run.made(LOGS, ".mcap")))
             raise
         except ShardEnd as end:
             part = {"shard": options.shard, "trials": end.count, "of": end.total}
@@ -325,7 +324,7 @@ def _outcome(
     how: dict[str, Any] = {} if view is None else {"view": view}
     if options.log and experiment.logs is not None:
         run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
-        how["logs"] = run.folder(LOGS)
+        how["logs"] = run.path / LOGS
     interim = Interim()
 
     def on_row(row: Any) -> None:

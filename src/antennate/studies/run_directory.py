@@ -130,7 +130,7 @@ class RunDirectory:
             self.trials.begin(identity, tasks if before else None)
             whole = not self.trials.damaged and self.trials.holds_all(tasks)
             self.finished = before and not retry and whole and run_files.is_finished(place)
-            self.untouched = self.kept = self.finished
+            self.untouched, self.kept = self.finished, self.finished or bool(self.trials.others)
         if before and not self.finished:
             run_files.remove_run(
                 place, lambda file: file.parent.name != LOGS and file.name != TRIALS
@@ -250,7 +250,7 @@ class RunDirectory:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
         if not self.finished:
             self.trials = self.trials or TrialFile(self.path / TRIALS)
-            self.trials.add_row(row)
+            self.kept |= self.trials.add_row(row)
 
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
         """Write the table of the rows, if there are any, and the result.
@@ -292,23 +292,23 @@ class RunDirectory:
         if self.finished and path.exists() and (name != REPORT or self.untouched):
             return
         self.untouched = False
-        with run_files.writing(path):
-            self.path.mkdir(exist_ok=True)
-            self.claim_names([name])
-            path.parent.mkdir(exist_ok=True)
+        self.claim_names([name])
         with writing_whole(path, overwrite=True) as file:
             file.writelines(formats.pieces(content))
 
     def claim_names(self, names: Iterable[str]) -> None:
-        """Put names into the list of files of this run, before these files are made.
+        """Put names into the list of files of this run, and make folders for these files.
 
         Raises:
-            OutputError: There is such a file, which this run has not made.
+            OutputError: There is such a file, which this run has not made; or it cannot be written.
         """
         names = list(names)
         self.require_free(names)
         with run_files.writing(self.path / FILES):
+            self.path.mkdir(exist_ok=True)
             run_files.add_to_list(self.path, names)
+            for folder in {(self.path / name).parent for name in names}:
+                folder.mkdir(exist_ok=True)
 
     def require_free(self, names: Iterable[str]) -> None:
         """Find out, before a run, whether names that it will write are those of somebody else.
@@ -323,18 +323,6 @@ class RunDirectory:
                     f"{self.path}: expected no file {name} but of this run, found one of somebody "
                     "else; move it, or choose another folder"
                 )
-
-    def folder(self, name: str) -> Path:
-        """A folder in the directory for files of the run, made if it is not there.
-
-        Raises:
-            ConfigError: The name leads out of the directory.
-            OutputError: It cannot be made.
-        """
-        path = run_files.inside(self.path, name)
-        with run_files.writing(path):
-            path.mkdir(exist_ok=True)
-        return path
 
     def write_figures(self, figures: Mapping[str, Any]) -> None:
         """Put figures of matplotlib into the directory, each as svg and png, by name.
@@ -353,9 +341,8 @@ class RunDirectory:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        stays = self.kept or self.can_go_on or bool(self.trials and self.trials.others)
         complete = kind is None and self._complete  # else what is missing can be written again
-        self._leave(stays, spent=complete and not self.keeps_trials)
+        self._leave(self.kept or self.can_go_on, spent=complete and not self.keeps_trials)
 
     def _leave(self, stays: bool, spent: bool = False) -> None:
         """Let others take the folder, as it is or without this run."""

@@ -225,8 +225,10 @@ class TrialFile(Content):
         self.processors += self._seen
         self._seen.clear()
 
-    def add_row(self, row: Any) -> None:
-        """Keep a row, a dataclass or a mapping, unless the file has it from a process before.
+    def add_row(self, row: Any) -> bool:
+        """Keep a row, a dataclass or a mapping; whether it has a line of its own.
+
+        One that the file has from a process before is not written again.
 
         Raises:
             ConfigError: The row is neither.
@@ -235,14 +237,14 @@ class TrialFile(Content):
         """
         if self._rows is not None:
             self._rows.append(row if is_dataclass(row) else as_mapping(row))
-            return
+            return False
         number, values = self._count, strict(as_mapping(row))
         self._count += 1
         data = line({"row": number, "values": values})
-        known = self.others.get(number)
-        self.others[number] = values
-        if known is None or dumped(known) != dumped(values):
+        if number not in self.others or dumped(self.others[number]) != dumped(values):
             self._write(data)
+        self.others[number] = values
+        return True
 
     def saw(self, model: str) -> None:
         """Name the processor of the trials that come next; it is kept with the first of them."""
