@@ -90,7 +90,7 @@ def run(words: str, folder: Path, *more: str) -> None:
 def killed(folder: Path) -> None:
     """A run whose processes are killed after some rows, then resumed."""
     words = [*ANTENNATE, *KILLED.split(), "--no-figures", "--out", str(folder)]
-    store = folder / "trials.store.jsonl"
+    store = folder / "trials.jsonl"
     quiet = subprocess.DEVNULL
     with subprocess.Popen(words, start_new_session=True, stdout=quiet, stderr=quiet) as process:
         while process.poll() is None:

@@ -128,7 +128,7 @@ def go_on(folder: Path, finished: int) -> float:
     note.unlink(missing_ok=True)
     if finished:
         (run / "result.json").unlink()
-        store = run / "trials.store.jsonl"
+        store = run / "trials.jsonl"
         lines = store.read_bytes().splitlines(keepends=True)
         store.write_bytes(b"".join(lines[: finished - ALL]))  # without the last trials
     words = ["study", str(folder / "study.toml"), "--trust-code", "--no-figures"]

@@ -251,7 +251,6 @@ def test_nonsense_is_refused_in_one_line(
         ("write", ("../up.txt", "x"), "name: expected one within the run, found ../up.txt"),
         ("write", (3, "x"), "name: expected text"),
         ("write", ("mine.txt", 3), "content: expected text, bytes or pieces, found 3"),
-        ("folder", ("/tmp/own",), "name: expected one within the run"),
         ("text", (b"x",), "name: expected text"),
         ("write_figures", (3,), "figures: expected a dictionary, found 3"),
         ("write_figures", ({"a": 3},), "figure: expected a Figure, found 3"),

@@ -372,7 +372,7 @@ def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
         "report.html",
         "result.json",
         "trials.csv",
-        "trials.store.jsonl",
+        "trials.jsonl",
         "versions.json",
     ]
     command, *dates = (run / "command.txt").read_text().splitlines()
@@ -469,8 +469,8 @@ def test_overwrite_leaves_nothing_old(capsys, tmp_path):
 
 def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "trials.partial.jsonl").write_text("{}\n")
-    assert "trials.partial.jsonl" in refusal(capsys, *QUICK, "--out", "run")
+    (tmp_path / "run" / "trials.jsonl").write_text("{}\n")
+    assert "trials.jsonl" in refusal(capsys, *QUICK, "--out", "run")
 
 
 def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
@@ -510,7 +510,7 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
 
     def append(self, row):
         kept(self, row)
-        seen.append(json.loads((self.path / "trials.partial.jsonl").read_text().splitlines()[-1]))
+        seen.append(row.trial)
         if len(seen) == 2:
             raise KeyboardInterrupt
 
@@ -520,9 +520,8 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
     assert "interrupted: kept 2 trials" in err
     assert "trials" in out
     rows = table(tmp_path / "run")
-    assert sorted(int(row["trial"]) for row in rows) == sorted(row["trial"] for row in seen)
+    assert sorted(int(row["trial"]) for row in rows) == sorted(seen)
     assert json.loads((tmp_path / "run" / "result.json").read_text())["interrupted"] is True
-    assert not (tmp_path / "run" / "trials.partial.jsonl").exists()
 
 
 @pytest.mark.slow
@@ -534,7 +533,7 @@ def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
     )
     words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]
-    partial = tmp_path / "run" / "trials.partial.jsonl"
+    partial = tmp_path / "run" / "trials.jsonl"
     with child(code, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
         try:
             deadline = time.monotonic() + 60

@@ -628,7 +628,7 @@ def test_figures_that_did_not_fit_are_drawn_by_resume(
     assert main([*words, "--resume"]) == 0
     assert (tmp_path / "run" / "figures" / "ranks.png").exists()
     assert (tmp_path / "run" / "trials.csv").read_bytes() == table
-    assert (tmp_path / "run" / "trials.store.jsonl").exists()
+    assert (tmp_path / "run" / "trials.jsonl").exists()
 
 
 def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(

@@ -16,7 +16,7 @@ from design_plans import HERE, design, plan, refusal, result, same, table, words
 from antennate import experiments
 from antennate.cli import main
 from antennate.studies.run_files import add_to_list
-from antennate.studies.store import STORE
+from antennate.studies.trial_file import TRIALS
 
 pytestmark = pytest.mark.usefixtures("there")
 
@@ -33,15 +33,15 @@ def test_a_search_cut_anywhere_goes_on_to_the_same_bytes(
 ) -> None:
     plan(settings={"noise": 0.1})
     design("whole")
-    lines = Path("whole", STORE).read_bytes().splitlines(keepends=True)
+    lines = Path("whole", TRIALS).read_bytes().splitlines(keepends=True)
     trials = len(table("whole"))
     assert len(lines) == 2 + trials + 3 + 1  # what is run, the processor, three batches, the end
     assert b'"processor":' in lines[1]
     for cut in (1, 5, 20, 41, len(lines) - 1):
         shutil.rmtree("run", ignore_errors=True)
         Path("run").mkdir()
-        add_to_list(Path("run"), [STORE])
-        Path("run", STORE).write_bytes(b"".join(lines[:cut]) + lines[cut][:30])
+        add_to_list(Path("run"), [TRIALS])
+        Path("run", TRIALS).write_bytes(b"".join(lines[:cut]) + lines[cut][:30])
         notes = tmp_path / f"notes{cut}"
         with monkeypatch.context() as patch:
             patch.setenv("STUDY_NOTES", str(notes))
@@ -59,7 +59,7 @@ def test_a_killed_search_goes_on_to_the_same_bytes() -> None:
     known = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{HERE}"}
     command = [sys.executable, "-m", "antennate", *words("--workers", "2")]
     with subprocess.Popen(command, env=known, stderr=subprocess.DEVNULL) as driver:
-        store = Path("run", STORE)
+        store = Path("run", TRIALS)
         while not store.exists() or store.read_bytes().count(b'"result"') < 15:
             assert driver.poll() is None
             time.sleep(0.02)
@@ -76,7 +76,7 @@ def test_another_search_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     plan(seed=1)
     assert "seed 0, now 1" in refusal(capsys, *words())
     plan()
-    path = Path("run", STORE)
+    path = Path("run", TRIALS)
     text = path.read_text()
     design()
     assert path.read_text() == text

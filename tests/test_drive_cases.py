@@ -148,7 +148,7 @@ def test_G4_a_full_disk_costs_the_log_and_not_the_result(cases: Any) -> None:
 
 def test_G4_room_for_the_result_is_kept_while_a_robot_is_driven(tmp_path: Path) -> None:
     with RunDirectory.create("drive", tmp_path / "run") as folder:
-        folder.without_trials()
+        folder.keep_room()
         kept = [path.stat().st_size for path in folder.path.iterdir()]
         folder.finish({"schema": 1})
         assert {path.name for path in folder.path.iterdir()} == {"files.txt", "result.json"}

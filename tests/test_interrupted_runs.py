@@ -20,7 +20,7 @@ from antennate.errors import OutputError
 from antennate.messages import command_words
 from antennate.sim.world import World
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.store import Store
+from antennate.studies.trial_file import TrialFile
 from antennate.telemetry.reader import LogReader
 
 TUNNEL = ["tunnel", "--controllers", "open", "--time-limit", "0.2", "--trials", "3"]
@@ -108,14 +108,14 @@ def test_an_interrupted_gait_goes_on_after_the_walks_that_had_ended(capsys, tmp_
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("UV", raising=False)
     words = ["gait", "--sweep-points", "2", "--cycles", "2", "--settling-cycles", "0"]
-    kept = Store.append
+    kept = TrialFile.append
 
     def append(self, *given):
         kept(self, *given)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(Store, "append", append)
+        patched.setattr(TrialFile, "append", append)
         assert main([*words, "--out", "run", "--workers", "1", "--no-figures"]) == 130
     said = capsys.readouterr().err
     (line,) = [a for a in said.splitlines() if a.startswith("to go on: ")]
@@ -204,33 +204,10 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
     monkeypatch.setattr(os, "write", full)
     assert main([*TUNNEL, "--workers", "1", "--out", str(tmp_path / "run")]) == 2
     (line,) = [a for a in capsys.readouterr().err.splitlines() if "error:" in a]
-    store = tmp_path / "run" / "trials.store.jsonl"
+    store = tmp_path / "run" / "trials.jsonl"
     assert f"expected to write {store}, found: No space left on device" in line
     assert ("what was finished is kept, and the run can be resumed" in line) == bool(kept)
     assert store.exists() == bool(kept)
-
-
-def test_a_disk_that_is_full_at_the_table_of_trials_so_far_keeps_the_trial(
-    capsys, tmp_path, monkeypatch
-):
-    opened = Path.open
-
-    def full(path, *how, **more):
-        if path.name == "trials.partial.jsonl":
-            return opened(Path("/dev/full"), "w")
-        return opened(path, *how, **more)
-
-    words = [*TUNNEL, "--workers", "1", "--no-figures", "--out", str(tmp_path / "run")]
-    with monkeypatch.context() as patched:
-        patched.setattr(Path, "open", full)
-        assert main(words) == 2
-    (line,) = [a for a in capsys.readouterr().err.splitlines() if "error:" in a]
-    assert line.endswith(
-        "trials.partial.jsonl, found: No space left on device; what was finished is kept, and "
-        "the run can be resumed"
-    )
-    assert (tmp_path / "run" / "trials.store.jsonl").read_bytes().count(b'"key":') == 1
-    assert main([*words, "--resume"]) == 0
 
 
 @pytest.mark.parametrize(

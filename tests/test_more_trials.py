@@ -8,7 +8,7 @@ import pytest
 
 import antennate
 from antennate.cli import main
-from antennate.studies.store import STORE, read_store
+from antennate.studies.trial_file import TRIALS, read_trials
 
 NOTED = """
 from pathlib import Path
@@ -101,14 +101,14 @@ def test_a_run_that_was_killed_as_it_took_more_goes_on(cut: int) -> None:
     """At the line that says so: whole, or torn; with the result of before still there."""
     assert study("run", 2) == 0
     result = Path("run/result.json").read_bytes()
-    begun = Path("run", STORE).stat().st_size
+    begun = Path("run", TRIALS).stat().st_size
     assert study("run", 3) == 0
-    lines = Path("run", STORE).read_bytes()
+    lines = Path("run", TRIALS).read_bytes()
     end = lines.index(b"\n", begun) + 1
-    Path("run", STORE).write_bytes(lines[: end - cut])
+    Path("run", TRIALS).write_bytes(lines[: end - cut])
     Path("run/result.json").write_bytes(result)
     noted()
-    assert len(read_store(Path("run", STORE)).records) == 6
+    assert len(read_trials(Path("run", TRIALS)).records) == 6
     assert study("run", 3) == 0
     assert sorted(int(line.split()[1]) for line in noted()) == [2, 2, 2]
     assert study("once", 3) == 0

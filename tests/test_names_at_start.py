@@ -103,6 +103,6 @@ def test_an_interrupted_run_lists_its_trials(monkeypatch: pytest.MonkeyPatch) ->
         patch.setattr(RunDirectory, "append", interrupted)
         assert main(["tunnel", *SHORT[:1], "3", *SHORT[2:], "--out", "run"]) == 130
     names = Path("run/files.txt").read_text().splitlines()[1:]
-    assert "trials.store.jsonl" in names
+    assert "trials.jsonl" in names
     assert all(Path("run", name).exists() for name in names)
     assert main(["tunnel", *SHORT[:1], "3", *SHORT[2:], "--out", "run", "--resume"]) == 0

@@ -14,7 +14,7 @@ import pytest
 from test_replaced_runs import SLOW, killed_once, program
 
 from antennate.studies import work
-from antennate.studies.store import STORE, line, read_store
+from antennate.studies.trial_file import TRIALS, line, read_trials
 
 WORDS = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", "--no-figures"]
 KILLED = """
@@ -47,15 +47,15 @@ def test_a_run_killed_beside_its_result_names_all_processors_with_trials(
         'experiment = "code.py:trial"\nplan = "grid"\ntrials = 3\n[vary]\nx = [0.5]\n'
     )
     killed_once(Path("begun"), program(*WORDS, FREE="2"))
-    here, path = named(), Path("run", STORE)
-    known = read_store(path)
+    here, path = named(), Path("run", TRIALS)
+    known = read_trials(path)
     assert (len(known.records), known.processors) == (2, [here])
     lines = [{"identity": known.identity}, {"processor": f"Not {here}"}, *known.records.values()]
     path.write_bytes(b"".join([line({k: v for k, v in a.items() if k != "crc"}) for a in lines]))
 
     Path("begun").unlink()
     killed_once(Path("begun"), program(*WORDS, FREE="2"))
-    assert read_store(path).processors == [f"Not {here}"]
+    assert read_trials(path).processors == [f"Not {here}"]
 
     done = subprocess.run(
         [sys.executable, "killed.py", *WORDS], env={**os.environ, "FREE": "9"}, capture_output=True

@@ -16,6 +16,7 @@ import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.studies.columns import shown
+from antennate.studies.trial_file import line
 
 
 class Page(HTMLParser):
@@ -256,7 +257,9 @@ def test_points_of_two_studies_stand_together_by_what_varies() -> None:
 def test_a_run_that_was_stopped_has_a_page() -> None:
     Path("run").mkdir()
     Path("run/command.txt").write_text("antennate bench wall --trials 9\n")
-    Path("run/trials.partial.jsonl").write_text('{"trial": 0}\n{"trial": 1}\n')
+    lines = [line({"row": i, "values": {"trial": i}}) for i in range(3)]
+    lines[1] = lines[1].replace(b'"trial":1', b'"trial":2')
+    Path("run/trials.jsonl").write_bytes(b"".join(lines) + lines[2][:20])
     assert main(["report", "run"]) == 0
     page = Page(Path("run/report.html"))
     assert "was stopped: 2 trials were kept" in page.text
@@ -315,7 +318,7 @@ def test_a_table_that_was_cut_is_one_line(capsys: pytest.CaptureFixture[str], cu
     """Its last cell is empty: without its end the last row may still have all cells."""
     Path("run").mkdir()
     Path("run/command.txt").write_text("antennate bench wall --trials 2\n")
-    Path("run/trials.partial.jsonl").touch()
+    Path("run/trials.jsonl").touch()
     table = "seed,trial,reason\n0,0,\n0,1,it is a long reason that is quoted\n0,2,\n"
     Path("run/trials.csv").write_text(table[:cut])
     assert "run/trials.csv: expected a whole file of this kind" in refusal(capsys, "run")

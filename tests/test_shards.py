@@ -14,7 +14,7 @@ import pytest
 from antennate.cli import main
 
 PLAN = 'experiment = "springs"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 3.5, 4.0, 4.5]\n'
-STORE = "trials.store.jsonl"
+TRIALS = "trials.jsonl"
 
 
 @pytest.fixture(scope="module")
@@ -113,13 +113,13 @@ def test_a_merge_names_the_shard_that_is_missing(
 def test_a_damaged_shard_is_no_missing_one_and_can_be_run_again(
     damage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    *lines, last = Path("2-2", STORE).read_bytes().splitlines(keepends=True)
+    *lines, last = Path("2-2", TRIALS).read_bytes().splitlines(keepends=True)
     left = {"cut": last[:-15], "removed": b"", "flipped": last.replace(b'"crc":"', b'"crc":"0', 1)}
-    Path("2-2", STORE).write_bytes(b"".join(lines) + left[damage])
+    Path("2-2", TRIALS).write_bytes(b"".join(lines) + left[damage])
     before = files()
     assert merge("1-2", "2-2", out="merged") == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"2-2/{STORE}: expected 2 finished trials, found 1: the file is damaged; " in line
+    assert f"2-2/{TRIALS}: expected 2 finished trials, found 1: the file is damaged; " in line
     remedy = line.rpartition("run this shard again, with ")[2]
     assert remedy == "--shard 2/2 --resume --out 2-2"
     assert files() == before
@@ -143,7 +143,7 @@ def test_a_file_that_says_no_shard_is_refused(
 
 def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
     """It does not say that trials are kept in the folder that it has removed."""
-    limit = Path("1-2", STORE).stat().st_size + 10
+    limit = Path("1-2", TRIALS).stat().st_size + 10
 
     def small_disk() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
@@ -160,7 +160,7 @@ def test_a_merge_onto_a_full_disk_leaves_nothing_and_its_shards() -> None:
     )
     assert done.returncode == 2
     assert done.stderr == (
-        f"antennate study merge: error: expected to write merged/{STORE}, found: File too large\n"
+        f"antennate study merge: error: expected to write merged/{TRIALS}, found: File too large\n"
     )
     assert files() == before
     assert not Path("merged").exists()

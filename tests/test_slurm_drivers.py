@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import antennate
-from antennate.studies.store import read_store
+from antennate.studies.trial_file import read_trials
 
 HERE = Path(__file__).parent
 
@@ -30,14 +30,14 @@ from study_trials import trial
 from antennate.experiments.study.config import StudyConfig
 from antennate.studies.engines import make_engine
 from antennate.studies.pool import Workers, gather
-from antennate.studies.store import Store
+from antennate.studies.trial_file import TrialFile
 
-store = Store(Path("run/trials.store.jsonl"))
+store = TrialFile(Path("run/trials.jsonl"))
 store.begin({"study": "of six trials"})
 model = StudyConfig(experiment="wall", plan="sobol", points=4, seed=1, trials=2, vary={"x": [1.0]})
 config = {"x": 1.0, "sleep": 0.5, "model": model}
 tasks = [(config, seed) for seed in range(6)]
-workers = Workers(1, make_engine("slurm-local"), store=store)
+workers = Workers(1, make_engine("slurm-local"), trials=store)
 gather(trial, tasks, workers, lambda done, total: None)
 """
 
@@ -71,7 +71,7 @@ def test_the_next_driver_runs_again_what_jobs_finish_after_theirs_was_killed(
         first.wait()
     assert driver(notes).wait() == 0
     assert sorted(set(notes.read_text().split()[1::2])) == list("012345")
-    assert sorted(read_store(Path("run/trials.store.jsonl")).records) == [
+    assert sorted(read_trials(Path("run/trials.jsonl")).records) == [
         f"0.{seed}" for seed in range(6)
     ]
     assert not list(Path("run/slurm").glob("*.jsonl"))

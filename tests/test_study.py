@@ -33,8 +33,7 @@ from antennate.studies.experiment import Done
 from antennate.studies.identity import identity
 from antennate.studies.plan import Range
 from antennate.studies.pool import Workers, gather
-from antennate.studies.run_files import add_to_list
-from antennate.studies.store import STORE, Store, line, read_store
+from antennate.studies.trial_file import TRIALS, TrialFile, line, read_trials
 
 HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'study_trials.py'}:trial"
@@ -201,12 +200,10 @@ def test_shards_together_are_the_same_bytes(
 def test_W2_a_second_driver_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan()
     code = (
-        "import sys, time; from pathlib import Path; from antennate.studies.store import Store;"
-        "Store(Path(sys.argv[1])); print('ready', flush=True); time.sleep(60)"
+        "import time; from antennate.studies.run_directory import RunDirectory;"
+        "run = RunDirectory.create('study', 'run'); print('ready', flush=True); time.sleep(60)"
     )
-    Path("run").mkdir()
-    add_to_list(Path("run"), [STORE])
-    words = [sys.executable, "-c", code, f"run/{STORE}"]
+    words = [sys.executable, "-c", code]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "ready\n"
@@ -250,7 +247,7 @@ def test_a_finished_study_that_is_repeated_leaves_its_files_alone(
 
 def test_W7_damaged_and_torn_lines_are_run_again(done: Path, tmp_path: Path) -> None:
     before = Path("run/trials.csv").read_bytes()
-    path = Path("run", STORE)
+    path = Path("run", TRIALS)
     lines = path.read_bytes().splitlines(keepends=True)
     assert len(lines) == 14  # what is run, the processor, twelve trials
     flipped = lines[4].replace(b"value", b"velue")
@@ -269,10 +266,10 @@ def test_W7_damaged_and_torn_lines_are_run_again(done: Path, tmp_path: Path) -> 
 
 def on_another_processor(run: str) -> None:
     """Let the trials of a run look as if they ran elsewhere."""
-    path = Path(run, STORE)
+    path = Path(run, TRIALS)
     here = processor_of(run)
     kept = [each for each in path.read_bytes().splitlines(keepends=True) if b'"key"' in each]
-    first = {"identity": read_store(path).identity}
+    first = {"identity": read_trials(path).identity}
     path.write_bytes(b"".join([line(first), line({"processor": f"Not {here}"}), *kept]))
 
 
@@ -284,7 +281,7 @@ def test_other_processors_are_recorded_and_the_table_stays(done: Path) -> None:
     here = processor_of("run")
     assert here in Path("run/report.html").read_text()
     on_another_processor("run")
-    path = Path("run", STORE)
+    path = Path("run", TRIALS)
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
     Path("run/result.json").unlink()  # as if it had been killed before its last trial
     assert study("--no-figures") == 0
@@ -304,7 +301,7 @@ def test_other_processors_of_shards_are_recorded() -> None:
 
 
 def test_W7_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
-    store = Store(tmp_path / "s")
+    store = TrialFile(tmp_path / "s")
     store.begin({"command": "x"})
     store.append("0.0", {"result": [1, math.nan]})
     store.close()
@@ -312,13 +309,13 @@ def test_W7_a_line_cut_anywhere_is_noticed(tmp_path: Path) -> None:
     head = len(line({"identity": {"command": "x"}}))
     for end in range(len(data)):
         (tmp_path / "s").write_bytes(data[:end])
-        again = Store(tmp_path / "s")
+        again = TrialFile(tmp_path / "s")
         assert again.records == {} or end == len(data) - 1
         assert (again.identity is None) == (end < head - 1)
         again.begin({"command": "x"})
         again.append("0.1", {"result": 2})
         again.close()
-        whole = Store(tmp_path / "s")
+        whole = TrialFile(tmp_path / "s")
         assert whole.records["0.1"]["result"] == 2
         whole.close()
 
@@ -341,7 +338,7 @@ def test_W8_a_full_disk_is_one_line_and_loses_nothing(
         words = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"]
         assert "No space left on device; what was finished is kept" in refusal(capsys, *words)
     assert (
-        len(Path("run", STORE).read_bytes().splitlines()) == 7
+        len(Path("run", TRIALS).read_bytes().splitlines()) == 7
     )  # five trials and the first two lines
     assert study("--no-figures") == 0
     assert Path("run/trials.csv").read_bytes() == done.read_bytes()
@@ -354,7 +351,7 @@ def test_W7_a_damaged_first_line_is_refused_and_costs_no_trial(
     plan()
     assert study("--no-figures") == 0
     Path("run/result.json").unlink()  # as if it was killed
-    store = Path("run", STORE)
+    store = Path("run", TRIALS)
     damaged = bytearray(store.read_bytes())
     damaged[30] ^= 1
     store.write_bytes(damaged)
@@ -394,7 +391,7 @@ def test_W9_ten_thousand_finished_trials_are_known_at_once(tmp_path: Path) -> No
     """The bound of two seconds is for the whole command; here for the part that grows."""
     import time
 
-    store = Store(tmp_path / STORE)
+    store = TrialFile(tmp_path / TRIALS)
     store.begin({"command": "x"})
     row = {"point": 1, "value": 0.25, "outcome": "success", **{f"column_{i}": i for i in range(12)}}
     for place in range(10_000):
@@ -403,9 +400,9 @@ def test_W9_ten_thousand_finished_trials_are_known_at_once(tmp_path: Path) -> No
     best = math.inf
     for _ in range(3):
         begin = time.perf_counter()
-        again = Store(tmp_path / STORE)
+        again = TrialFile(tmp_path / TRIALS)
         tasks = [(i,) for i in range(10_000)]
-        found = gather(squares, tasks, Workers(1, store=again, closed=True), lambda *_: None)
+        found = gather(squares, tasks, Workers(1, trials=again, closed=True), lambda *_: None)
         best = min(best, time.perf_counter() - begin)
         again.close()
     assert len(found) == 10_000
@@ -423,14 +420,14 @@ def test_the_identity_follows_what_decides_the_numbers() -> None:
 
 
 def test_what_is_missing_is_an_error_of_ours(tmp_path: Path) -> None:
-    store = Store(tmp_path / "s")
+    store = TrialFile(tmp_path / "s")
     with pytest.raises(OutputError, match="another process"):
-        Store(tmp_path / "s")
+        TrialFile(tmp_path / "s")
     with pytest.raises(WorkerError, match="expected 1 finished trials, found 0"):
-        gather(squares, [(1,)], Workers(1, store=store, closed=True), lambda *_: None)
+        gather(squares, [(1,)], Workers(1, trials=store, closed=True), lambda *_: None)
     store.close()
     with pytest.raises(BadInputError, match="expected a readable file"):
-        read_store(tmp_path / "no")
+        read_trials(tmp_path / "no")
 
 
 def test_W1_killed_studies_end_with_the_same_table(tmp_path: Path) -> None:
@@ -449,7 +446,7 @@ def test_W5_a_study_that_is_told_to_end_keeps_what_is_done(tmp_path: Path) -> No
     text = Path("plan.toml").read_text()
     Path("plan.toml").write_text(text.replace("trials = 3", "trials = 4"))
     driver = study_killed.start(tmp_path, "run")
-    store = Path("run") / STORE
+    store = Path("run") / TRIALS
     end = time.monotonic() + 120.0
     while not store.exists() or store.read_bytes().count(b"\n") < 3:
         assert driver.poll() is None

@@ -33,8 +33,8 @@ from antennate.experiments.study.config import StudyConfig
 from antennate.messages import command_words
 from antennate.studies.identity import environment, identity, packages_used
 from antennate.studies.slurm import Resumable
-from antennate.studies.store import read_store
 from antennate.studies.submitted import Submitted
+from antennate.studies.trial_file import read_trials
 from antennate.studies.work import Call, Work
 
 HERE = Path(__file__).parent
@@ -183,7 +183,7 @@ def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
         assert job.carry_out() == 3
         assert job.carry_out() == 0
         assert len(notes.read_text().splitlines()) == 3
-        assert sorted(read_store(tmp_path / "job.jsonl")[1]) == ["0", "1", "2"]
+        assert sorted(read_trials(tmp_path / "job.jsonl").records) == ["0", "1", "2"]
     finally:
         del os.environ["STUDY_NOTES"]
 
@@ -193,13 +193,13 @@ def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
     part = Work(trial, tasks, together=False, timeout=1.0)
     job_of(tmp_path / "hung.jsonl", part).carry_out()
-    found = read_store(tmp_path / "hung.jsonl")[1]
+    found = read_trials(tmp_path / "hung.jsonl").records
     assert found["1"]["failure"] == ["hung", "no result within 1 s"]
     assert found["2"]["result"]
     signals = {0: (signal.SIGTERM,), 1: (signal.SIGUSR2,), 2: (signal.SIGKILL,)}
     part = Work(signal.raise_signal, signals, together=False, timeout=60.0)
     job_of(tmp_path / "asked.jsonl", part).carry_out()
-    found = read_store(tmp_path / "asked.jsonl")[1]
+    found = read_trials(tmp_path / "asked.jsonl").records
     assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
     assert found["2"]["failure"] == ["crashed", "a worker process ended with code -9 in its work"]
 
@@ -597,6 +597,6 @@ def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]
         if path.name == "files.txt":
             names = set(path.read_text().splitlines())
             assert set(again.read_text().splitlines()) == names
-        elif path.name not in ("command.txt", "report.html", "trials.store.jsonl"):
+        elif path.name not in ("command.txt", "report.html", "trials.jsonl"):
             assert again.read_bytes() == path.read_bytes(), path
-    assert Path("run/trials.store.jsonl").exists()
+    assert Path("run/trials.jsonl").exists()

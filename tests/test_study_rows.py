@@ -12,7 +12,7 @@ import pytest
 
 from antennate.cli import main
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.store import STORE
+from antennate.studies.trial_file import TRIALS
 
 OWN = """
 import numpy as np
@@ -172,7 +172,7 @@ def test_trials_of_which_nobody_knows_what_was_run_are_not_run_again_in_silence(
 ) -> None:
     own = "def trial(config, seed):\n    return {'value': 1.0}\n"
     assert study(own, 3, "--no-figures")[0] == 0
-    path = Path("run", STORE)
+    path = Path("run", TRIALS)
     path.write_bytes(path.read_bytes().replace(b"identity", b"identify", 1))
     assert study(own, 3, "--no-figures")[0] == 2
     assert "found that damaged, and 3 sound trials" in capsys.readouterr().err

@@ -128,7 +128,7 @@ def _walk(
         _operator(config, options) as operator,
         folder_for(view, options, config, argv) as folder,
     ):
-        folder.without_trials()
+        folder.keep_room()
         folder.claim_names(LOG_PARTS)
         with connect(config, options.esp32, options.bus, key) as session:
             if operator.stop is not None:

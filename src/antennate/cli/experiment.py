@@ -224,26 +224,24 @@ def carry_out(
             view.results = str(run.path)
         films = options.video_trial if options.video else None
         run.require_free(names_of(experiment, config, not options.no_figures, films))
-        run.keeps_store = experiment.on_workers
-        workers = replace(workers, store=run.store, shared=environment(kind, config))
+        run.keeps_trials = experiment.on_workers
+        workers = replace(workers, trials=run.trials, shared=environment(kind, config))
         try:
-            if shards and run.store is not None:
-                run.store.take(shards.records, shards.processors)
+            if shards and run.trials is not None:
+                run.trials.take(shards.records, shards.processors)
             outcome = _outcome(experiment, config, options, workers, run, view)
         except KeyboardInterrupt:
-            if shards is None and run.store is not None and run.store.holds_trials:
+            if shards is None and run.can_go_on:
                 again = _go_on(experiment.name, argv, run.path)
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
             raise
         except (LogError, OutputError, WorkerError):
-            if shards:
-                run.discard()
-            run.keep_logs()
+            run.kept = shards is None and (run.kept or bool(run.made(LOGS, ".mcap")))
             raise
         except ShardEnd as end:
             part = {"shard": options.shard, "trials": end.count, "of": end.total}
             run.write(SHARD, to_json(part))
-            run.keep()
+            run.kept = True
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
         say_by_hand(() if view is None else view.by_hand, run)
@@ -325,7 +323,7 @@ def _outcome(
     how: dict[str, Any] = {} if view is None else {"view": view}
     if options.log and experiment.logs is not None:
         run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
-        how["logs"] = run.folder(LOGS)
+        how["logs"] = run.path / LOGS
     interim = Interim()
 
     def on_row(row: Any) -> None:
@@ -355,7 +353,7 @@ def _end(
     result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
-    if argv is not None and interrupted and run.store is not None and run.store.holds_trials:
+    if argv is not None and interrupted and run.can_go_on:
         again = f"to go on: {_go_on(experiment.name, argv, run.path)}\n"
     if interrupted and (options.shard is not None or not outcome.rows):
         sys.stderr.write(again)
@@ -377,7 +375,7 @@ def _end(
             with progress("% of the films") as step:
                 write_films(experiment, config, options.video_trial, run, step, options.video_view)
         except KeyboardInterrupt:
-            run.keep_trials()
+            run.keeps_trials = True
             sys.stderr.write(f"{title}: interrupted: kept all but some films\n")
             return INTERRUPTED
     return BAD_INPUT if experiment.failed(found) else OK

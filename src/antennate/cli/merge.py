@@ -20,8 +20,8 @@ from antennate.params.base import Params
 from antennate.studies.identity import differences
 from antennate.studies.pool import places_of
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import SHARD, VERSIONS, read_as
-from antennate.studies.store import STORE, read_store
+from antennate.studies.run_files import SHARD, read_as
+from antennate.studies.trial_file import TRIALS, read_trials
 
 DESCRIPTION = """\
 Put the shards of one run together: the table and the result are the same as without shards.
@@ -92,16 +92,16 @@ def _gathered(shards: Sequence[Path]) -> Shards:
         if not (shard / SHARD).is_file():
             raise BadInputError(f"{shard}: expected a complete shard, found no {SHARD}")
         parts.append(read_as(shard / SHARD, _part))
-        RunDirectory.open(shard).text(VERSIONS)  # one that was cut is refused
-        store = read_store(shard / STORE)
-        if identity is not None and (changes := differences(identity, store.identity)):
+        RunDirectory.open(shard).versions()  # one that was cut is refused
+        content = read_trials(shard / TRIALS)
+        if identity is not None and (changes := differences(identity, content.identity)):
             raise BadInputError(
                 f"{shard}: expected a shard of the same run as {shards[0]}, found {changes}"
             )
-        identity = identity or store.identity
-        _require_whole(shard, parts[-1], places_of(store.records))
-        records |= store.records
-        processors += store.processors
+        identity = identity or content.identity
+        _require_whole(shard, parts[-1], places_of(content.records))
+        records |= content.records
+        processors += content.processors
     _require_all(parts[0], places_of(records))
     return Shards(shards, identity, records, processors)
 
@@ -111,7 +111,7 @@ def _require_whole(shard: Path, part: _Part, trials: Set[int]) -> None:
     sound = sum(place in part.places for place in trials)
     if sound < len(part.places):
         raise BadInputError(
-            f"{shard / STORE}: expected {len(part.places)} finished trials, found {sound}: the "
+            f"{shard / TRIALS}: expected {len(part.places)} finished trials, found {sound}: the "
             f"file is damaged; run this shard again, with --shard {part.number}/{part.parts} "
             f"--resume --out {shard}"
         )

@@ -35,8 +35,8 @@ from antennate.studies.run_files import (
     files_of,
     listed,
 )
-from antennate.studies.store import Tasks
 from antennate.studies.tables import Table
+from antennate.studies.trial_file import Tasks
 from antennate.telemetry.header import RECOVERED
 
 

@@ -283,7 +283,7 @@ def command(argv: Sequence[str]) -> int:
         wishes = options.scene, options.seed, options.gait
         files, result = export.exported(robot, options.export, *wishes)
     with folder_for(VIEW, options, config, argv) as folder:
-        folder.without_trials()
+        folder.keep_room()
         if files is None:
             files, result = _description(robot, config.zeros)
             from antennate.robots.wiring import wiring  # slow to import

@@ -176,9 +176,9 @@ def run(
     )
     with RunDirectory.create(*place, tasks=experiment.grows) as directory:
         directory.require_free(names_of(experiment, config, films=video))
-        directory.keeps_store = experiment.on_workers
+        directory.keeps_trials = experiment.on_workers
         directory.describe(config)
-        pool = replace(pool, store=directory.store)
+        pool = replace(pool, trials=directory.trials)
         outcome = experiment.run(config, pool, on_step, directory.append)
         keep(experiment, outcome, directory)
         if video is not None:

@@ -56,25 +56,6 @@ def to_json(value: Any) -> str:
     return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
 
 
-def sound_json(text: str) -> str:
-    """The text of a JSON file as it is.
-
-    Raises:
-        ValueError: It is no JSON.
-    """
-    json.loads(text)
-    return text
-
-
-def from_lines(text: str) -> list[Any]:
-    """Rows that stand as JSON on a line each.
-
-    Raises:
-        ValueError: A line is no JSON.
-    """
-    return list(map(json.loads, text.splitlines()))
-
-
 def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
     """The content of a file, piece by piece.
 
@@ -100,15 +81,6 @@ def as_mapping(row: Any) -> Mapping[str, Any]:
     if not is_dataclass(row) or isinstance(row, type):
         raise ConfigError(f"row: expected a dictionary or a dataclass, found {shown(row)}")
     return asdict(row)
-
-
-def to_line(row: Mapping[str, Any]) -> str:
-    """A row as strict JSON on one line.
-
-    Raises:
-        BadInputError: It holds an object of another kind.
-    """
-    return json.dumps(strict(row), allow_nan=False, default=_refuse) + "\n"
 
 
 def _refuse(value: Any) -> Any:
@@ -266,12 +238,13 @@ def encoded(value: Any) -> Any:
     raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
 
 
-def decoded(data: Any, packages: Collection[str]) -> Any:
+def decoded(data: Any, packages: Collection[str] | None) -> Any:
     """Back from `encoded`.
 
     Args:
         data: What JSON held.
-        packages: Top-level packages whose classes may be named.
+        packages: Top-level packages whose classes may be named; None for what objects of any class
+            say in place of them.
 
     Raises:
         ValueError: It is nothing that `encoded` makes.
@@ -292,6 +265,8 @@ def decoded(data: Any, packages: Collection[str]) -> Any:
             flat = np.frombuffer(base64.b64decode(data["data"]), np.dtype(data["dtype"]))
             array = flat.reshape(data["shape"]).copy()
             return array if kind == "array" else array[()]
+        if packages is None:
+            return _plain(data)
         return _object(_class(kind, packages), data, packages)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"expected a result, found {error}") from None
@@ -324,6 +299,22 @@ def _class(name: str, packages: Collection[str]) -> type:
     return kind
 
 
+def plain_row(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A row as a table has it, from what `encoded` made of its dataclass."""
+    return {key: strict(decoded(item, None)) for key, item in data.items() if key != _KIND}
+
+
+def _plain(data: Mapping[str, Any]) -> Any:
+    """What an object of any class says: an enumeration, a model, or the fields of a dataclass."""
+    if data.keys() == {_KIND, "value"}:
+        return data["value"]
+    return json.loads(data["fields"]) if data.keys() == {_KIND, "fields"} else plain_row(data)
+
+
 def dumped(value: Any) -> str:
-    """JSON on one line; NaN and infinities are kept."""
-    return json.dumps(value, separators=(",", ":"))
+    """JSON on one line; NaN and infinities are kept.
+
+    Raises:
+        BadInputError: It holds an object of another kind.
+    """
+    return json.dumps(value, separators=(",", ":"), default=_refuse)

@@ -1,4 +1,4 @@
-"""Run tasks on workers: what was finished before is taken from the store, the rest is run.
+"""Run tasks on workers: what was finished before is taken from their file, the rest is run.
 
 One worker means this process, without any start-up cost. Nothing that was finished is lost when
 somebody presses Ctrl-C, or when a worker or this process is killed.
@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from antennate.errors import WorkerError
-from antennate.studies.formats import decoded, encoded
+from antennate.studies.formats import decoded
 from antennate.studies.sending import IMPORTING
-from antennate.studies.store import Store, key_of
+from antennate.studies.trial_file import TrialFile, key_of
 from antennate.studies.work import Call, Engine, Failure, Here, Work
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Workers:
     Attributes:
         count: How many.
         engine: Where they are; processes of this machine if not given.
-        store: Where finished tasks are kept, None to keep none.
+        trials: Where finished tasks are kept, None to keep none.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
         timeout: Time after which a task that has not ended is given up [s], so that even one worker
             is a process of its own; None for an hour, where one worker waits on.
@@ -68,7 +68,7 @@ class Workers:
 
     count: int
     engine: Engine | None = None
-    store: Store | None = None
+    trials: TrialFile | None = None
     shard: tuple[int, int] | None = None
     timeout: float | None = None
     retry: bool = False
@@ -138,30 +138,29 @@ class _Kept:
 
     def emit(self, place: int, result: Any) -> None:
         """Keep a result."""
-        if self._workers.store is not None:
-            self._workers.store.append(key_of(self._number, place), {"result": encoded(result)})
         self._finish(place, result)
 
     def fail(self, place: int, failure: Failure) -> None:
         """Keep a failure, if there is a result that stands for it."""
         if self._lost is None:
             raise failure.raised()
-        result = self._lost(place, failure)
-        if self._workers.store is not None:
-            content = {"failure": [failure.status, failure.reason], "result": encoded(result)}
-            self._workers.store.append(key_of(self._number, place), content)
-        self._finish(place, result)
+        why = [failure.status, failure.reason]
+        self._finish(place, self._lost(place, failure), failure=why)
 
-    def _finish(self, place: int, result: Any) -> None:
-        self.results[place] = result
-        self._take(result)
+    def _finish(self, place: int, result: Any, **more: Any) -> None:
+        trials, key = self._workers.trials, key_of(self._number, place)
+        with trials.trial(key, result, **more) if trials else contextlib.nullcontext():
+            self.results[place] = result
+            self._take(result)
         self._on_step(len(self.results), self._total)
 
     def resume(self) -> None:
         """Take what was finished before."""
-        records = self._workers.store.records if self._workers.store is not None else {}
-        for place in range(self._total) if records else ():
-            record = records.pop(key_of(self._number, place), None)
+        trials = self._workers.trials
+        if trials is None or not trials.records:
+            return
+        for place in range(self._total):
+            record = trials.records.pop(key_of(self._number, place), None)
             if record is None:
                 continue
             if "failure" in record and (self._lost is None or self._workers.retry):
@@ -171,7 +170,8 @@ class _Kept:
             except ValueError:
                 continue  # of a class that is no more: it is run again
             self.results[place] = result
-            self._take(result)
+            with trials.known():
+                self._take(result)
         if self.results:
             self._on_step(len(self.results), self._total)
 
@@ -236,8 +236,8 @@ def gather(
         timeout = TIMEOUT if workers.timeout is None else workers.timeout
         work = Work(function, dict(enumerate(tasks)), together, timeout)
         call = Call(work, parts, kept.emit, kept.fail, batched=batched, shared=workers.shared)
-        if workers.store is not None:
-            call.saw, call.folder = workers.store.saw, workers.store.path.parent
+        if workers.trials is not None:
+            call.saw, call.folder = workers.trials.saw, workers.trials.path.parent
         workers.engine_for(len(parts)).run(call, workers.count)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, kept.results)), len(tasks))

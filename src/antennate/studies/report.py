@@ -29,14 +29,13 @@ from antennate.studies.run_files import (
     FIGURES,
     FILMS,
     LARGEST,
-    PARTIAL,
     REPORT,
     RESULT,
     TABLE,
-    VERSIONS,
-    when_run,
 )
+from antennate.studies.run_times import when_run
 from antennate.studies.tables import FEW, Table
+from antennate.studies.trial_file import TRIALS
 
 _MOST_REASONS = 20
 """Most trials whose failure is quoted."""
@@ -122,7 +121,7 @@ def report(run: RunDirectory, view: View) -> str:
     Raises:
         BadInputError: The directory is damaged.
     """
-    ended = (run.path / TABLE).exists() and not (run.path / PARTIAL).exists()
+    ended = (run.path / TABLE).exists() and not (run.path / TRIALS).exists()
     result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>{page.escape(view.title)}</h1>"]
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
@@ -253,14 +252,10 @@ def _table(text: str) -> dict[str, Any]:
         raise BadInputError(f"{CONFIG}: expected TOML, found: {error}") from None
 
 
-def _known_versions(run: RunDirectory) -> dict[str, str]:
-    return {name: str(value) for name, value in json.loads(run.text(VERSIONS) or "{}").items()}
-
-
 def _versions(run: RunDirectory) -> str:
-    found = ", ".join(f"{name} {value}" for name, value in _known_versions(run).items())
+    found = ", ".join(f"{name} {value}" for name, value in run.versions().items())
     rows = len(run.rows())
-    kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else PARTIAL}." if rows else ""
+    kept = f" {rows} rows in {TABLE if (run.path / TABLE).exists() else TRIALS}." if rows else ""
     return f"<h2>Versions</h2>{page.paragraphs(f'{found}.{kept}', 'muted')}" if found else ""
 
 
@@ -281,7 +276,7 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
         parts.append(page.block(_command(run, view), wrap=True))
     parts.append(page.paragraphs(FEW if any(FEW in text for text in sentences) else ""))
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
-    parts.append(_differing("Versions", names, [_known_versions(run) for run in runs]))
+    parts.append(_differing("Versions", names, [run.versions() for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))
     parts += [
         _pairs("Films", names, [_films(run) for run in runs], str, "pair"),

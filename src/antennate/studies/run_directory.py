@@ -1,9 +1,8 @@
 """The run directory: everything about one run in one place, and nothing half written.
 
 Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are
-appended to `trials.partial.jsonl`, and what a run needs to be resumed to `trials.store.jsonl`,
-which stays where more trials may follow. A directory that
-holds a run is left alone unless told otherwise; then it is renamed to NAME.old first.
+appended to `trials.jsonl`, which stays where more trials may follow. A directory that holds a run
+is left alone unless told otherwise; then it is renamed to NAME.old first.
 
 ```python
 with RunDirectory.create("tunnel", "runs/mine") as run:
@@ -27,33 +26,21 @@ from antennate import checks
 from antennate.errors import BadInputError, OutputError
 from antennate.files import writing_whole
 from antennate.params.base import Config, Params, read_file
-from antennate.studies import formats
-from antennate.studies.claim import Claim, claim, give_back
+from antennate.studies import formats, run_files
 from antennate.studies.run_files import (
     COMMAND,
     CONFIG,
     FIGURES,
     FILES,
     LOGS,
-    PARTIAL,
     REPORT,
     RESULT,
     ROOM,
     TABLE,
     VERSIONS,
-    add_to_list,
-    begun_line,
-    files_of,
-    inside,
-    listed,
-    read_as,
-    remove_described,
-    remove_run,
-    trim_list,
-    with_end,
-    writing,
 )
-from antennate.studies.store import Tasks
+from antennate.studies.run_times import begun_line, with_end
+from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
 
@@ -66,21 +53,21 @@ class RunDirectory:
 
     Attributes:
         path: Where it is.
-        store: Its finished trials if it can be resumed, None otherwise.
-        keeps_store: Whether they stay when the run is complete.
-        untouched: Whether it was finished already, and no file of it was missing so far.
+        trials: The file of its trials, None if there is none.
+        keeps_trials: Whether that file stays when the run is complete.
+        finished: Whether the run was finished already when it was taken.
+        kept: Whether it stays when the run ends, though it may hold no trials.
+        untouched: Whether no file of such a run was missing so far.
         old: The new name of the folder that it replaces, None if it replaces none.
     """
 
-    def __init__(self, taken: Claim):
-        self.path, self.store, self.keeps_store = taken.path, taken.store, False
-        self._finished, self.untouched = taken.finished, taken.finished
-        self._created, self.old, self._lock = taken.created, taken.old, taken.lock
-        self._partial = taken.partial
-        self._kept = taken.partial is None
+    def __init__(self, path: Path) -> None:
+        self.path, self.old, self.trials = path, None, None
+        self.keeps_trials = self.finished = self.untouched = False
+        self._created: Sequence[Path] = ()
+        self._lock: int | None = None
+        self.kept = self._complete = False
         self._described: dict[str, str] = {}
-        self._spent: Path | None = None
-        self._listed = set(listed(taken.path) or ())
 
     @classmethod
     def create(
@@ -114,7 +101,40 @@ class RunDirectory:
             OutputError: It cannot be made or written to, it holds another run, or another process
                 works on it; or, to overwrite it, it holds no run.
         """
-        return cls(claim(command, path, overwrite, identity, resume, retry, tasks))
+        run, before = cls(run_files.place_of(command, path)), False
+        place, resume = run.path, resume if identity is not None else None
+        with run_files.writing(place):
+            run._created = [p for p in (place, *place.parents) if not p.exists()]
+            place.mkdir(parents=True, exist_ok=path is not None)
+            run_files.sweep(place)
+            run.old = run_files.set_aside(place) if overwrite and any(place.iterdir()) else None
+            try:
+                place.mkdir(exist_ok=True)
+                before = run_files.goes_on(place, resume)
+                run._begin(identity, tasks, before, retry)
+            except BaseException:
+                run._leave(stays=before)
+                raise
+        return run
+
+    def _begin(
+        self, identity: Mapping[str, Any] | None, tasks: Tasks | None, before: bool, retry: bool
+    ) -> None:
+        """Begin a run in a folder that is there, or go on with the one before."""
+        place = self.path
+        if not before:
+            run_files.add_to_list(place, (TRIALS, ROOM))
+        self._lock = locked(place / FILES)
+        if identity is not None:
+            self.trials = TrialFile(place / TRIALS)
+            self.trials.begin(identity, tasks if before else None)
+            whole = not self.trials.damaged and self.trials.holds_all(tasks)
+            self.finished = before and not retry and whole and run_files.is_finished(place)
+            self.untouched, self.kept = self.finished, self.finished or bool(self.trials.others)
+        if before and not self.finished:
+            run_files.remove_run(
+                place, lambda file: file.parent.name != LOGS and file.name != TRIALS
+            )
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -124,9 +144,9 @@ class RunDirectory:
             BadInputError: It holds no run, or the path is none.
         """
         place = checks.path("path", path)
-        if not any((place / name).exists() for name in (RESULT, PARTIAL, CONFIG)):
+        if not any((place / name).exists() for name in (RESULT, TRIALS, CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
-        return cls(Claim(place))
+        return cls(place)
 
     def result(self) -> dict[str, Any]:
         """The content of result.json.
@@ -134,19 +154,22 @@ class RunDirectory:
         Raises:
             BadInputError: There is none, or it is damaged.
         """
-        return read_as(self.path / RESULT, json.loads)
+        return run_files.read_as(self.path / RESULT, json.loads)
 
     def rows(self) -> list[dict[str, Any]]:
         """The finished trials: those of trials.csv, or of a run that was stopped.
 
         Raises:
-            BadInputError: The file is damaged.
+            BadInputError: The file is damaged, or is of a run that a version before did not end.
         """
         if (self.path / TABLE).exists():
-            return read_as(self.path / TABLE, formats.from_csv)
-        if (self.path / PARTIAL).exists():
-            return read_as(self.path / PARTIAL, formats.from_lines)
-        return []
+            return run_files.read_as(self.path / TABLE, formats.from_csv)
+        if old := run_files.before_this_version(self.path):
+            raise BadInputError(
+                f"{self.path}: expected {TRIALS}, found {old} of a version before; go on with that "
+                "version, which writes its result"
+            )
+        return read_trials(self.path / TRIALS).rows() if (self.path / TRIALS).exists() else []
 
     def config(self, model: type[Config]) -> Config:
         """The configuration of the run.
@@ -162,15 +185,29 @@ class RunDirectory:
         Raises:
             BadInputError: The file is damaged, or no file of a run has such a name.
         """
-        path = inside(self.path, name)
-        decode = formats.sound_json if name.endswith(".json") else str
-        return read_as(path, decode) if path.exists() else ""
+        path = run_files.inside(self.path, name)
+        return run_files.read_as(path, str) if path.exists() else ""
+
+    def versions(self) -> dict[str, str]:
+        """What versions.json says; empty if there is none.
+
+        Raises:
+            BadInputError: It is damaged.
+        """
+        path = self.path / VERSIONS
+        found = run_files.read_as(path, json.loads) if path.exists() else {}
+        return {name: str(value) for name, value in found.items()}
 
     def made(self, folder: str, ending: str) -> list[Path]:
         """Files of the run in a folder of it; of a run of an older version all that are there."""
         files = sorted((self.path / folder).glob(f"*{ending}"))
-        own = files_of(self.path)
+        own = run_files.files_of(self.path)
         return [file for file in files if file in own or not own]
+
+    @property
+    def can_go_on(self) -> bool:
+        """Whether it holds trials with which a run can go on."""
+        return self.trials is not None and self.trials.holds_trials
 
     def describe(self, config: Params, command: Sequence[str] = ()) -> None:
         """Write what is known before the run: configuration, versions and command.
@@ -186,25 +223,20 @@ class RunDirectory:
         checks.instance("config", config, Params)
         self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
         if command:
-            resumed = self.store is not None and self.store.holds_trials
-            self._described[COMMAND] = f"{shlex.join(command)}\n{begun_line(resumed)}"
+            self._described[COMMAND] = f"{shlex.join(command)}\n{begun_line(self.can_go_on)}"
         for name, text in self._described.items():
             self.write(name, text)
 
     def _versions(self) -> str:
         """Versions of what the numbers depend on, and the models of the processors."""
-        identity = self.store.identity if self.store is not None else None
-        models = self.store.processors if self.store is not None else []
-        known = versions() if identity is None else identity["versions"]
-        return formats.to_json({**known, "processor": " and ".join(models or [processor()])})
+        trials = self.trials
+        known = trials.identity["versions"] if trials and trials.identity else versions()
+        models = (trials.processors if trials else []) or [processor()]
+        return formats.to_json({**known, "processor": " and ".join(models)})
 
-    def without_trials(self) -> None:
-        """Say that this run has none, so that no empty file of them is left if it is killed.
-
-        Room for the result is kept, so that a disk that fills meanwhile does not cost it.
-        """
-        self._drop_partial()
-        with writing(self.path / ROOM):
+    def keep_room(self) -> None:
+        """Keep room for the result, so that a disk that fills meanwhile does not cost it."""
+        with run_files.writing(self.path / ROOM):
             (self.path / ROOM).write_bytes(bytes(_KEPT_FREE))
 
     def append(self, row: Any) -> None:
@@ -214,18 +246,14 @@ class RunDirectory:
             ConfigError: The row is neither, or holds what is no number, text, list or dictionary.
             OutputError: It cannot be written, or the run is finished.
         """
-        if self._finished:
-            return
-        if self._partial is None:
+        if self._complete:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
-        promised = self.store.promised() if self.store is not None else contextlib.nullcontext()
-        with promised, writing(self.path / PARTIAL):
-            self._partial.write(formats.to_line(formats.as_mapping(row)))
-            self._partial.flush()
-        self.keep()
+        if not self.finished:
+            self.trials = self.trials or TrialFile(self.path / TRIALS)
+            self.kept |= self.trials.add_row(row)
 
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
-        """Write the result and, if there are rows, their table; then drop the partial file.
+        """Write the table of the rows, if there are any, and the result.
 
         What `describe` wrote is written again where somebody removed it meanwhile.
 
@@ -235,39 +263,20 @@ class RunDirectory:
         """
         checks.mapping("result", result)
         checks.instance("rows", rows, Iterable)
-        table = formats.to_csv(formats.as_mapping(row) for row in rows)
-        if table:
+        if table := formats.to_csv(formats.as_mapping(row) for row in rows):
             self.write(TABLE, table)
-        self._give_room()
+        with run_files.writing(self.path / ROOM):
+            (self.path / ROOM).unlink(missing_ok=True)
         for name, text in self._described.items():
             if not (self.path / name).exists():
                 self.write(name, text)
-        if not self._finished and self.text(VERSIONS) not in ("", self._versions()):
+        if not self.finished and self.text(VERSIONS) not in ("", self._versions()):
             self.write(VERSIONS, self._versions())
         self.write(RESULT, formats.to_json(result))
         if text := self.text(COMMAND):
             self.write(COMMAND, with_end(text))
-        self.keep()
-        self._drop_partial()
-        if not result.get("interrupted") and self.store is not None:
-            self._spent = None if self.keeps_store else self.store.path
-            self._close_store()
-
-    def keep(self) -> None:
-        """Let it stay when the run ends."""
-        self._kept = True
-
-    def keep_trials(self) -> None:
-        """Let the store of finished trials stay, so that what is missing can still be written."""
-        self._spent = None
-
-    def keep_logs(self) -> None:
-        """Let it stay when the run ends if it holds logs, even if none of the trials has ended."""
-        self._kept = self._kept or any(path.parent.name == LOGS for path in files_of(self.path))
-
-    def discard(self) -> None:
-        """Let nothing stay of a run whose trials are all in other files."""
-        self._kept = False
+        self.kept = True
+        self._complete = not result.get("interrupted") or self.trials is None
 
     def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
         """Put one file into the directory, whole or not at all; a long text comes in pieces.
@@ -279,28 +288,27 @@ class RunDirectory:
                 bytes nor pieces of text.
             OutputError: It cannot be written.
         """
-        path = inside(self.path, name)
-        if self._finished and path.exists() and (name != REPORT or self.untouched):
+        path = run_files.inside(self.path, name)
+        if self.finished and path.exists() and (name != REPORT or self.untouched):
             return
         self.untouched = False
         self.claim_names([name])
-        with writing(path):
-            path.parent.mkdir(exist_ok=True)
         with writing_whole(path, overwrite=True) as file:
             file.writelines(formats.pieces(content))
 
     def claim_names(self, names: Iterable[str]) -> None:
-        """Put names into the list of files of this run, before these files are made.
+        """Put names into the list of files of this run, and make folders for these files.
 
         Raises:
-            OutputError: There is such a file, which this run has not made.
+            OutputError: There is such a file, which this run has not made; or it cannot be written.
         """
-        new = [name for name in names if name not in self._listed]
-        self.require_free(new)
-        if new:
-            with writing(self.path / FILES):
-                add_to_list(self.path, new)
-            self._listed.update(new)
+        names = list(names)
+        self.require_free(names)
+        with run_files.writing(self.path / FILES):
+            self.path.mkdir(exist_ok=True)
+            run_files.add_to_list(self.path, names)
+            for folder in {(self.path / name).parent for name in names}:
+                folder.mkdir(exist_ok=True)
 
     def require_free(self, names: Iterable[str]) -> None:
         """Find out, before a run, whether names that it will write are those of somebody else.
@@ -308,24 +316,13 @@ class RunDirectory:
         Raises:
             OutputError: There is such a file, which this run has not made.
         """
+        own = run_files.listed(self.path) or ()
         for name in names:
-            if name not in self._listed and os.path.lexists(self.path / name):
+            if name not in own and os.path.lexists(self.path / name):
                 raise OutputError(
                     f"{self.path}: expected no file {name} but of this run, found one of somebody "
                     "else; move it, or choose another folder"
                 )
-
-    def folder(self, name: str) -> Path:
-        """A folder in the directory for files of the run, made if it is not there.
-
-        Raises:
-            ConfigError: The name leads out of the directory.
-            OutputError: It cannot be made.
-        """
-        path = inside(self.path, name)
-        with writing(path):
-            path.mkdir(exist_ok=True)
-        return path
 
     def write_figures(self, figures: Mapping[str, Any]) -> None:
         """Put figures of matplotlib into the directory, each as svg and png, by name.
@@ -340,45 +337,33 @@ class RunDirectory:
             for suffix, data in render(figure).items():
                 self.write(f"{FIGURES}/{name}.{suffix}", data)
 
-    def _drop_partial(self) -> None:
-        if self._partial is None:
-            return
-        with writing(self.path / PARTIAL):
-            self._partial.close()
-            (self.path / PARTIAL).unlink(missing_ok=True)
-        self._partial = None
-
-    def _close_store(self, remove: bool = False) -> None:
-        if self.store is not None:
-            self.store.close(remove)
-            self.store = None
-
-    def _give_room(self) -> None:
-        with writing(self.path / ROOM):
-            (self.path / ROOM).unlink(missing_ok=True)
-
     def __enter__(self) -> RunDirectory:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None and self._spent is not None:  # else what is missing can be written again
-            with contextlib.suppress(OSError):
-                self._spent.unlink()
-        stays = self._kept or (self.store is not None and self.store.holds_trials)
-        self._close_store(remove=not stays)
-        if stays:
-            if self._partial is not None:
-                with contextlib.suppress(OSError):
-                    self._partial.close()
-        else:
-            with contextlib.suppress(OSError, OutputError):
-                self._drop_partial()
-                self._give_room()
-                (remove_described if self.old is None else remove_run)(self.path)
-                give_back(self.path, self._created, self.old)
+        complete = kind is None and self._complete  # else what is missing can be written again
+        self._leave(self.kept or self.can_go_on, spent=complete and not self.keeps_trials)
+
+    def _leave(self, stays: bool, spent: bool = False) -> None:
+        """Let others take the folder, as it is or without this run."""
+        if self.trials is not None:
+            self.trials.close(remove=spent or not stays)
+        with contextlib.suppress(OSError):
+            if self._lock is not None and stays:
+                run_files.trim_list(self.path, self._lock)
+            elif self._lock is not None:
+                run_files.remove_run(
+                    self.path, lambda file: self.old is not None or _is_before(file)
+                )
+            if not stays and self.old is not None:
+                self.old.rename(self.path)
+            for folder in () if stays else self._created:
+                folder.rmdir()
         if self._lock is not None:
-            if stays:
-                with contextlib.suppress(OSError):
-                    trim_list(self.path, self._lock)
             os.close(self._lock)
-            self._lock = None
+        self._lock = None
+
+
+def _is_before(file: Path) -> bool:
+    """Whether a file is of those that stand there before anything is measured, or a log."""
+    return file.name in (CONFIG, VERSIONS, COMMAND, TRIALS, ROOM) or file.parent.name == LOGS

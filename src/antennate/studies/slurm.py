@@ -24,8 +24,8 @@ from antennate.studies.identity import environment
 from antennate.studies.processes import Processes, on_ctrl_c
 from antennate.studies.run_files import JOBS
 from antennate.studies.sending import Packed, added_objects, pack_whole
-from antennate.studies.store import Store, parsed
 from antennate.studies.submitted import require_same, work_apart
+from antennate.studies.trial_file import Content, TrialFile
 from antennate.studies.work import Call, Failure, Work
 
 _WARNINGS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2)
@@ -76,14 +76,14 @@ class Resumable:
         if not file.exists():
             return 0
         require_same(self._identity, Path())
-        store = Store(file)
-        store.begin(self._identity)
-        left = {k: task for k, task in self._part.tasks.items() if str(k) not in store.records}
+        trials = TrialFile(file)
+        trials.begin(self._identity)
+        left = {k: task for k, task in self._part.tasks.items() if str(k) not in trials.records}
 
         def keep(place: int, content: Mapping[str, Any]) -> None:
             if not file.exists():
                 raise WorkerError("expected a driver that reads what this job finishes, found none")
-            store.append(str(place), content)
+            trials.append(str(place), content)
 
         def emit(place: int, result: Any) -> None:
             keep(place, {"result": encoded(result)})
@@ -94,10 +94,10 @@ class Resumable:
         if left:
             part = self._part.only(list(left))
             work = work_apart(part, Path.cwd(), self._added, _WARNINGS)
-            call = Call(work, [list(left)], emit, fail, store.saw)
+            call = Call(work, [list(left)], emit, fail, trials.saw)
             call.divide(self._at_once)
             Processes().run(call, 1)
-        store.close()
+        trials.close()
         return len(left)
 
     def checkpoint(self) -> Any:
@@ -246,7 +246,7 @@ class _Driver:
         data = data[: data.rfind(b"\n") + 1]
         if data:
             self._failed_starts = 0
-        lines = parsed(data)
+        lines = Content().read(data)
         for model in lines.processors:
             self._call.saw(model)
         for place in [place for place in job.left if str(place) in lines.records]:

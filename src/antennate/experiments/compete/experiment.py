@@ -30,7 +30,7 @@ from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
-from antennate.studies.run_files import span
+from antennate.studies.run_times import span
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.studies.work import Failure
 from antennate.types import AntennaFrame, Controller
@@ -131,7 +131,7 @@ def _decide(made: Controller, config: TunnelConfig) -> None:
 
 def foretold(config: CompeteConfig, workers: Workers) -> str:
     """How long the episodes will take that are left: between two ends, as nobody knows more yet."""
-    kept = set[int]() if workers.store is None else places_of(workers.store.records)
+    kept = set[int]() if workers.trials is None else places_of(workers.trials.records)
     left = [d for i, d in enumerate(draws(config)) if i not in kept and workers.mine(i)]
     limits = dict[tuple[str, int], float]()
     for draw in left:

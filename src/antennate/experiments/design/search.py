@@ -213,18 +213,18 @@ class Search:
 
     def _decided(self, key: str, make: Callable[[], Any]) -> Any:
         """What was decided before, or else is decided now: read back, it stays as it was."""
-        store = self.workers.store
+        trials = self.workers.trials
         version = package().__version__
-        if store is not None and (record := store.records.get(key)) is not None:
+        if trials is not None and (record := trials.records.get(key)) is not None:
             if record["optuna"] != version:
                 raise BadInputError(
-                    f"{store.path.parent}: expected optuna {record['optuna']}, with which it was "
+                    f"{trials.path.parent}: expected optuna {record['optuna']}, with which it was "
                     f"begun, found {version}; choose another folder or give --overwrite"
                 )
             return record["decided"]
         decision = make()
-        if store is not None:
-            store.append(key, {"optuna": version, "decided": decision})
+        if trials is not None:
+            trials.append(key, {"optuna": version, "decided": decision})
         return decision
 
     def _evaluate(self, designs: Sequence[Design], phase: str) -> None:

@@ -1,0 +1,346 @@
+"""The file of trials: one line of JSON each with a checksum, only ever appended.
+
+| line | says |
+|---|---|
+| `identity` | what is run; with `keys`, that there are more trials, and the keys of those before |
+| `processor` | a model of processor, on which trials that follow ran |
+| `key`, `result` | one trial: what its worker returned, with every bit, and its rows (`rows`) |
+| `row`, `values` | a row that belongs to no trial, and its number |
+
+Rows of a trial are `result` or `first` where the result, or the first part of it, is the row, so
+that it stands there once; else they are listed.
+
+A line that a killed process left torn, or that was damaged since, fails its checksum: its trial
+counts as not run. The file is locked while somebody appends to it; the system frees the lock when
+that process ends, however it ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import re
+import sys
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from antennate.errors import BadInputError, OutputError
+from antennate.files import read_limited
+from antennate.studies.formats import as_mapping, dumped, encoded, plain_row, strict
+from antennate.studies.identity import but_trials, differences
+
+TRIALS = "trials.jsonl"
+Tasks = Callable[[Mapping[str, Any]], Sequence[Any]]
+"""What each task of a configuration is, by its place: the same for any number of trials."""
+_SYNC = 1.0
+"""Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
+_HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
+_RESULT, _FIRST = "result", "first"
+"""Where the row of a trial stands in its result."""
+
+
+@dataclass
+class Content:
+    """What the lines of a file say.
+
+    Attributes:
+        identity: What is run, None where no sound line says it.
+        records: Trials by key; of a key that comes twice the last counts.
+        others: Rows that belong to no trial, by number.
+        processors: Models of the processors that they ran on.
+        damaged: Lines that failed their checksum.
+    """
+
+    identity: Any = None
+    records: dict[str, Any] = field(default_factory=dict)
+    others: dict[int, Any] = field(default_factory=dict)
+    processors: list[str] = field(default_factory=list)
+    damaged: int = 0
+
+    def read(self, data: bytes) -> Content:
+        """Take lines.
+
+        Trials before the line that says what is run are of nothing that is known: they go.
+        """
+        for content in map(_sound, filter(None, data.split(b"\n"))):
+            if content is None:
+                self.damaged += 1
+            elif "identity" in content:
+                if self.identity is None or "keys" in content:
+                    self._turn_to(content["identity"], content.get("keys", {}))
+            elif "key" in content:
+                self.records[content["key"]] = content
+            elif "row" in content:
+                self.others[content["row"]] = content["values"]
+            elif "processor" in content:
+                self.processors.append(content["processor"])
+        return self
+
+    def _turn_to(self, identity: Any, keys: Mapping[str, str]) -> None:
+        """Go on with what is run from here on; trials of before that it holds have other keys."""
+        if self.identity is None:
+            keys, self.processors = {}, []
+        self.identity, self.others = identity, {}
+        moved = {keys[key]: record for key, record in self.records.items() if key in keys}
+        self.records = {key: {**record, "key": key} for key, record in moved.items()}
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Rows of all trials, as a table has them, and those of none.
+
+        A trial that was first shown on a page, which keeps its row alone, is a trial since.
+        """
+        found: list[dict[str, Any]] = []
+        for record in self.records.values():
+            match record.get("rows", ()):
+                case "result":
+                    found.append(plain_row(record["result"]))
+                case "first":
+                    found.append(plain_row(record["result"]["of"][0]))
+                case listed:
+                    found += listed
+        return [*found, *(row for row in self.others.values() if row not in found)]
+
+
+class TrialFile(Content):
+    """The trials of one run, open to add more.
+
+    Args:
+        path: The file; it is made if it is missing.
+
+    Attributes:
+        holds_trials: Whether it holds any that no other file has, kept before or now.
+
+    Raises:
+        OutputError: It cannot be opened, or another process appends to it.
+        BadInputError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        try:
+            self._file = locked(path, os.O_CREAT | os.O_APPEND)
+        except OSError as error:
+            raise OutputError(f"expected to write {path}, found: {error.strerror}") from None
+        self._synced, self._seen, self._count = 0.0, list[str](), 0
+        self._rows: list[Any] | None = None
+        data = read_limited(path, sys.maxsize)
+        self._end = len(data)
+        self.read(data)
+        self.holds_trials = bool(self.records)
+        if data and not data.endswith(b"\n"):
+            self._write(b"\n")  # what a killed process left is a line of its own
+
+    def begin(self, identity: Mapping[str, Any], tasks: Tasks | None = None) -> None:
+        """Say what is run, or find that it is what the file was begun with, or more trials of it.
+
+        Args:
+            identity: What is run.
+            tasks: Of a configuration; None if there cannot be more trials.
+
+        Raises:
+            BadInputError: It is something else, or fewer trials; the text says what differs.
+            OutputError: It cannot be written.
+        """
+        before, place = self.identity, self.path.parent
+        if before is None and self.records:
+            raise BadInputError(
+                f"{self.path}: expected what is run in its first line, found that damaged, and "
+                f"{len(self.records)} sound trials; choose another folder or give --overwrite"
+            )
+        if before is None:
+            self._write(line({"identity": identity}))
+            self._turn_to(identity, {})
+        elif not (changes := differences(before, identity)):
+            return
+        elif tasks is None or but_trials(before) != but_trials(identity):
+            raise BadInputError(
+                f"{place}: expected the run that it was begun with, found another: "
+                f"{changes}; choose another folder or give --overwrite"
+            )
+        else:
+            old, new = tasks(before["config"]), tasks(identity["config"])
+            if len(new) < len(old):
+                raise BadInputError(
+                    f"{place}: expected no fewer trials than this run has, found {changes}; "
+                    "choose another folder for fewer"
+                )
+            places = {task: key_of(0, i) for i, task in enumerate(new)}
+            keys = {key_of(0, i): places[task] for i, task in enumerate(old) if task in places}
+            self._write(line({"identity": identity, "keys": keys}))
+            self._turn_to(identity, keys)
+
+    def holds_all(self, tasks: Tasks | None) -> bool:
+        """Whether no trial of what is run is missing, as far as its tasks are known."""
+        count = 0 if tasks is None or self.identity is None else len(tasks(self.identity["config"]))
+        return all(key_of(0, place) in self.records for place in range(count))
+
+    @contextlib.contextmanager
+    def trial(self, key: str, result: Any, **more: Any) -> Iterator[None]:
+        """Keep a trial once the block has ended, however it ends, and its rows from the block.
+
+        Args:
+            key: The key of the trial.
+            result: What its worker returned.
+            more: What else its line says.
+
+        Raises:
+            OutputError: As for `append`.
+        """
+        content = {**more, "result": encoded(result)}
+        with self.known() as rows:
+            try:
+                yield
+            finally:
+                self.append(key, content | ({"rows": _rows(rows, result)} if rows else {}))
+
+    @contextlib.contextmanager
+    def known(self) -> Iterator[list[Any]]:
+        """Rows that are added within the block are those of a trial, which has a line already."""
+        self._rows = rows = list[Any]()
+        try:
+            yield rows
+        finally:
+            self._rows = None
+
+    def append(self, key: str, content: Mapping[str, Any], elsewhere: bool = False) -> None:
+        """Keep one trial, and its processor, if that is a new one.
+
+        Args:
+            key: Its key.
+            content: What else its line says.
+            elsewhere: Whether it stays in another file, too.
+
+        Raises:
+            OutputError: The disk is full, or the like; what was kept before stays whole.
+        """
+        new = b"".join(line({"processor": model}) for model in self._seen)
+        self._write(new + line({"key": key, **content}), is_trial=not elsewhere)
+        self.processors += self._seen
+        self._seen.clear()
+
+    def add_row(self, row: Any) -> bool:
+        """Keep a row, a dataclass or a mapping; whether it has a line of its own.
+
+        One that the file has from a process before is not written again.
+
+        Raises:
+            ConfigError: The row is neither.
+            BadInputError: It holds what is no number, text, list or dictionary.
+            OutputError: As for `append`.
+        """
+        if self._rows is not None:
+            self._rows.append(row if is_dataclass(row) else as_mapping(row))
+            return False
+        number, values = self._count, strict(as_mapping(row))
+        self._count += 1
+        data = line({"row": number, "values": values})
+        if number not in self.others or dumped(self.others[number]) != dumped(values):
+            self._write(data)
+        self.others[number] = values
+        return True
+
+    def saw(self, model: str) -> None:
+        """Name the processor of the trials that come next; it is kept with the first of them."""
+        if model not in [*self.processors, *self._seen]:
+            self._seen.append(model)
+
+    def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
+        """Keep trials that stay in other files too, and the processors that they ran on."""
+        for model in processors:
+            self.saw(model)
+        for key, content in records.items():
+            self.append(key, content, elsewhere=True)
+            self.records[key] = content
+
+    def _write(self, data: bytes, is_trial: bool = False) -> None:
+        try:
+            left = data
+            while left:  # a disk that is almost full takes a part
+                left = left[os.write(self._file, left) :]
+            self._end += len(data)
+            self.holds_trials |= is_trial  # before the disk is waited for, where a signal may come
+            if time.monotonic() - self._synced > _SYNC:
+                os.fsync(self._file)
+                self._synced = time.monotonic()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._end)
+            kept = "; what was finished is kept, and the run can be resumed"
+            raise OutputError(
+                f"expected to write {self.path}, found: {error.strerror}"
+                f"{kept if self.holds_trials else ''}"
+            ) from None
+
+    def close(self, remove: bool = False) -> None:
+        """Let others append; `remove` deletes the file first."""
+        with contextlib.suppress(OSError):
+            if remove:
+                self.path.unlink(missing_ok=True)
+            elif self._end:
+                os.fsync(self._file)
+        with contextlib.suppress(OSError):
+            os.close(self._file)
+
+
+def read_trials(path: Path) -> Content:
+    """The content of a file; nobody need have ended it.
+
+    Raises:
+        BadInputError: It cannot be read.
+    """
+    return Content().read(read_limited(path, sys.maxsize))
+
+
+def key_of(call: int, place: int) -> str:
+    """The key of a task: the number of the call that carries it out, and its place in that."""
+    return f"{call}.{place}"
+
+
+def line(content: Mapping[str, Any]) -> bytes:
+    """One line with its checksum, which is that of the same JSON without it."""
+    body = dumped(content).encode()
+    return b'{"crc":"%08x",%b\n' % (zlib.crc32(body), body[1:])
+
+
+def locked(path: Path, flags: int = 0) -> int:
+    """The handle of a file of a run, locked: the system frees it when this process ends.
+
+    Raises:
+        OSError: It cannot be opened.
+        OutputError: Another process works on it.
+    """
+    handle = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o666)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise OutputError(
+            f"{path.parent}: expected a run that nobody works on, found another process at it"
+        ) from None
+    except OSError:
+        pass  # a file system without locks
+    return handle
+
+
+def _rows(rows: Sequence[Any], result: Any) -> Any:
+    """The rows of a trial, or where in its result its only one stands."""
+    if len(rows) == 1 and is_dataclass(rows[0]):
+        if rows[0] is result:
+            return _RESULT
+        if isinstance(result, tuple) and rows[0] is result[0]:
+            return _FIRST
+    return [strict(as_mapping(row)) for row in rows]
+
+
+def _sound(text: bytes) -> dict[str, Any] | None:
+    """The content of a line, None of one that is damaged."""
+    head = _HEAD.match(text)
+    body = b"{" + text[head.end() :] if head else b""
+    return json.loads(body) if head and zlib.crc32(body) == int(head[1], 16) else None
