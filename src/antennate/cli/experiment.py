@@ -113,9 +113,9 @@ OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_t
 def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
     """Fields of the options that this experiment has not."""
     has = {
-        OF_WORKERS: experiment.on_workers,
-        ("engine", "slurm"): experiment.anywhere,
-        ("shard",): experiment.in_shards,
+        OF_WORKERS: experiment.workers != "none",
+        ("engine", "slurm"): experiment.workers == "anywhere",
+        ("shard",): experiment.undivided is not None,
         ("video", "video_trial"): experiment.films is not None,
         ("video_view",): experiment.films is not None and "robot" in experiment.config.model_fields,
         ("video_trial",): "trials" in experiment.config.model_fields,
@@ -138,7 +138,8 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
             f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
             "found none"
         )
-    if options.shard is not None and (why := experiment.undivided(config)):
+    undivided = experiment.undivided
+    if options.shard is not None and undivided is not None and (why := undivided(config)):
         raise ConfigError(f"--shard: {why}")
     config = experiment.settled(config, options.out if options.resume or options.retry else None)
     experiment.check(config)
@@ -224,7 +225,7 @@ def carry_out(
             view.results = str(run.path)
         films = options.video_trial if options.video else None
         run.require_free(names_of(experiment, config, not options.no_figures, films))
-        run.keeps_trials = experiment.on_workers
+        run.keeps_trials = experiment.workers != "none"
         workers = replace(workers, trials=run.trials, shared=environment(kind, config))
         try:
             if shards and run.trials is not None:
@@ -304,7 +305,7 @@ def _folder(
     how: dict[str, Any] = {}
     if shards:
         how = {"command": "merge"}
-    elif experiment.on_workers:
+    elif experiment.workers != "none":
         resume = options.resume or options.retry or experiment.continued
         tasks = experiment.grows if options.shard is None else None
         how = {"resume": resume, "retry": options.retry, "tasks": tasks}

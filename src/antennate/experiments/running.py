@@ -156,7 +156,7 @@ def run(
     experiment, config = _configured(name_or_config, settings)
     config = experiment.settled(config, out if resume else None)
     experiment.check(config)
-    if engine != LOCAL and not (experiment.on_workers and experiment.anywhere):
+    if engine != LOCAL and experiment.workers != "anywhere":
         raise ConfigError(
             f"engine: expected an experiment that runs trials on workers, found {experiment.name}"
         )
@@ -176,7 +176,7 @@ def run(
     )
     with RunDirectory.create(*place, tasks=experiment.grows) as directory:
         directory.require_free(names_of(experiment, config, films=video))
-        directory.keeps_trials = experiment.on_workers
+        directory.keeps_trials = experiment.workers != "none"
         directory.describe(config)
         pool = replace(pool, trials=directory.trials)
         outcome = experiment.run(config, pool, on_step, directory.append)

@@ -23,7 +23,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
 from antennate.errors import ConfigError
 from antennate.studies.columns import Frame, content, frame, typed
@@ -141,15 +141,14 @@ class Experiment(Generic[Config, Out]):
         continued: Whether a run goes on with what its folder holds, without --resume.
         explained: Page that says what the rows of its tables mean; empty for none.
         captions: What each figure shows, by its name, in one sentence.
-        on_workers: Whether it runs trials on workers; without them there is no engine to choose.
-        anywhere: Whether workers may be on other machines.
+        workers: Where its trials may run: none (it has no trials on workers), here (processes of
+            this machine) or anywhere (on other machines, too).
         foretold: foretold(config, workers) -> one line on how long it will take, said before the
             first trial; empty for nothing.
         tasks: tasks(config) -> an identity for each task of `run`. Tasks that stay the same with
             more trials have the same, so a finished run can take more. None: that of `trials`.
-        in_shards: Whether its trials are known from the start, so that several machines can each
-            run a share of them, a shard.
-        undivided: undivided(config) -> why shards cannot divide its trials; empty if they can.
+        undivided: undivided(config) -> why several machines cannot each run a share of its trials,
+            a shard; empty if they can. None where they never can, as trials follow from others.
     """
 
     name: str
@@ -175,10 +174,8 @@ class Experiment(Generic[Config, Out]):
     continued: bool = False
     explained: str = ""
     captions: Mapping[str, str] = field(default_factory=dict)
-    on_workers: bool = True
-    anywhere: bool = True
-    in_shards: bool = True
-    undivided: Callable[[Config], str] = lambda config: ""
+    workers: Literal["none", "here", "anywhere"] = "anywhere"
+    undivided: Callable[[Config], str] | None = lambda config: ""
     foretold: Callable[[Config, Workers], str] = lambda config, workers: ""
     tasks: Callable[[Config], Sequence[Any]] | None = None
 
@@ -255,6 +252,7 @@ class Experiment(Generic[Config, Out]):
         without that module there are none.
         """
         folder = module.rpartition(".")[0]
+        more.setdefault("explained", "docs/results.md")
         if "figures" not in more and importlib.util.find_spec(f"{folder}.figure"):
             more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
                 outcome

@@ -243,5 +243,4 @@ EXPERIMENT = Experiment.of_folder(
         "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
         "against unloading, and rival curves.",
     },
-    explained="docs/results.md",
 )

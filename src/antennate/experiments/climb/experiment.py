@@ -81,5 +81,4 @@ EXPERIMENT = Experiment.of_trials(
         "of the trials; the band is the aim.",
         "felt": "What climb takes the ground for, by the first thing that it feels.",
     },
-    explained="docs/results.md",
 )

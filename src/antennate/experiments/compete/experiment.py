@@ -216,7 +216,7 @@ EXPERIMENT = Experiment.of_folder(
     undivided=undivided,
     foretold=foretold,
     parts="episodes",
-    anywhere=False,
+    workers="here",
     captions={
         "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "
         "Wilson's.",
@@ -224,5 +224,4 @@ EXPERIMENT = Experiment.of_folder(
         "profiles": "Share of the draws that a controller crosses within a factor of the time of "
         "the fastest (Dolan and More).",
     },
-    explained="docs/results.md",
 )

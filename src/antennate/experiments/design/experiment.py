@@ -263,5 +263,5 @@ EXPERIMENT = Experiment.of_folder(
         "tradeoff": "Every design by its objectives, with the front, the references, and those run "
         "again with their intervals.",
     },
-    in_shards=False,
+    undivided=None,
 )

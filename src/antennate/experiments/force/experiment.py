@@ -285,5 +285,4 @@ EXPERIMENT = Experiment.of_folder(
         "force": "Force over flex, at rest and on the move, and the share of the force "
         "that one reading explains.",
     },
-    explained="docs/results.md",
 )

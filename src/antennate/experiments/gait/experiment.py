@@ -290,5 +290,4 @@ EXPERIMENT = Experiment.of_folder(
         "gait": "The sweep over the lead of the body wave, and the maneuvers from above.",
         "unknown": "FORWARD over all draws of the unknown numbers, and over each of them alone.",
     },
-    explained="docs/results.md",
 )

@@ -351,5 +351,4 @@ EXPERIMENT = Experiment.of_folder(
         "twists": "The twist map: amplitude and offset over speed and curvature, and walked turns.",
         "swimmer": "Beside it: the curvature of Purcell's swimmer, with its best strokes.",
     },
-    explained="docs/results.md",
 )

@@ -277,6 +277,5 @@ EXPERIMENT = Experiment.of_folder(
         "ringdown": "The swing of the antenna after it is let go, animals beside it, and a "
         "cone as a chain.",
     },
-    explained="docs/results.md",
-    on_workers=False,
+    workers="none",
 )

@@ -287,6 +287,5 @@ EXPERIMENT = Experiment.of_folder(
         "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "
         "and the choice of the divider.",
     },
-    explained="docs/results.md",
-    on_workers=False,
+    workers="none",
 )

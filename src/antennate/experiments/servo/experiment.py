@@ -183,6 +183,5 @@ EXPERIMENT = Experiment.of_folder(
         "servo": "Goals and measured positions of each recording, with those of two models; "
         "shaded: full drive while the shaft rests.",
     },
-    explained="docs/results.md",
-    on_workers=False,
+    workers="none",
 )

@@ -270,6 +270,5 @@ EXPERIMENT = Experiment.of_folder(
         "springs": "Torque of each spring up to its yield, and the errors of what could "
         "be wound in its place.",
     },
-    explained="docs/results.md",
-    on_workers=False,
+    workers="none",
 )

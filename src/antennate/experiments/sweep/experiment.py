@@ -284,5 +284,4 @@ EXPERIMENT = Experiment.of_folder(
         "sweep": "Shares of the time in each shape, with the base fixed and moving, and "
         "the errors of the estimates.",
     },
-    explained="docs/results.md",
 )

@@ -255,6 +255,5 @@ EXPERIMENT = Experiment.of_folder(
     captions={
         "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",
     },
-    explained="docs/results.md",
-    on_workers=False,
+    workers="none",
 )

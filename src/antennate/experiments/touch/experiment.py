@@ -354,5 +354,4 @@ EXPERIMENT = Experiment.of_folder(
         "touch_trace": "One traverse: the wall with shapes of the antenna, flex, bending "
         "level, and contact against truth.",
     },
-    explained="docs/results.md",
 )

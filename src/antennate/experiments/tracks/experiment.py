@@ -296,5 +296,5 @@ EXPERIMENT = Experiment.of_folder(
         "angle over time, and what other criteria change.",
     },
     explained="docs/tracks.md",
-    on_workers=False,
+    workers="none",
 )

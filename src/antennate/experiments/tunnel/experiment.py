@@ -165,5 +165,4 @@ EXPERIMENT = Experiment.of_trials(
     logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in every(config)],
     tasks=tasks,
     captions=CAPTIONS,
-    explained="docs/results.md",
 )

@@ -295,5 +295,4 @@ EXPERIMENT = Experiment.of_trials(
         "passages": "The first trial of each profile: advance of the tip, and shapes of the "
         "antenna along the wall.",
     },
-    explained="docs/results.md",
 )
