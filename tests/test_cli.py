@@ -533,11 +533,11 @@ def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
     )
     words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]
-    partial = tmp_path / "run" / "trials.jsonl"
+    trials = tmp_path / "run" / "trials.jsonl"
     with child(code, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
         try:
             deadline = time.monotonic() + 60
-            while not (partial.exists() and partial.read_text().count("\n") >= 2):
+            while not (trials.exists() and trials.read_text().count('"key":') >= 2):
                 assert time.monotonic() < deadline
                 time.sleep(0.2)
             run.send_signal(number)
