@@ -148,7 +148,10 @@ def judge(folders: Sequence[str]) -> None:
         if not fits:
             those = " or ".join(f"`{command(name, c)}`" for c in SETTINGS if name in parts(c))
             sys.exit(f"{folder}: expected a run of {those}, found another")
-        runs[fits[0].setting][name] = load(name).read(run.result())
+        try:
+            runs[fits[0].setting][name] = load(name).read(run.result())
+        except ValueError as error:
+            sys.exit(f"{folder}: expected a result of this version, found {error}; run it again")
     for config in SETTINGS:
         of = runs[config.setting]
         if missing := [command(name, config) for name in parts(config) if of and name not in of]:

@@ -7,11 +7,15 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from antennate.experiments.reproduce.experiment import CLAIMS, ReproduceConfig, configured
+from antennate.experiments.wall.experiment import Border, Pair, Passed, ProfileSummary, WallResult
+from antennate.studies.columns import content
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.statistics import Discordance
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -83,23 +87,35 @@ def test_both_pages_tell_what_the_run_found(pages: Path) -> None:
 
 def test_runs_with_fitted_numbers_stand_beside(pages: Path, tmp_path: Path) -> None:
     """Of the wall soft slips, no spring reaches 30° and all else fails: 19 of 20 is over a half."""
-    row = {"trials": 20, "invalid": 0, "successes": 0, "jams": 0, "slips": 19, "hinge_max_deg": 9.0}
+    counts: Any = {"trials": 20, "invalid": 0, "successes": 0, "jams": 0, "slips": 19}
+    ended = Passed(**counts, wilson95=None)
+    row = ProfileSummary(**vars(ended), hinge_max_deg=9.0, after_start=ended)
+    none: Any = {"only_first": 0, "only_second": 0, "mcnemar_p": 1.0}
+    pair = Pair(**none, trials=20, after_start=Discordance(**none))
     names = ("stiff", "compliant", "descending", "matched_uniform", "ascending")
-    pair = {"trials": 20, "only_first": 0, "only_second": 0}
-    found = {
-        "command": "wall",
-        "profiles": dict.fromkeys(names, row),
-        "paired": {f"descending-{name}": pair for name in names[3:]},
-    }
+    found = WallResult(
+        seed=7,
+        gravity="down",
+        start_m=0.04,
+        profiles=dict.fromkeys(names, row),
+        border=Border(at_mm=19.0, below_mm=None, above_mm=None),
+        paired={f"descending-{name}": pair for name in names[3:]},
+    )
     for setting in ("fitted", "default"):
         config = configured("wall", ReproduceConfig(setting=setting))
         with RunDirectory.create("wall", tmp_path / setting) as folder:
             folder.describe(config)
-            folder.finish(found)
+            folder.finish(content(found))
     (tmp_path / "other").mkdir()
     for name in ("config.toml", "result.json"):
         text = (tmp_path / "fitted" / name).read_text().replace("trials = 200", "trials = 199")
         (tmp_path / "other" / name).write_text(text)
+    (tmp_path / "older").mkdir()
+    shutil.copy(tmp_path / "fitted" / "config.toml", tmp_path / "older")
+    (tmp_path / "older" / "result.json").write_text('{"command": "wall"}')
+    done = run(pages, str(tmp_path / "older"))
+    assert "expected a result of this version, found seed: field required" in done.stderr
+    assert "Traceback" not in done.stderr
     done = run(pages, str(tmp_path / "other"))
     assert "expected a run of `antennate bench wall --seed 7` or `antennate bench " in done.stderr
     assert "missing: antennate antenna springs;" in run(pages, str(tmp_path / "default")).stderr
