@@ -25,7 +25,7 @@ from antennate.params.base import from_values, read_file
 from antennate.robots.imu import ImuParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import draw_trial, scene_of
-from antennate.studies.columns import frame
+from antennate.studies.pooling import frame
 
 TINY = {
     "trials": 1,

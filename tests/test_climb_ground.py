@@ -24,7 +24,7 @@ from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.sensing import Verdict
 from antennate.experiments.climb.tables import ground_tables
 from antennate.sim.trial import draw_trial, scene_of
-from antennate.studies.columns import frame
+from antennate.studies.pooling import frame
 
 WORDS = (
     "flat",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -12,24 +13,26 @@ from antennate.errors import ConfigError
 from antennate.studies.columns import (
     Column,
     Ends,
-    by,
     column,
     column_of,
     columns,
     content,
+    named,
+    shown,
+    tabular,
+    typed,
+)
+from antennate.studies.pooling import (
+    by,
     count,
     frame,
     largest,
     mean,
     median,
-    named,
     pooled,
     share,
-    shown,
     smallest,
-    tabular,
     total,
-    typed,
 )
 from antennate.studies.statistics import wilson
 from antennate.studies.tables import Table
@@ -152,12 +155,18 @@ def test_a_name_tells_words_and_unit() -> None:
     )
 
 
-def test_every_column_of_the_wall_is_said_once() -> None:
-    """What a trial and what a profile has in common comes from one class."""
-    experiment = experiments.load("wall")
-    assert experiment.row is not None
-    of_row = {each.name: each for each in columns(experiment.row)}
-    assert of_row["longest_stick_mm"].title == "longest stick [mm]"
+def test_what_a_trial_and_a_profile_of_the_wall_share_is_one_column() -> None:
+    """The class of the rows and that of the summaries inherit it."""
+    row, hints = experiments.load("wall").row, get_type_hints(experiments.load("wall").result)
+    _, summary = get_args(hints["profiles"])
+    assert row is not None
+    of_row = {each.name: each for each in columns(row)}
+    shared = [each for each in columns(summary) if each.name in of_row]
+    assert [each.name for each in shared if each.unit == "mm"] == [
+        "least_advance_mm",
+        "longest_stick_mm",
+    ]
+    assert all(each == of_row[each.name] for each in shared)
 
 
 def test_what_cannot_be_pooled_is_told_by_class_and_field() -> None:
@@ -179,4 +188,5 @@ def test_whole_numbers_stay_whole_where_some_are_not_known() -> None:
     rows = frame([{"x": 3}, {"x": None}])
     assert [repr(pool(rows, "x")) for pool in (largest, smallest, total)] == ["3"] * 3
     assert shown(3.0, "d") == "3"
-    assert list(by(frame([{"c": None, "x": 1}, {"c": "a", "x": 2}]), "c")) != ["a"]
+    groups = by(frame([{"c": None, "x": 1}, {"c": "a", "x": 2}]), "c")
+    assert [some["x"].tolist() for some in groups.values()] == [[1], [2]]

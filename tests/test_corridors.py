@@ -280,7 +280,7 @@ def test_a_run_shows_shares_of_each_limit(
 def test_shares_are_of_the_limit_of_each_trial() -> None:
     from antennate.experiments.tunnel import result as measures
     from antennate.experiments.tunnel.physics import TrialResult
-    from antennate.studies.columns import frame
+    from antennate.studies.pooling import frame
 
     def row(name: str, trial: int, time: float, limit: float) -> TrialResult:
         ended = "success" if time < limit else "timeout"

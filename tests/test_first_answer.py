@@ -15,8 +15,8 @@ from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import summarise
 from antennate.experiments.tunnel.tables import sentence
-from antennate.studies.columns import frame
 from antennate.studies.pool import Workers
+from antennate.studies.pooling import frame
 from antennate.studies.tables import Interim
 from antennate.studies.work import Here
 

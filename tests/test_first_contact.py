@@ -22,7 +22,7 @@ from antennate.experiments.tunnel.result import TunnelResult
 from antennate.experiments.tunnel.result import summarise as crossed
 from antennate.experiments.wall.experiment import summarise
 from antennate.experiments.wall.physics import WallConfig, invalid
-from antennate.studies.columns import frame
+from antennate.studies.pooling import frame
 
 TUNNEL, WALL = experiments.load("tunnel"), experiments.load("wall")
 FEW = "Fewer than 5 trials decide nothing; their means have no interval."

@@ -90,40 +90,25 @@ def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
     assert "tunnel" in out
 
 
+FORMS = "dice: expected tables to return a list of Table and sentence a text, found "
+TYPES = "dice: expected values of the types that Result says, found eyes: input should be"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('[Table.of("Dice", {"throws": result})]', "1 / 0", "ZeroDivisionError"),
-        ('[Table.of("Dice", {"throws": result})]', '["dice"]', "found list and str"),
-        ('f"Dice show {result.eyes:.1f} eyes."', "6", "found list and int"),
+        ('[Table.of("Dice", {"throws": result})]', "1 / 0", f"{FORMS}ZeroDivisionError"),
+        ('[Table.of("Dice", {"throws": result})]', '["dice"]', f"{FORMS}list and str"),
+        ('f"Dice show {result.eyes:.1f} eyes."', "6", f"{FORMS}list and int"),
+        ("    result=Result,\n", "", "its class as `result` of the experiment, found Result"),
+        ("eyes: float | None =", "eyes: str =", TYPES),
+        ("frame(rows, Row)))", "frame(rows, Row), eyes=[]))", TYPES),
     ],
 )
-def test_tables_and_a_sentence_of_another_form_are_one_line(
+def test_tables_a_sentence_and_a_result_of_another_form_are_one_line(
     old: str, new: str, told: str, dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The rows are kept."""
-    assert old in DICE
-    (dice / "site" / "dice_study.py").write_text(DICE.replace(old, new))
-    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
-    err = capsys.readouterr().err
-    assert "dice: expected tables to return a list of Table and sentence a text" in err
-    assert told in err
-    assert "Traceback" not in err
-    assert len(RunDirectory.open(dice / "run").rows()) == 2
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("    result=Result,\n", "", "its class as `result` of the experiment, found Result"),
-        ("eyes: float | None =", "eyes: str =", "that Result says, found eyes: input should"),
-        ("frame(rows, Row)))", "frame(rows, Row), eyes=[]))", "found eyes: input should be"),
-    ],
-)
-def test_a_result_that_is_not_of_its_class_is_one_line(
-    old: str, new: str, told: str, dice: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It could not be read again. The rows are kept."""
     assert old in DICE
     (dice / "site" / "dice_study.py").write_text(DICE.replace(old, new))
     assert main(["dice", "--trials", "2", "--out", "run"]) == 2

@@ -26,7 +26,7 @@ from antennate.experiments.wall.physics import (
 )
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
-from antennate.studies.columns import frame
+from antennate.studies.pooling import frame
 
 PERIOD = 0.01
 SHORT = {"wall": {"travel": 0.03, "start": 0.005, "speed": 0.02}, "trials": 2}

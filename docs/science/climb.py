@@ -26,9 +26,10 @@ from antennate.experiments.tunnel.physics import TrialResult
 from antennate.experiments.tunnel.result import ControllerSummary, paired, summary
 from antennate.figures import render
 from antennate.sim.scenes.scene import TIME_LIMIT
-from antennate.studies.columns import columns, frame
+from antennate.studies.columns import columns
 from antennate.studies.experiment import Found
 from antennate.studies.formats import from_csv
+from antennate.studies.pooling import frame
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
 

@@ -360,7 +360,7 @@ def _end(
         sys.stderr.write(again)
         raise KeyboardInterrupt
     try:
-        keep(experiment, outcome, run, figures=not options.no_figures)
+        keep(experiment, outcome, result, run, figures=not options.no_figures)
     except OutputError:
         with contextlib.suppress(AntennateError):
             show_result(result, options, *_shown(experiment, found), experiment.explained)

@@ -13,11 +13,12 @@ from antennate.control.registry import CONTROLLERS, KINDS, ControllerFactory
 from antennate.errors import BadInputError, ConfigError
 from antennate.messages import one_line, shown
 from antennate.params.base import Params, from_values
-from antennate.studies.columns import content, frame
+from antennate.studies.columns import content
 from antennate.studies.engines import LOCAL, Device, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity, texts
 from antennate.studies.pool import Workers
+from antennate.studies.pooling import frame
 from antennate.studies.report import write_report
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import FILMS
@@ -180,7 +181,7 @@ def run(
         directory.describe(config)
         pool = replace(pool, trials=directory.trials)
         outcome = experiment.run(config, pool, on_step, directory.append)
-        keep(experiment, outcome, directory)
+        keep(experiment, outcome, experiment.content(outcome.result()), directory)
         if video is not None:
             write_films(experiment, config, video, directory)
         write_report(directory, experiment.view)
@@ -211,17 +212,25 @@ def _film(name: str) -> str:
 def keep(
     experiment: Experiment[Any, Any],
     outcome: Outcome,
+    result: Mapping[str, Any],
     directory: RunDirectory,
     figures: bool = True,
 ) -> None:
     """Write what came out into a run directory: files, rows and result, then figures.
+
+    Args:
+        experiment: The experiment.
+        outcome: What its run returned.
+        result: What result.json holds, from `Experiment.content`.
+        directory: The run directory.
+        figures: Whether figures are drawn.
 
     Raises:
         OutputError: Something cannot be written; what was written stays.
     """
     for name, text in experiment.files(outcome).items():
         directory.write(name, text)
-    directory.finish(experiment.content(outcome.result()), outcome.rows)
+    directory.finish(result, outcome.rows)
     if figures:
         directory.write_figures(experiment.figures(outcome))
 

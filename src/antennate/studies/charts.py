@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
-from antennate.studies.columns import Column, Frame, by, valid
+from antennate.studies.columns import Column, Frame
+from antennate.studies.pooling import by, valid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

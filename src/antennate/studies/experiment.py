@@ -26,9 +26,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
 from antennate.errors import ConfigError
-from antennate.studies.columns import Frame, content, frame, typed
+from antennate.studies.columns import Frame, content, typed
 from antennate.studies.formats import strict
 from antennate.studies.pool import Workers
+from antennate.studies.pooling import frame
 from antennate.studies.report import View
 from antennate.studies.tables import Table
 from antennate.studies.trials import Config, OnRow, OnStep, Trial, Trials, no_row, no_step

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from antennate.jackknife import ENOUGH, student95
-from antennate.studies.columns import Ends, Frame, column, count, percent, share, tabular
+from antennate.studies.columns import Ends, Frame, column, percent, tabular
+from antennate.studies.pooling import count, share
 from antennate.types import Bools, Floats, Ints
 
 _Z95 = 1.959963984540054

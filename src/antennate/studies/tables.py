@@ -141,9 +141,8 @@ class Table:
             note: Under it.
             preface: Before the title.
         """
-        if measures is None:
-            measures = columns(type(next(iter(conditions.values())))) if conditions else ()
-        lines = (line for m in measures for line in ((m, m.ends) if m.interval else (m,)))
+        known = _measures(conditions, measures)
+        lines = (line for m in known for line in ((m, m.ends) if m.interval else (m,)))
         rows = [(m.title, [m.cell(c) for c in conditions.values()]) for m in lines if m.label]
         return cls(title, list(conditions), rows, note, preface=preface)
 
@@ -156,9 +155,14 @@ class Table:
         note: str = "",
         preface: str = "",
     ) -> Table:
-        """The same with a line for each condition, and a column for each measure."""
-        if measures is None:
-            measures = columns(type(next(iter(rows.values())))) if rows else ()
-        named = [measure for measure in measures if measure.label]
+        """A line for each condition, a cell for each column that has a label; else as `of`."""
+        named = [measure for measure in _measures(rows, measures) if measure.label]
         cells = [(name, [m.cell(row) for m in named]) for name, row in rows.items()]
         return cls(title, [m.title for m in named], cells, note, preface=preface)
+
+
+def _measures(summaries: Mapping[str, Any], measures: Iterable[Column] | None) -> Iterable[Column]:
+    """What is shown of summaries: these measures, else all columns of their class."""
+    if measures is not None:
+        return measures
+    return columns(type(next(iter(summaries.values())))) if summaries else ()

@@ -28,7 +28,8 @@ from antennate.experiments.climb.result import (
 from antennate.experiments.climb.rows import Probe
 from antennate.jackknife import ENOUGH, jackknife95
 from antennate.studies import statistics
-from antennate.studies.columns import Ends, Frame, by, mean, pooled, total, valid
+from antennate.studies.columns import Ends, Frame
+from antennate.studies.pooling import by, mean, pooled, total, valid
 from antennate.types import Floats
 
 PLAN_BAND = (-0.06, 0.04)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from antennate.experiments.climb.rows import Effort, Probe
-from antennate.studies.columns import Ends, Frame, column, count, mean, percent, tabular
+from antennate.studies.columns import Ends, Frame, column, percent, tabular
+from antennate.studies.pooling import count, mean
 from antennate.studies.statistics import Outcomes
 
 REFERENCE = "level"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from antennate.studies.columns import column, mean, percent, tabular
+from antennate.studies.columns import column, percent, tabular
+from antennate.studies.pooling import mean
 
 
 @tabular

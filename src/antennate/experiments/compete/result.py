@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from antennate.experiments.compete.comparison import Check
-from antennate.studies.columns import Ends, column, count, percent, share, tabular, total
+from antennate.studies.columns import Ends, column, percent, tabular
+from antennate.studies.pooling import count, share, total
 from antennate.studies.statistics import wilson
 
 
@@ -41,8 +42,8 @@ class Cell:
 class Controller(Cell, Ranked):
     """A controller over all scenes.
 
-    `successes`, `timeouts`, `left`, `fell`, `invalid` and the outcomes `overturned` add up to
-    `episodes`.
+    `successes`, `timeouts`, `left`, `fell`, `invalid`, and episodes whose outcome is overturned,
+    which have no key of their own, add up to `episodes`.
     """
 
     speed_m_s: float | None = column("speed over successes", "m/s", form=".3f", interval="speed_95")

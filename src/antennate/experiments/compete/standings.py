@@ -25,7 +25,8 @@ from antennate.experiments.compete.comparison import Check
 from antennate.experiments.compete.episodes import Episode, all_drawn, restricted
 from antennate.experiments.compete.result import Cell, Controller, Pair, Ranked, Standing
 from antennate.studies import statistics
-from antennate.studies.columns import Frame, by, frame, pooled
+from antennate.studies.columns import Frame
+from antennate.studies.pooling import by, frame, pooled
 from antennate.types import Floats, Ints
 
 ALPHA = 0.05

@@ -19,7 +19,8 @@ from antennate.experiments.sweep.physics import Trace, Wall, record
 from antennate.params.bench import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.columns import column, tabular, tabular_row, total
+from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.pooling import total
 from antennate.types import Floats
 
 

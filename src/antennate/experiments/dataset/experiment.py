@@ -33,20 +33,11 @@ from antennate.experiments.dataset.estimates import (
     summary,
 )
 from antennate.experiments.dataset.walk import walk_windows
-from antennate.studies.columns import (
-    INVALID,
-    NONE,
-    Frame,
-    by,
-    column,
-    column_of,
-    frame,
-    pooled,
-    tabular,
-)
+from antennate.studies.columns import NONE, Frame, column, column_of, tabular
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.parquet import require_parquet
 from antennate.studies.pool import Workers
+from antennate.studies.pooling import INVALID, by, frame, pooled
 from antennate.studies.tables import Table
 from antennate.studies.trials import OneByOne, OnRow, OnStep, Trials, no_row, no_step
 

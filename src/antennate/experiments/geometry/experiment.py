@@ -26,9 +26,10 @@ from antennate.experiments.geometry.result import (
 from antennate.experiments.geometry.torus import Torus
 from antennate.mechanics.twist import TwistMap, Wave
 from antennate.robots.mechanics import cycles, peaks, phase_law, wave_of
-from antennate.studies.columns import Frame, by, frame, shown
+from antennate.studies.columns import Frame, shown
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, gather
+from antennate.studies.pooling import by, frame
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step

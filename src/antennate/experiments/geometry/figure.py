@@ -26,7 +26,8 @@ from antennate.experiments.swimmers import swimmer_figure
 from antennate.mechanics.chain import purcell
 from antennate.mechanics.maps import curvature_map
 from antennate.mechanics.twist import TwistMap
-from antennate.studies.columns import Frame, column_of, frame
+from antennate.studies.columns import Frame, column_of
+from antennate.studies.pooling import frame
 
 _DASHED = (0, (4, 2))
 

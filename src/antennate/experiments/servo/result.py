@@ -30,8 +30,7 @@ class RecordingRow:
     weight_stalled_n_m: float | None
     """Mean torque of the weight while it stalls."""
     lifted_n_m: float
-    """Largest torque of the weight that the servo held at rest with less than 0.9 of full drive, in
-    any recording."""
+    """Largest torque of the weight that the servo held at rest with less than 0.9 of full drive."""
 
 
 @tabular

@@ -14,7 +14,8 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.experiments.tracks.config import CleaningParams, TracksConfig
 from antennate.experiments.tracks.track import Track
-from antennate.studies.columns import column, columns, tabular, total
+from antennate.studies.columns import column, columns, tabular
+from antennate.studies.pooling import total
 from antennate.types import Bools, Floats, Ints
 
 _MOST_EXCHANGED, _MOST_ACROSS = 0.5, 0.8

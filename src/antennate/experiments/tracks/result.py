@@ -6,7 +6,8 @@ from typing import Literal
 
 from antennate.experiments.tracks.cleaning import Handled
 from antennate.experiments.tracks.measures import ShapeShare, Varied, Wall
-from antennate.studies.columns import column, tabular, tabular_row, total
+from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.pooling import total
 
 
 @tabular

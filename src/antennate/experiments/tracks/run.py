@@ -20,8 +20,8 @@ from antennate.experiments.tracks.readers import read
 from antennate.experiments.tracks.result import Seen, TrackRow, TracksResult, Unseen, WallFound
 from antennate.experiments.tracks.track import Track
 from antennate.messages import shortened
-from antennate.studies.columns import frame, mean, pooled
 from antennate.studies.pool import Workers
+from antennate.studies.pooling import frame, mean, pooled
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.types import Ints
 

@@ -42,7 +42,8 @@ from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.sim.trial import TrialConfig, require_own_curves
 from antennate.sim.world import World
-from antennate.studies.columns import column, largest, mean, smallest, tabular, tabular_row, total
+from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.pooling import largest, mean, smallest, total
 from antennate.types import Floats, Ints, Maneuver
 
 if TYPE_CHECKING:

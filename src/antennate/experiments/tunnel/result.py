@@ -13,18 +13,8 @@ from antennate.experiments.tunnel.physics import Measured, TunnelConfig
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies import statistics
-from antennate.studies.columns import (
-    Ends,
-    Frame,
-    by,
-    column,
-    mean,
-    percent,
-    pooled,
-    tabular,
-    total,
-    valid,
-)
+from antennate.studies.columns import Ends, Frame, column, percent, tabular
+from antennate.studies.pooling import by, mean, pooled, total, valid
 from antennate.studies.statistics import Outcomes, PairedTest
 from antennate.types import Floats
 

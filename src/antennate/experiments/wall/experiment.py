@@ -20,18 +20,9 @@ from antennate.experiments.wall.physics import (
 )
 from antennate.sim.bench import Watch, unwatched
 from antennate.studies.charts import Shares, Strip
-from antennate.studies.columns import (
-    Ends,
-    Frame,
-    by,
-    column,
-    column_of,
-    count,
-    pooled,
-    tabular,
-    valid,
-)
+from antennate.studies.columns import Ends, Frame, column, column_of, tabular
 from antennate.studies.experiment import Experiment, Found
+from antennate.studies.pooling import by, count, pooled, valid
 from antennate.studies.statistics import Discordance, Matched, mcnemar, wilson
 from antennate.studies.tables import Table, few, successes
 from antennate.studies.trials import OneByOne, Trials

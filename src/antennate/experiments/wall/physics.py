@@ -23,7 +23,8 @@ from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.scene import GRAVITY, BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
-from antennate.studies.columns import column, largest, median, tabular, tabular_row
+from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.pooling import largest, median
 from antennate.types import Floats
 
 COMMAND_PERIOD = 0.002
