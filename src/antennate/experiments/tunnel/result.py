@@ -24,7 +24,7 @@ class Ended(Outcomes):
     """How the trials of a controller ended."""
 
     overturned: int | None = column("overturned", form="d", default=None)
-    """Robots on their backs; only where there are any, and then part of the sum of all trials."""
+    """Robots on their backs, part of the sum of all trials; `null` if there are none."""
     fell: int | None = column("fell", form="d", default=None)
     """Robots that fell, likewise."""
     speed_m_s: float | None = column("speed over successes", "m/s", form=".3f", interval="speed_95")
