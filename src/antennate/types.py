@@ -147,7 +147,7 @@ class Robot(Protocol):
         ...
 
     def read(self) -> AntennaFrame:
-        """The newest reading of both antennae."""
+        """What the robot feels now."""
         ...
 
     def write(self, command: JointCommand) -> None:

@@ -49,14 +49,16 @@ class ControllerKind:
         about: Sentence on what it does, for somebody who meets it for the first time.
         make: Makes it of (control, robot, batch).
         reads: Parameters of the control that it reads; others are refused. All read the rate, the
-            conditioning, the rule's threshold and hysteresis, and the gait but for `turn_offset`.
+            conditioning, the rule's threshold and hysteresis, and the gait but for `turn_offset`;
+            those that climb read no sweep of the antenna bases either.
         colour: Colour in figures, #RRGGBB; where it is empty, one that no other controller has.
         line: Line in figures, as matplotlib takes it, to tell controllers apart in grey print.
         needs: Knowledge that it cannot do without, and only a simulation has.
         climbs: Whether it raises links and antennae of the robot.
 
     Raises:
-        ConfigError: A part is not of its kind.
+        ConfigError: Name or sentence is no text, `make` no function, the colour none, or `reads`
+            neither a tuple nor a function.
     """
 
     name: str

@@ -127,8 +127,8 @@ def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
 def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
     """How a trial ends at time t [s], where a look at it says `outcome`; None if it goes on.
 
-    An outcome counts up to the limit [s], times rounded to µs as tables have them; after it, and
-    at the limit without an outcome, the trial ends as `late`.
+    An outcome counts up to the limit [s], with t rounded to µs as tables have it. After the limit,
+    and from it on without an outcome, the trial ends as `late`.
     """
     if outcome is not None:
         return outcome if round(t, 6) <= limit else late

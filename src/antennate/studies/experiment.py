@@ -45,7 +45,7 @@ class Outcome(Protocol):
 
     @property
     def rows(self) -> Sequence[Any]:
-        """Finished trials, dataclasses, in a fixed order; by default there are none."""
+        """Finished trials, dataclasses, in a fixed order."""
         return ()
 
     def result(self) -> Any:
@@ -278,7 +278,8 @@ class Experiment(Generic[Config, Out]):
     ) -> Experiment[Config, Any]:
         """An experiment with a folder whose run is its trials, which `summarise` makes a result of.
 
-        Arguments are those of `of_folder` and of `Found`.
+        Arguments are those of `of_folder` and of `Found`. Its trials can be shown on a page unless
+        `shown=False` is given.
 
         Raises:
             ConfigError: A run may end early, and the result cannot say so.

@@ -131,9 +131,10 @@ class Route:
         return geometry.progress(self.route, head)
 
     def left(self, head: Floats) -> bool:
-        """Whether the head is past the end of the route, or outside the rectangle.
+        """Whether the head is past the end of the route, or far outside of the rectangle.
 
-        Where success has a rule of its own, the robot may go on past the end.
+        Far is `LEFT_BEHIND` along x or y. A scene with `succeeded` lets the robot go on past the
+        end.
         """
         outside = (head < self._low).any() or (head > self._high).any()
         past = not hasattr(self, "succeeded") and self.progress(head) > self.length
