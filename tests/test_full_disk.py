@@ -17,7 +17,7 @@ import pytest
 from lockstep import BoardPort, LockstepClock
 from stated import STATED
 from test_drive_processes import ANTENNATE, NO_SERVO, Drive, twin
-from test_simulated_logs import HEADER, in_rows, rows, walked
+from test_simulated_logs import HEADER, as_made, made, walked
 
 from antennate.cli import main
 from antennate.errors import LogError, reason
@@ -26,7 +26,7 @@ from antennate.hardware.driving.connect import prepare
 from antennate.hardware.safety.session import Session
 from antennate.port import PortError
 from antennate.telemetry.reader import LogReader, count
-from antennate.telemetry.simulated import RowLog
+from antennate.telemetry.simulated import TickLog
 from antennate.telemetry.twin_log import LogQueue
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
@@ -207,10 +207,10 @@ def test_a_log_behind_a_queue_says_once_why_it_has_failed(tmp_path: Path) -> Non
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
-        log = LogQueue(RowLog(path, HEADER, in_rows), told.append)
+        log = LogQueue(TickLog(path, HEADER, as_made), told.append)
         end = time.monotonic() + 60.0
-        for row in rows(6000):
-            log.add(row)
+        for tick in made(6000):
+            log.add(tick)
             if told or time.monotonic() > end:
                 break
             time.sleep(0.002)

@@ -11,6 +11,7 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from log_ticks import HEADER
+from log_ticks import HEADER, tick
 
 import antennate
 from antennate.cli import main
@@ -35,10 +36,11 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.simulated import HEAD, Decisions, RowLog, Rows, SimulatedLog
+from antennate.telemetry.simulated import HEAD, Beside, Decisions, SimulatedLog, TickLog
+from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.telemetry.twin_log import LogQueue
-from antennate.types import AntennaFrame, Contact, Floats, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
 TICKS = 60
 TURN = 4096
@@ -380,28 +382,24 @@ def test_contacts_of_a_look_are_its_own_where_the_first_is_with_an_obstacle(tmp_
         np.testing.assert_allclose(found["normal"], wanted, rtol=1e-6)
 
 
-def rows(count: int) -> Floats:
-    """Rows of numbers that follow from their place."""
-    width = HEAD + 4 * len(ROBOT.joint_names)
-    found = 0.01 * np.arange(1, count + 1)[:, None] + np.arange(width) / 1024
-    found[:, 0] = 0.01 * np.arange(1, count + 1)
-    found[:, [1, 7, 8]] = 3.0, 1.0, 2.0  # maneuver and contacts are whole numbers
-    return found
+def made(count: int) -> list[Tick]:
+    """Ticks that follow from their number, 0.01 s apart."""
+    return [replace(tick(number), now=0.01 * number) for number in range(1, count + 1)]
 
 
-def in_rows(ticks: Sequence[Floats]) -> Rows:
-    """What `RowLog` writes of such rows."""
-    return np.array(ticks), {}
+def as_made(ticks: Sequence[Tick], _: int) -> list[tuple[Tick, Beside]]:
+    """What `TickLog` writes of such ticks."""
+    return [(each, {}) for each in ticks]
 
 
 def test_a_log_behind_a_queue_is_the_same(tmp_path: Path) -> None:
-    kept = rows(700)
-    with RowLog(tmp_path / "here.mcap", HEADER, in_rows) as log:
-        for row in kept:
-            log.add(row)
-    with LogQueue(RowLog(tmp_path / "there.mcap", HEADER, in_rows)) as queue:
-        for row in kept:
-            queue.add(row)
+    kept = made(700)
+    with TickLog(tmp_path / "here.mcap", HEADER, as_made) as log:
+        for each in kept:
+            log.add(each)
+    with LogQueue(TickLog(tmp_path / "there.mcap", HEADER, as_made)) as queue:
+        for each in kept:
+            queue.add(each)
     assert queue.close() == ""
     with LogReader(tmp_path / "here.mcap") as one, LogReader(tmp_path / "there.mcap") as other:
         assert [tick.pack() for tick in one] == [tick.pack() for tick in other]
@@ -414,53 +412,52 @@ def test_a_tick_never_waits_for_a_slow_disk_and_those_without_room_are_counted(
     """The queue holds 30 s of ticks; what comes in order before and after stays in order."""
     begun, go_on = threading.Event(), threading.Event()
 
-    def slowly(ticks: Sequence[Floats]) -> Rows:
+    def slowly(ticks: Sequence[Tick], first: int) -> list[tuple[Tick, Beside]]:
         begun.set()
         go_on.wait(60)
-        return np.array(ticks), {}
+        return as_made(ticks, first)
 
-    kept = rows(3500)
-    queue = LogQueue(RowLog(tmp_path / "log.mcap", HEADER, slowly))
+    kept = made(3500)
+    queue = LogQueue(TickLog(tmp_path / "log.mcap", HEADER, slowly))
     queue.add(kept[0])
     assert begun.wait(60)
     begin = time.monotonic()
-    for row in kept[1:]:
-        queue.add(row)
+    for each in kept[1:]:
+        queue.add(each)
     assert time.monotonic() - begin < 1.0
     go_on.set()
     assert queue.close() == "499 ticks are missing in it"
     assert queue.dropped == 499
     with LogReader(tmp_path / "log.mcap") as log:
-        assert [tick.now for tick in log] == pytest.approx(kept[:3001, 0])
+        assert [tick.now for tick in log] == [each.now for each in kept[:3001]]
         assert log.end == 3001
 
 
 def test_a_log_that_fails_in_any_way_is_told(tmp_path: Path) -> None:
-    def broken(ticks: Sequence[Floats]) -> Rows:
-        raise ValueError("rows of 3")
+    def broken(ticks: Sequence[Tick], first: int) -> list[tuple[Tick, Beside]]:
+        raise ValueError("ticks of 3")
 
     told = list[str]()
-    queue = LogQueue(RowLog(tmp_path / "log.mcap", HEADER, broken), told.append)
-    queue.add(rows(1)[0])
-    assert queue.close() == queue.failure == "ValueError: rows of 3"
+    queue = LogQueue(TickLog(tmp_path / "log.mcap", HEADER, broken), told.append)
+    queue.add(made(1)[0])
+    assert queue.close() == queue.failure == "ValueError: ticks of 3"
     assert told == [queue.failure]
 
 
 SLOW = f"""
 import os, signal, sys, threading, time
 sys.path[:0] = {sys.path!r}
-import numpy as np
-from test_simulated_logs import HEADER, Path, RowLog, rows
+from test_simulated_logs import HEADER, Path, TickLog, as_made, made
 
 begun = threading.Event()
-def slowly(ticks):
+def slowly(ticks, first):
     begun.set()
     time.sleep(0.5)
-    return np.array(ticks), {{}}
+    return as_made(ticks, first)
 
-log = RowLog(Path(sys.argv[1]), HEADER, slowly)
-for row in rows(300):  # the first 256 are written at once
-    log.add(row)
+log = TickLog(Path(sys.argv[1]), HEADER, slowly)
+for tick in made(300):  # the first 256 are written at once
+    log.add(tick)
 begun.wait()
 """
 """A log whose thread writes for some time while 44 more ticks wait."""
@@ -484,10 +481,10 @@ def test_a_log_whose_simulation_is_killed_is_not_closed(tmp_path: Path) -> None:
     code = f"""
 import os, signal, sys, time
 sys.path[:0] = {sys.path!r}
-from test_simulated_logs import HEADER, LogQueue, Path, RowLog, in_rows, rows
-log = LogQueue(RowLog(Path({str(tmp_path / "log.mcap")!r}), HEADER, in_rows))
-for row in rows(300):
-    log.add(row)
+from test_simulated_logs import HEADER, LogQueue, Path, TickLog, as_made, made
+log = LogQueue(TickLog(Path({str(tmp_path / "log.mcap")!r}), HEADER, as_made))
+for tick in made(300):
+    log.add(tick)
 time.sleep(0.5)
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -497,7 +494,7 @@ os.kill(os.getpid(), signal.SIGKILL)
         assert [tick.now for tick in log] == pytest.approx(0.01 * np.arange(1, 301))
         assert log.end is None
     with pytest.raises(LogError, match="expected a log that does not exist yet"):
-        RowLog(tmp_path / "log.mcap", HEADER, in_rows)
+        TickLog(tmp_path / "log.mcap", HEADER, as_made)
 
 
 def test_a_scene_of_many_bodies_leaves_chunks_that_can_be_read(tmp_path: Path) -> None:
@@ -505,15 +502,13 @@ def test_a_scene_of_many_bodies_leaves_chunks_that_can_be_read(tmp_path: Path) -
     places = np.random.default_rng(0).normal(size=7500)
     message = COORDINATES.type.encode(0, tuple(places))
 
-    def rows(ticks: Sequence[int]) -> Rows:
-        table = np.zeros((len(ticks), HEAD + 4 * len(ROBOT.joint_names)))
-        table[:, 0] = 0.01 * np.array(ticks)
-        return table, {at: {COORDINATES: message} for at in range(len(ticks))}
+    def beside(ticks: Sequence[Tick], _: int) -> list[tuple[Tick, Beside]]:
+        return [(each, {COORDINATES: message}) for each in ticks]
 
     path = tmp_path / "log.mcap"
-    with RowLog(path, HEADER, rows) as log:
-        for number in range(256):
-            log.add(number)
+    with TickLog(path, HEADER, beside) as log:
+        for each in made(256):
+            log.add(each)
     with LogReader(path) as reader:
-        np.testing.assert_allclose([tick.now for tick in reader], 0.01 * np.arange(256))
+        assert [each.now for each in reader] == [each.now for each in made(256)]
         assert reader.damage == []

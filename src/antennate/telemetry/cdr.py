@@ -6,16 +6,14 @@ arrays of fixed length and sequences of both, without nesting.
 
 from __future__ import annotations
 
-import math
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from antennate.errors import LogError
 
@@ -107,55 +105,6 @@ class MessageType:
         except (struct.error, ValueError) as error:
             raise LogError(f"expected a {self.name}, found {len(data)} bytes: {error}") from None
         return values
-
-
-class Form:
-    """Messages of one type that differ in some of their numbers alone, made many at once.
-
-    Args:
-        kind: The type.
-        values: The values of all, one for each field.
-        varying: Fields whose numbers may be replaced in each, by as many.
-
-    Attributes:
-        size: Bytes of each.
-    """
-
-    def __init__(self, kind: MessageType, values: Sequence[Any], varying: Sequence[str]) -> None:
-        data = kind.encode(*values)
-        self._data, self.size = np.frombuffer(data, np.uint8), len(data)
-        formats, offsets = list[Any](), list[int]()
-        body, at = data[len(_HEADER) :], 0
-        for field in kind.fields:
-            value, at = _take(body, at, field)
-            if field.name in varying:
-                shape = (len(value),) if isinstance(value, tuple) else ()
-                formats.append((f"<{field.code}", shape))
-                width = struct.calcsize(f"<{field.code}") * math.prod(shape)
-                offsets.append(len(_HEADER) + at - width)
-        names = [field.name for field in kind.fields if field.name in varying]
-        self._layout = np.dtype(
-            {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
-        )
-
-    def encode(self, count: int, columns: Mapping[str, Any]) -> NDArray[np.uint8]:
-        """The bytes of messages with these numbers, a row each; shape (count, bytes).
-
-        Args:
-            count: How many.
-            columns: Numbers of some fields, of each message or the same of all, shape (count,) or
-                (), and one axis more where a field has several. Other fields are as in `values`.
-        """
-        rows = np.empty((count, self.size), np.uint8)
-        self.fill(rows, columns)
-        return rows
-
-    def fill(self, into: NDArray[np.uint8], columns: Mapping[str, Any]) -> None:
-        """Write what `encode` gives to an array, shape (count, bytes)."""
-        into[:] = self._data
-        block = into.view(self._layout)[:, 0]
-        for name, column in columns.items():
-            block[name] = column
 
 
 def _field(line: str) -> Field:

@@ -1,15 +1,14 @@
 """The log of a simulated robot: what a drive logs, and the physics beside it.
 
-Simulated time runs much faster than a robot's, so ticks are collected as rows of numbers and
-encoded many at once, by a thread: the simulation goes on meanwhile, as the engine lets other
-threads run.
+Simulated time runs much faster than a robot's, so ticks are collected as they are and written many
+at once, by a thread: the simulation goes on meanwhile, as the engine lets other threads run.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -22,49 +21,31 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.judge import LOOK_EVERY
 from antennate.sim.places import Contacts
 from antennate.sim.world import World
-from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import numbers_of
-from antennate.telemetry.topics import (
-    ANTENNA,
-    CONTACT_FORCES,
-    COORDINATES,
-    IMU,
-    JOINT_COMMANDS,
-    JOINT_STATES,
-    MANEUVER,
-    MOTION,
-    Topic,
-    imu_values,
-)
+from antennate.telemetry.ticks import Tick, numbers_of
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, JOINTS, MOTION, Topic
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Floats, JointCommand
 
+Beside = Mapping[Topic, bytes]
+"""Messages at the time of a tick that are no part of it, by topic."""
 HEAD = 9
 """Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
-Rows = tuple[Floats, Mapping[int, Mapping[Topic, bytes]]]
-"""Numbers of some ticks, shape (n, HEAD + 4 joints): what `HEAD` says, then the angles commanded
-[rad], and angles [rad], speeds [rad/s] and torques [N·m] measured. With an inertial sensor, behind
-the commanded angles: angular velocity [rad/s] and specific force [m/s²], six more. Beside them, by
-tick, messages of `CONTACT_FORCES` and `COORDINATES`."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
-"""Ticks that are encoded at once."""
-_MUCH = 1 << 22
-"""Bytes of bodies and contacts beyond which they are encoded in two parts: no reader takes a chunk
-of more than 8 MB."""
+"""Ticks that are written at once."""
 _PATIENCE = 0.15
 """Longest that a tick waits for others [s]; where there are many logs, for their thread too."""
 
 
-class RowLog:
+class TickLog:
     """One file, new; as a context it closes itself.
 
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
-        rows: Makes the rows of ticks that were added, many at once.
+        make: Makes ticks of what was added, many at once, from the number of the first.
 
     Attributes:
         path: The file.
@@ -73,12 +54,14 @@ class RowLog:
         LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
-    def __init__(self, path: Path, header: Header, rows: Callable[[Sequence[Any]], Rows]) -> None:
-        self.path, self._rows = path, rows
+    def __init__(
+        self,
+        path: Path,
+        header: Header,
+        make: Callable[[Sequence[Any], int], Iterable[tuple[Tick, Beside]]],
+    ) -> None:
+        self.path, self._make = path, make
         self._out = LogWriter(path, header, _LEAST_FREE)
-        self._angles = len(header.robot.joint_names)
-        self._felt = 2 * AXES if header.robot.has_imu else 0
-        self._forms = _forms(header.robot.joint_names)
         self._held: list[Any] = []
         self._since = math.inf
         self._writing: Future[None] | None = None
@@ -173,75 +156,16 @@ class RowLog:
         self._writing = None
 
     def _write(self, ticks: Sequence[Any]) -> None:
-        """Encode ticks, and hand them to the operating system."""
-        count, (rows, beside) = len(ticks), self._rows(ticks)
-        size = sum(len(data) for messages in beside.values() for data in messages.values())
-        if size > _MUCH and count > 1:
-            self._write(ticks[: count // 2])
-            self._write(ticks[count // 2 :])
-            return
-        t, angles = rows[:, 0], self._angles
-        decided, felt, measured = np.split(
-            rows, [HEAD + angles, HEAD + angles + self._felt], axis=1
-        )
-        joints = [decided[:, HEAD:], *np.split(measured, 3, axis=1)]
-        stamps = self._out.stamps(t)
-        time = {"sec": stamps // 10**9, "nanosec": stamps % 10**9}
-        columns: dict[Topic, dict[str, Any]] = {
-            ANTENNA: {
-                "t": t,
-                "counts": rows[:, 3:5],
-                "reading": rows[:, 3:5],
-                "level": rows[:, 5:7],
-                "contact": rows[:, 7:9].astype(np.int64),
-            },
-            MANEUVER: {
-                "number": self._out.written + 1 + np.arange(count),
-                "now": t,
-                "maneuver": rows[:, 1].astype(np.int64),
-                "phase": rows[:, 2],
-            },
-            JOINT_COMMANDS: time | {"position": joints[0]},
-            JOINT_STATES: time
-            | dict(zip(("position", "velocity", "effort"), joints[1:], strict=True)),
-        }
-        if self._felt:
-            motion = dict(zip(MOTION, np.split(felt, 2, axis=1), strict=True))
-            columns[IMU] = time | motion
-        self._out.write_many(
-            stamps,
-            {topic: (self._forms[topic], numbers) for topic, numbers in columns.items()},
-            beside,
-        )
+        """Make ticks, and hand them to the operating system."""
+        for tick, beside in self._make(ticks, self._out.written + 1):
+            self._out.write(tick, beside)
+        self._out.flush()
 
 
 @cache
 def _encoder() -> ThreadPoolExecutor:
     """The thread of all logs of this process."""
     return ThreadPoolExecutor(1, "logs")
-
-
-def _forms(names: tuple[str, ...]) -> dict[Topic, Form]:
-    """Messages of a tick in which all that is known in simulation varies."""
-    pair, angles = (0.0, 0.0), (0.0,) * len(names)
-    joints, time = (0, 0, "", names), ("sec", "nanosec")
-    return {
-        ANTENNA: Form(
-            ANTENNA.type,
-            (0.0, pair, pair, pair, (0, 0), math.nan),
-            ("t", "counts", "reading", "level", "contact"),
-        ),
-        MANEUVER: Form(
-            MANEUVER.type, (0, 0.0, 0, 0.0, True), ("number", "now", "maneuver", "phase")
-        ),
-        JOINT_COMMANDS: Form(JOINT_COMMANDS.type, (*joints, angles, (), ()), (*time, "position")),
-        JOINT_STATES: Form(
-            JOINT_STATES.type,
-            (*joints, angles, angles, angles),
-            (*time, "position", "velocity", "effort"),
-        ),
-        IMU: Form(IMU.type, imu_values(0, (0.0,) * AXES, (0.0,) * AXES), (*time, *MOTION)),
-    }
 
 
 class Decisions:
@@ -309,7 +233,8 @@ class Decisions:
         Args:
             ticks: Of `take`.
             row: The row of the batch.
-            into: Where to, shape (n, HEAD + joints), with six more of an inertial sensor.
+            into: Where to, shape (n, 9 + joints): t, maneuver, phase, counts, level, contact, the
+                angles commanded; behind them six numbers of an inertial sensor.
         """
         block, at = np.frombuffer(b"".join(ticks), self._layout), 0
         for name in self._layout.names or ():
@@ -326,7 +251,7 @@ class TakenTick(NamedTuple):
     contacts: Contacts | None
 
 
-class SimulatedLog(RowLog):
+class SimulatedLog(TickLog):
     """The log of one simulated robot, tick by tick; as a context it closes itself.
 
     Args:
@@ -343,11 +268,10 @@ class SimulatedLog(RowLog):
     def __init__(
         self, path: Path, header: Header, world: World, decisions: Decisions, row: int = 0
     ) -> None:
-        super().__init__(path, header, self._rows_of)
+        super().__init__(path, header, self._made)
         self._world, self._decisions, self._row = world, decisions, row
+        self._joints, self._has_imu = len(header.robot.joint_names), header.robot.has_imu
         self._ticks = 0
-        values = world.root, (0.0,) * world.model.nq
-        self._form = Form(COORDINATES.type, values, ("position",))
 
     def take(self, decided: bytes) -> None:
         """Keep one tick, of which `Decisions` says this.
@@ -364,24 +288,38 @@ class SimulatedLog(RowLog):
         world = self._world
         return TakenTick(decided, world.snapshot(), Contacts.of(world.data) if look else None)
 
-    def _rows_of(self, ticks: Sequence[TakenTick]) -> Rows:
-        """What is written of some ticks; many at once take hardly longer than one."""
-        end = HEAD + self._angles + self._felt
-        rows = np.empty((len(ticks), end + 3 * self._angles))
-        self._decisions.rows([tick.decided for tick in ticks], self._row, rows[:, :end])
-        measured, places = self._world.measured([tick.measured for tick in ticks])
-        rows[:, end:] = measured.reshape(len(ticks), -1)
-        looks = {i: tick.contacts for i, tick in enumerate(ticks) if tick.contacts is not None}
-        return rows, self._messages(looks, places) if looks else {}
+    def _made(self, taken: Sequence[TakenTick], first: int) -> Iterator[tuple[Tick, Beside]]:
+        """Ticks that were taken, with what lies beside each, from this number on."""
+        end = HEAD + self._joints
+        rows = np.empty((len(taken), end + 2 * AXES * self._has_imu))
+        self._decisions.rows([tick.decided for tick in taken], self._row, rows)
+        measured, places = self._world.measured([tick.measured for tick in taken])
+        looks = {i: tick.contacts for i, tick in enumerate(taken) if tick.contacts is not None}
+        beside = self._beside(looks, places) if looks else {}
+        for i, (row, of_joints) in enumerate(zip(rows.tolist(), measured.tolist(), strict=True)):
+            t, maneuver, phase, *_ = row
+            counts, level, contact = ((row[at], row[at + 1]) for at in (3, 5, 7))
+            felt = (tuple(row[at : at + AXES]) for at in range(end, len(row), AXES))
+            tick = Tick(
+                number=first + i,
+                t=t,
+                now=t,
+                counts=counts,
+                reading=counts,
+                level=level,
+                contact=(int(contact[0]), int(contact[1])),
+                maneuver=int(maneuver),
+                phase=phase,
+                angles=tuple(row[HEAD:end]),
+                **dict(zip(JOINTS[1:], map(tuple, of_joints), strict=True)),
+                **dict(zip(MOTION, felt, strict=False)),
+            )
+            yield tick, beside.get(i, {})
 
-    def _messages(
-        self, looks: Mapping[int, Contacts], places: Floats
-    ) -> dict[int, dict[Topic, bytes]]:
+    def _beside(self, looks: Mapping[int, Contacts], places: Floats) -> Mapping[int, Beside]:
         """The messages beside the ticks at which one looked."""
-        coordinates = self._form.encode(len(looks), {"position": places[[*looks]]})
-        messages = {
-            i: {COORDINATES: row.tobytes()} for i, row in zip(looks, coordinates, strict=True)
-        }
+        root, encode = self._world.root, COORDINATES.type.encode
+        messages = {i: {COORDINATES: encode(root, places[i])} for i in looks}
         contacts = Contacts.joined([*looks.values()])
         which, names, points, forces = self._world.obstacle_contacts(contacts)
         columns = names, *points.T.tolist(), forces.tolist()

@@ -28,7 +28,7 @@ from antennate.params.control import ControlParams
 from antennate.sim.trial import TrialConfig
 from antennate.sim.world import World
 from antennate.telemetry.header import TWIN, Header
-from antennate.telemetry.simulated import Decisions, RowLog, SimulatedLog
+from antennate.telemetry.simulated import Decisions, SimulatedLog, TickLog
 from antennate.twin.config import TwinConfig
 from antennate.twin.robot import TwinRobot
 from antennate.types import Contact
@@ -60,7 +60,7 @@ class LogQueue:
         failure: Why it cannot be written any more; empty while it can.
     """
 
-    def __init__(self, log: RowLog, on_failure: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(self, log: TickLog, on_failure: Callable[[str], None] = lambda _: None) -> None:
         self.path, self.dropped, self.failure = log.path, 0, ""
         self._log, self._on_failure = log, on_failure
         self._queue, self._over = deque[Any](), threading.Event()

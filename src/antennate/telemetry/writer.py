@@ -12,22 +12,19 @@ import contextlib
 import io
 import math
 import os
+import sys
 import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import IO, Any, cast
 
 from antennate import __version__
 from antennate.errors import LogError, reason
 from antennate.files import require_room
-from antennate.telemetry.cdr import Form
 from antennate.telemetry.header import LIBRARY, Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import EVENTS, Topic, topics_of
-from antennate.types import Floats, Ints
 
 LEAST_FREE = 1e9
 """Room for six hours of ticks at 100 Hz [byte] (assumed)."""
@@ -78,7 +75,7 @@ class LogWriter:
         sync: float | None = None,
         called: Path | None = None,
     ) -> None:
-        from antennate.telemetry.container import Container  # slow to import
+        from mcap.writer import Writer  # slow to import
 
         self.path, self._header, self._flush = path, header, flush
         self._names = header.robot.joint_names
@@ -89,7 +86,9 @@ class LogWriter:
         self._called = called or path
         require_room(self._called, least_free, LogError)
         self._file = _NewFile(path, self._called)
-        self._container = Container(self._file, f"{LIBRARY}{__version__}")
+        # `settle` closes its chunks
+        self._mcap = Writer(cast(IO[Any], self._file), chunk_size=sys.maxsize)
+        self._mcap.start("ros2", f"{LIBRARY}{__version__}")
         self._channels = self._register()
         for topic, data in header.messages().items():
             self.add(topic, 0, header.start, data)
@@ -98,17 +97,23 @@ class LogWriter:
             self._file.keep_safe(sync)
 
     def _register(self) -> dict[Topic, int]:
-        schemas: dict[str, int] = {}
         topics = topics_of(self._header.robot.has_imu)
-        for kind in {topic.type.name: topic.type for topic in topics}.values():
-            schemas[kind.name] = self._container.add_schema(kind.name, kind.schema)
+        kinds = {topic.type.name: topic.type for topic in topics}
+        schemas = {
+            name: self._mcap.register_schema(name, "ros2msg", kind.schema.encode())
+            for name, kind in kinds.items()
+        }
         return {
-            topic: self._container.add_channel(topic.name, schemas[topic.type.name])
+            topic: self._mcap.register_channel(topic.name, "cdr", schemas[topic.type.name])
             for topic in topics
         }
 
-    def write(self, tick: Tick) -> None:
+    def write(self, tick: Tick, beside: Mapping[Topic, bytes] | None = None) -> None:
         """Add a tick. After a failure or `close` it does nothing.
+
+        Args:
+            tick: The tick.
+            beside: More messages of its time, by topic.
 
         Raises:
             LogError: A number does not fit; or the disk is full or gone, which is raised once, and
@@ -117,7 +122,7 @@ class LogWriter:
         if self.failure:
             return
         stamp = self._stamp(tick.now)
-        messages = list(tick.messages(self._names, stamp))
+        messages = [*tick.messages(self._names, stamp), *(beside or {}).items()]
         named = {cause.partition(":")[0] for cause in tick.causes}
         if tick.state != self._state:
             self._told.clear()
@@ -130,46 +135,6 @@ class LogWriter:
         self.written += 1
         self.settle()
 
-    def write_many(
-        self,
-        stamps: Ints,
-        messages: Mapping[Topic, tuple[Form, Mapping[str, Any]]],
-        beside: Mapping[int, Mapping[Topic, bytes]],
-    ) -> None:
-        """Add ticks that follow one another, made elsewhere, and hand them over at once.
-
-        Args:
-            stamps: Time of each [ns], none before the last one's, shape (n,).
-            messages: What `Tick.messages` would give of each, by topic: the form of its messages
-                and the columns of their numbers.
-            beside: More messages of single ticks, by tick and topic.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
-        if self.failure:
-            return
-        numbers = (self.written + 1 + np.arange(len(stamps))) & _NUMBERS
-        self.written += len(stamps)
-        self._time = int(stamps[-1])
-        channels = self._channels
-        self._container.add_rows(
-            numbers,
-            stamps,
-            {channels[topic]: rows for topic, rows in messages.items()},
-            {
-                tick: {channels[topic]: data for topic, data in more.items()}
-                for tick, more in beside.items()
-            },
-        )
-        self.flush()
-
-    def stamps(self, times: Floats) -> Ints:
-        """Times of the messages of ticks at times [s] that follow one another [ns], shape (n,)."""
-        since = np.rint(1e9 * np.where(np.abs(times) < _LONGEST, times, 0.0)).astype(np.int64)
-        stamps = np.clip(self._header.start + since, 0, _LATEST)
-        return np.maximum.accumulate(np.maximum(stamps, self._time))
-
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
         """Add a message as it is, of a tick and a time [ns], not before the last one's.
 
@@ -180,7 +145,8 @@ class LogWriter:
         self._since = min(self._since, time.monotonic())
         self._size += len(data)
         self._time = max(self._time, stamp)
-        self._container.add(self._channels[topic], number & _NUMBERS, self._time, data)
+        channel, now = self._channels[topic], self._time
+        self._mcap.add_message(channel, now, data, now, number & _NUMBERS)
 
     def event(self, text: str, source: str = "antennate", t: float = 0.0) -> None:
         """Add an event at a time of the loop [s], not before the last tick."""
@@ -207,8 +173,7 @@ class LogWriter:
         if self.failure:
             return
         try:
-            self._container.end_chunk()
-            self._file.flush()
+            self._mcap.flush()
         except OSError as error:
             self._fail(error)
         self.kept, self._size = self.written, 0
@@ -224,7 +189,7 @@ class LogWriter:
             return
         self.flush()
         try:
-            self._container.finish()
+            self._mcap.finish()
             self._file.flush()
             self._file.sync()
         except OSError as error:
