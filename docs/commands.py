@@ -1,8 +1,8 @@
-"""Write the list of docs/commands.md from the commands themselves; with --check only compare it.
+"""Write docs/options.md from the commands themselves.
 
-What stands before the mark is written by hand. An option that is the same in several commands and
-explained there is named alone where a command takes it, or with others as a set. What a command
-has in common with an earlier one is named alone, too.
+An option that is the same in several commands and explained in docs/commands.md is named alone
+where a command takes it, or with others as a set. What a command has in common with an earlier one
+is named alone, too.
 """
 
 from collections import Counter
@@ -17,8 +17,12 @@ from antennate.cli.options import Option
 from antennate.experiments import is_ours
 from antennate.messages import command_words
 
-MARK = "<!-- commands: python docs/commands.py -->"
-SHARED = "[Options of a run](#options-of-a-run): "
+HEAD = """\
+# Options of commands
+
+What holds for every command: [Commands](commands.md).
+"""
+SHARED = "[Options of a run](commands.md#options-of-a-run): "
 SETS = {
     "results": "--out --overwrite --json",
     "trials": "--workers --resume --retry --engine --slurm --shard --trial-timeout",
@@ -110,7 +114,7 @@ def line(option: Option) -> str:
 
 def is_own(name: str) -> bool:
     """Whether a command is of this package."""
-    return name == "study merge" or is_ours(name.split()[-1])
+    return name in ("study merge", "parameters") or is_ours(name.split()[-1])
 
 
 def index(title: str, named: dict[str, str]) -> str:
@@ -120,18 +124,18 @@ def index(title: str, named: dict[str, str]) -> str:
 
 
 def main() -> None:
-    """Write the page, or compare it."""
+    """Write the page."""
     others = ROBOT_COMMANDS | LOG_COMMANDS
     studies = {n: what for n, what in commands().items() if is_own(n) and n not in others}
     pages = [described(name) for name in studies | others]
     rows = [pair for page in pages for pair in options(page).items()]
     counts = Counter(text for _, text in rows)
-    begin, _, _ = Path(__file__).with_suffix(".md").read_text(encoding="utf-8").partition(MARK)
-    shared = {text for name, text in rows if counts[text] >= _MANY and f"`{name}" in begin}
+    told = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    shared = {text for name, text in rows if counts[text] >= _MANY and f"`{name}" in told}
     lists = [index("Simulation and study", studies), index("Robot, twin, logs", others)]
     sections = (section(page, shared, pages[:i]) for i, page in enumerate(pages))
-    parts = [begin, MARK, *lists, *(part for parts in sections for part in parts)]
-    finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n")
+    parts = [HEAD, *lists, *(part for parts in sections for part in parts)]
+    finish(__file__, "\n\n".join(part.strip() for part in parts) + "\n", name="options.md")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Write docs/names.md from the public names of antennate; with --check only compare it."""
+"""Write docs/names.md from the public names of antennate."""
 
 import enum
 import inspect
@@ -127,7 +127,7 @@ def part(name: str) -> Iterator[str]:
 
 
 def main() -> None:
-    """Write the page, or compare it."""
+    """Write the page."""
     names = [name for name in dir(antennate) if not name.startswith("_")]
     links = ", ".join(f"[`{name}`](#{name.lower()})" for name in names)
     parts = [HEAD, links, *(text for name in names for text in part(name))]

@@ -1,4 +1,4 @@
-"""Write docs/performance.md from docs/performance.json and .toml; --check only looks.
+"""Write docs/performance.md from docs/performance.json and .toml.
 
 `uv run python benchmarks/performance.py` measures and writes that file, part by part.
 """

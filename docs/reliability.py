@@ -1,4 +1,4 @@
-"""Write docs/reliability.md from docs/reliability.toml and the names of tests; --check only looks.
+"""Write docs/reliability.md from docs/reliability.toml and the names of tests.
 
 A test shows the rows with which its name begins: `test_B7_T5_servos_stop` shows B7 and T5.
 """

@@ -1,4 +1,4 @@
-"""Write docs/topics.md from antennate.telemetry.topics; with --check only compare it."""
+"""Write docs/topics.md from antennate.telemetry.topics."""
 
 from collections.abc import Iterator
 
@@ -45,7 +45,7 @@ def section(topic: Topic) -> str:
 
 
 def main() -> None:
-    """Write the page, or compare it."""
+    """Write the page."""
     rows = [row(f"[`{t.name}`](#{t.name.strip('/')})", how_often(t), t.meaning) for t in TOPICS]
     index = "\n".join([heads("topic", "written", "what"), *rows])
     sections = "\n\n".join(map(section, TOPICS))

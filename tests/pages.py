@@ -8,11 +8,15 @@ may differ. Blocks of other kinds, as of `bash`, are for readers alone.
 
 from __future__ import annotations
 
+import atexit
+import functools
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -29,6 +33,16 @@ python() { "$PYTHON" -W error "$@"; }
 """
 _PATIENCE = 300.0
 """Longest that a block may take [s]; the machine may be busy."""
+
+
+@functools.cache
+def made_pages() -> dict[str, Path]:
+    """The pages of the site that are not in git, by name, made anew."""
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder)
+    words = [sys.executable, "-W", "error", str(DOCS / "pages.py"), str(folder)]
+    subprocess.run(words, check=True)
+    return {path.name: path for path in folder.iterdir()}
 
 
 class Block(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from first_hour import Command
-from pages import DOCS, Script, blocks
+from pages import DOCS, Script, blocks, made_pages
 
 import antennate
 from antennate.cli import commands
@@ -83,6 +83,11 @@ def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
     assert wide == []
 
 
+def test_no_line_of_code_is_wider_than_a_page_that_is_made() -> None:
+    for path in made_pages().values():
+        test_no_line_of_code_is_wider_than_a_page(str(path))
+
+
 def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_reference() -> None:
     site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
 
@@ -94,9 +99,10 @@ def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_ref
                 else:
                     yield from entries(content)
 
+    found = {str(path.relative_to(DOCS)): path for path in DOCS.rglob("*.md")} | made_pages()
     titles = {
-        str(path.relative_to(DOCS)): re.findall("^# (.*)$", path.read_text(), re.MULTILINE)[0]
-        for path in DOCS.rglob("*.md")
+        name: re.findall("^# (.*)$", path.read_text(), re.MULTILINE)[0]
+        for name, path in found.items()
     }
     menu = [*entries(site["project"]["nav"])]
     assert len(menu) == len(dict(menu))
@@ -106,9 +112,7 @@ def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_ref
 
 
 def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
-    _, mark, page = (DOCS / "commands.md").read_text().partition("<!-- commands: ")
-    assert mark
-    begin, *sections = page.split("\n## ")
+    begin, *sections = made_pages()["options.md"].read_text().split("\n## ")
     linked = re.findall(r"\[`([\w ]+)`\]\(#antennate-([\w-]+)\)", begin)
     assert [name.replace(" ", "-") for name, _ in linked] == [anchor for _, anchor in linked]
     assert {name for name, _ in linked} == set(commands())

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
+from pages import made_pages
 
 from antennate.errors import MissingPackageError
 
@@ -218,6 +219,11 @@ def test_a_page_names_what_is_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     code = "".join(match[0] for match in CODE.finditer(text))
     assert missing(SPAN.findall(CODE.sub("", text)), code) == []
+
+
+def test_a_page_that_is_made_names_what_is_there() -> None:
+    for path in made_pages().values():
+        test_a_page_names_what_is_there(path)
 
 
 def test_docstrings_name_what_is_there() -> None:

@@ -38,7 +38,10 @@ LOG_COMMANDS = {
     "log view": "A log, or that of a run, on a page of this computer",
     "report": "A run, or two side by side, as one page to read, print and send",
 }
-_MERGE = {"study merge": "The shards of a run as the run that they are parts of"}
+_OTHERS = {
+    "study merge": "The shards of a run as the run that they are parts of",
+    "parameters": "Every number: its default, unit, meaning and source",
+}
 _FUNCTIONS = {
     "setup zero": "setup:zero",
     "setup jog": "setup:jog",
@@ -49,7 +52,7 @@ _FUNCTIONS = {
     "study merge": "merge:command",
 }
 """Module and function of the commands that are not `command` of a module of their name."""
-_OWN = {**ROBOT_COMMANDS, **LOG_COMMANDS, **_MERGE}
+_OWN = {**ROBOT_COMMANDS, **LOG_COMMANDS, **_OTHERS}
 _GROUPS = {
     "bench": "An antenna before walls and posts",
     "antenna": "What an antenna is made of",
@@ -104,7 +107,7 @@ def commands() -> dict[str, str]:
     """What each command does, by its name behind that of its group: the experiments first."""
     from antennate.experiments import summaries
 
-    known = {command_words(name): text for name, text in summaries().items()} | _MERGE
+    known = {command_words(name): text for name, text in summaries().items()} | _OTHERS
     listed = [name for entry in _EXPERIMENTS for name in (entry, *_parts(entry)) if name in known]
     return {n: known[n] for n in listed} | known | ROBOT_COMMANDS | LOG_COMMANDS
 

@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
+from html import escape
 from typing import Any, cast
 
 import numpy as np
@@ -34,6 +35,7 @@ _NUMBERS = {
 }
 """Numbers as they are written."""
 _FORMULA = ("=", "+", "-", "@")
+_BAR = re.compile(r"`([^`]*\|[^`]*)`|\|")
 
 
 def strict(value: Any) -> Any:
@@ -318,3 +320,21 @@ def dumped(value: Any) -> str:
         BadInputError: It holds an object of another kind.
     """
     return json.dumps(value, separators=(",", ":"), default=_refuse)
+
+
+def markdown_row(*cells: object) -> str:
+    """A row of a table in Markdown."""
+    return "| " + " | ".join(_BAR.sub(_without_bar, str(cell)) for cell in cells) + " |"
+
+
+def _without_bar(found: re.Match[str]) -> str:
+    """Code, or a bar alone, without a character that would end the cell."""
+    code = found[1]
+    if code is None:
+        return "&#124;"
+    return f"<code>{escape(code, quote=False).replace('|', '&#124;')}</code>"
+
+
+def markdown_heads(*names: str) -> str:
+    """The first two lines of a table in Markdown."""
+    return markdown_row(*names) + "\n" + "|" + "---|" * len(names)

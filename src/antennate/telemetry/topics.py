@@ -1,8 +1,7 @@
 """The topics of a log and the definitions of their messages, in the words of ROS 2.
 
 Every tick has one message in each of `TICK_TOPICS`, and in others where there is something to say,
-all with the tick's number and time. docs/topics.md is
-written from here.
+all with the tick's number and time. docs/topics.py makes a page of the site from them.
 """
 
 from __future__ import annotations

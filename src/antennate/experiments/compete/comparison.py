@@ -16,7 +16,7 @@ from antennate.types import Floats, Ints
 
 BIAS, CHANCE = 0.01, 0.01
 """Times of a draw that differ by no more than this share of the limit are the same elsewhere (0.94
-of 100 s in 200 draws, docs/performance.md); and the p below which a table does not repeat."""
+of 100 s in 200 draws, docs/performance.json); and the p below which a table does not repeat."""
 ENOUGH = 4
 """Draws that can tell something if all are far off: 2 (1/4)^4 is below `CHANCE`, see `_far_p`."""
 

@@ -79,7 +79,7 @@ class CompeteConfig(Params):
     tie: float = number(
         0.015,
         "1",
-        "measured: two instruction sets, 193 and 196 of the same 200 draws (docs/performance.md)",
+        "measured: two instruction sets, 193 and 196 of the same 200 draws (docs/performance.json)",
         ge=0,
         le=1,
     )

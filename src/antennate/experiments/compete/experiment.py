@@ -37,7 +37,7 @@ from antennate.types import AntennaFrame, Controller
 
 START, COSTS = 2.0, (0.01, 0.2)
 """Time to begin, and time of a core for each second of the limits [s]: where all cross early and
-draws go in lockstep, and where most run into the limit, one by one (docs/performance.md)."""
+draws go in lockstep, and where most run into the limit, one by one (docs/performance.json)."""
 PATIENCE = 120.0
 """Time in which a controller has to be made and to decide once, before anything is run [s]."""
 
