@@ -6,10 +6,13 @@ import atexit
 import os
 import shutil
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -39,15 +42,18 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
     atexit.register(shutil.rmtree, kept, ignore_errors=True)
 
 
+EVERY_RUN = "not slow and not ci"
+"""Marks of the tests of `uv run pytest`, as `addopts` in pyproject.toml has it."""
+
 HERE = tempfile.mkdtemp(prefix="tests-")
 """An empty folder to run in, so that no robot.toml that a user left in the clone is read."""
 atexit.register(shutil.rmtree, HERE, ignore_errors=True)
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """One more than cores: many tests wait for programs that they started."""
-    return core_count() + 1
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """A worker for each core, and one more where tests wait for programs that they started."""
+    return core_count() + (config.getoption("markexpr") != EVERY_RUN)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -55,6 +61,43 @@ def pytest_collection(session: pytest.Session) -> None:
     """Commands look into the working directory while tests are collected, too."""
     if session.config.getoption("dist") == "no":  # it collects, and starts no workers that do
         os.chdir(HERE)
+
+
+BEGUN: list[str] = []
+"""Processes that the test that runs now has begun."""
+_BEGINNINGS = ("subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system")
+
+
+def _note_beginning(event: str, args: tuple[Any, ...]) -> None:
+    if event in _BEGINNINGS:
+        BEGUN.append(f"{event}{args[1:2] or args}")
+
+
+def _noted_start(self: BaseProcess, start: Callable[[Any], None] = BaseProcess.start) -> None:
+    BEGUN.append(f"multiprocessing {self.name}")
+    start(self)
+
+
+sys.addaudithook(_note_beginning)
+BaseProcess.start = _noted_start  # type: ignore[method-assign]  # its spawn tells no audit hook
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """No process has begun."""
+    BEGUN.clear()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Refuse a test of every run that begins a process, in its fixtures or by itself."""
+    yield
+    if BEGUN and not any(map(item.get_closest_marker, ("ci", "slow", "smoke"))):
+        pytest.fail(
+            f"expected a test of every run to begin no process, found {BEGUN[0]}; "
+            "mark it with @pytest.mark.ci, and `.ci/run` runs it",
+            pytrace=False,
+        )
 
 
 @pytest.fixture(autouse=True)

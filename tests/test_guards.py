@@ -27,7 +27,7 @@ def test_every_guard_has_its_own_name() -> None:
 
 
 @pytest.mark.parametrize("guard", GUARDS, ids=lambda guard: guard.name)
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_guard_that_is_switched_off_is_noticed(guard: Guard) -> None:
     """That it passes with the guard is seen where it runs by itself, and here if it does not."""
     if not runs_by_itself(guard.notice):

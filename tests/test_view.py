@@ -15,7 +15,7 @@ import pytest
 from browser import CHROMIUM, Tab, browser
 from PIL import Image
 from stated import STATED
-from view_rig import PATIENCE, Shown, shown
+from view_rig import PATIENCE, Shown, share_cores, shown, told
 
 from antennate import simulate
 from antennate.params.control import ControlParams, RuleParams
@@ -289,12 +289,15 @@ def test_X23_a_drive_and_its_twin_are_shown(
     twin = ("twin", "--view", "--view-port", "0", "--duration", "600", "--touch", "left@8s")
     with shown(*twin, folder=tmp_path) as served:
         paths = json.loads(served.answer())
+        share_cores(served)
         walks = request.config.getoption("--pictures")
         words = ["drive", "--no-touch-check", "--out", "run", "--view", "--view-port", "0"]
         words += ["--arm", "--duration", "600"] if walks else ["--dry-run", "600"]
         words += STATED
         words += ["--esp32", paths["esp32"], "--bus", paths["bus"]]
         with shown(*words, folder=tmp_path) as driven:
+            told(driven, "missed_ticks=")  # it is shown, and its page serves
+            share_cores(driven)
             driven_shown(tab, keep, driven)
             opened(tab, served)
             looked_at(tab, served)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from stated import STATED
-from view_rig import ANTENNATE, PATIENCE, Shown, shown
+from view_rig import ANTENNATE, PATIENCE, shown, told
 
 from antennate.cli import pages
 from antennate.hardware.driving.report import MANY, Recent
@@ -94,14 +94,6 @@ def test_a_late_loop_gives_its_view_up_once_servos_have_torque(tmp_path: Path, a
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["pace"]["missed_cycles"] > MANY
     assert ("view: given up" in "".join(driven.lines)) is armed
-
-
-def told(driven: Shown, what: str) -> None:
-    """Return once it has said so."""
-    end = time.monotonic() + PATIENCE
-    while not any(what in line for line in driven.lines):
-        assert time.monotonic() < end, driven.lines
-        time.sleep(0.1)
 
 
 @contextmanager

@@ -1,10 +1,12 @@
 """A command that shows itself on a page, in a process of its own, and what its page answers."""
 
+import os
 import re
 import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -100,6 +102,23 @@ def child_of(process: int) -> int:
     """The one process that another one has started."""
     [child] = Path(f"/proc/{process}/task/{process}/children").read_text().split()
     return int(child)
+
+
+def told(view: Shown, what: str) -> None:
+    """Return once it has said so."""
+    end = time.monotonic() + PATIENCE
+    while not any(what in line for line in view.lines):
+        assert time.monotonic() < end, view.lines
+        time.sleep(0.1)
+
+
+def share_cores(view: Shown) -> None:
+    """Give the process of a page its share of the cores.
+
+    Beside a loop in real time it has what nothing else wants: nothing where others are busy.
+    """
+    for thread in Path(f"/proc/{child_of(view.process.pid)}/task").iterdir():
+        os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
 
 
 def ask(port: int, path: str = "/", host: str | None = "", **headers: str) -> tuple[int, str]:

@@ -183,11 +183,11 @@ class Decisions:
         self._unknown = np.full(batch, math.nan)
         self._parts = robot.command_shapes(batch)
         self._felt = MOTION if robot.has_imu else ()
-        pair, axes = (batch, 2), (batch, AXES)
+        one, pair, axes = (batch,), (batch, 2), (batch, AXES)
         self._unfelt = np.full(axes, math.nan)
         self._layout = np.dtype(
             [
-                *(("t", float, batch), ("maneuver", np.int64, batch), ("phase", float, batch)),
+                *(("t", float, one), ("maneuver", np.int64, one), ("phase", float, one)),
                 *(("counts", float, pair), ("level", float, pair), ("contact", np.int64, pair)),
                 *((name, float, shape) for name, shape in self._parts.items()),
                 *((name, float, axes) for name in self._felt),
