@@ -16,6 +16,7 @@ def snippets(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("page", "count"),
     [("docs/api.md", 5), pytest.param("README.md", 1, marks=pytest.mark.slow)],

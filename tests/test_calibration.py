@@ -257,6 +257,7 @@ def one() -> CalibrateOutcome:
     return run(RIG, 1)
 
 
+@pytest.mark.ci
 def test_the_rig_gives_the_same_on_one_and_two_workers_and_from_its_own_recording(
     one: CalibrateOutcome, tmp_path: Path
 ) -> None:

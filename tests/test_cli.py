@@ -95,6 +95,7 @@ def test_a_group_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert "`antennate setup zero`, `antennate setup jog`" in capsys.readouterr().out
 
 
+@pytest.mark.smoke
 def test_python_runs_the_package_as_the_command():
     words = [sys.executable, "-m", "antennate", "--version"]
     done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60)
@@ -153,6 +154,7 @@ def test_help_of_a_study_names_what_an_option_takes_and_every_plan(capsys):
     assert all(plan in first for plan in ("grid", "list", "random", "sobol", "morris"))
 
 
+@pytest.mark.ci
 def test_the_door_opens_without_heavy_imports():
     code = (
         "import sys, antennate.cli as c; c.main(['--help']); "
@@ -189,6 +191,7 @@ _REFUSED = [
 """Words, and what neither they nor those above them need."""
 
 
+@pytest.mark.ci
 def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
     """One process for all of them, and what it has imported after each."""
     script = """if True:
@@ -473,6 +476,7 @@ def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
     assert "trials.jsonl" in refusal(capsys, *QUICK, "--out", "run")
 
 
+@pytest.mark.ci
 def test_one_and_two_workers_write_the_same_bytes(capsys, tmp_path):
     words = ["--trials", "2", "--time-limit", "1", "--controllers", "open", "closed"]
     words += ["--no-figures"]

@@ -182,6 +182,7 @@ def test_what_is_felt_is_counted_by_hand():
     assert stats.poisson.cdf(2, 0.5 * high) == pytest.approx(0.025)
 
 
+@pytest.mark.ci
 def test_rows_are_the_same_on_two_workers():
     config = ClimbConfig(**TINY)
     one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)

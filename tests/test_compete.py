@@ -156,6 +156,7 @@ def episodes(name: str, count: int = 1, scene: str = SHORT, limit: float = 0.05)
 # faults in a trial
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "why"),
     [
@@ -176,12 +177,14 @@ def test_what_fails_in_a_trial_is_invalid_with_its_reason(
     assert why in row.reason
 
 
+@pytest.mark.ci
 def test_a_decision_within_the_limit_is_none_that_took_too_long(
     entries: Callable[[str], str],
 ) -> None:
     assert [r.outcome for r in episodes(entries("Busy"), 2, limit=5.0)] == ["timeout"] * 2
 
 
+@pytest.mark.ci
 def test_decisions_of_a_batch_are_judged_alone(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
@@ -193,12 +196,14 @@ def test_decisions_of_a_batch_are_judged_alone(
     assert {row.outcome for row in rows} == {"timeout"}
 
 
+@pytest.mark.ci
 def test_who_can_use_knowledge_but_needs_none_is_given_none(
     entries: Callable[[str], str],
 ) -> None:
     assert episodes(entries("Curious"))[0].reason == ""
 
 
+@pytest.mark.ci
 def test_who_needs_knowledge_in_a_run_alone_is_given_it_and_its_rows_say_so(
     entries: Callable[[str], str],
 ) -> None:
@@ -331,6 +336,7 @@ class Slow:
 """
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process tells its time itself")
 @pytest.mark.parametrize(
     ("name", "why"),
@@ -372,6 +378,7 @@ def test_processor_time_does_not_escape(
         assert not left.exists()
 
 
+@pytest.mark.ci
 def test_a_judge_that_was_stopped_blames_no_controller(entries: Callable[[str], str]) -> None:
     """As by Ctrl-Z and fg: 1.5 s, where a decision may last one second on the clock."""
     words = "sleep 0.3; kill -STOP $0; sleep 1.5; kill -CONT $0"
@@ -381,6 +388,7 @@ def test_a_judge_that_was_stopped_blames_no_controller(entries: Callable[[str], 
     assert [row.reason for row in rows] == [""]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["Busy", "Begins", "Entry"])
 def test_where_the_system_does_not_tell_a_process_tells_its_time_itself(
     name: str, entries: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
@@ -394,6 +402,7 @@ def test_where_the_system_does_not_tell_a_process_tells_its_time_itself(
 # a run
 
 
+@pytest.mark.ci
 def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     tmp_path: Path, entries: Callable[[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -421,6 +430,7 @@ def test_a_run_ranks_counts_invalid_as_failed_and_keeps_controllers_apart(
     assert "expected finite angles in yaw" in told
 
 
+@pytest.mark.ci
 def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -437,6 +447,7 @@ def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
     assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 
+@pytest.mark.ci
 def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(
     entries: Callable[[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -454,6 +465,7 @@ def test_rows_are_the_same_for_any_number_of_workers() -> None:
     assert len({(r.controller, r.scene, r.trial) for r in one}) == 40
 
 
+@pytest.mark.smoke
 def test_a_row_is_that_of_tunnel() -> None:
     """The same scene, seed and trial, run by the command `tunnel` with those parameters."""
     text = "uturn+variation.reading_noise=3+time_limit=2"
@@ -489,6 +501,7 @@ def write_wheel(path: Path) -> None:
             wheel.writestr(name, text)
 
 
+@pytest.mark.ci
 def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Path) -> None:
     wheel = tmp_path / f"rivals-2.0-py3-none-any.{'wh' + 'l'}"  # no address of a registry
     write_wheel(wheel)
@@ -515,11 +528,15 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ("--controllers entries.py:Shape", "expected yaw of shape (1, 5), found (1, 2)"),
+        pytest.param(
+            "--controllers entries.py:Shape",
+            "expected yaw of shape (1, 5), found (1, 2)",
+            marks=pytest.mark.ci,
+        ),
         ("--controllers clsoed", "did you mean closed?"),
         ("--controllers entries.py:Ends ./entries.py:Ends", "controllers must differ"),
         ("--controllers a/p.onnx open ./a//p.onnx", "controllers must differ"),
-        ("--controllers missing.py:Mine", "no file"),
+        pytest.param("--controllers missing.py:Mine", "no file", marks=pytest.mark.ci),
         ("--scenes utrun", "did you mean uturn?"),
         ("--scenes uturn+variation.noise=3", "'uturn+variation.noise=3': "),
         (
@@ -560,6 +577,7 @@ def test_bad_input_is_one_line_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "why"), [("Dies", "process ended"), ("Hangs", "no result within 4 s")]
 )
@@ -581,6 +599,7 @@ def test_who_ends_or_hangs_a_process_is_named_before_the_first_trial(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.ci
 def test_who_ends_its_process_in_a_trial_is_invalid_and_who_breaks_it_breaks_nothing_else(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
@@ -595,6 +614,7 @@ def test_who_ends_its_process_in_a_trial_is_invalid_and_who_breaks_it_breaks_not
     assert "a program that it began runs on" in rows[2].reason
 
 
+@pytest.mark.ci
 def test_entries_with_helpers_of_one_name_each_get_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -612,6 +632,7 @@ def test_entries_with_helpers_of_one_name_each_get_their_own(
     assert main(["compete", *words, "--workers", "1", "--out", str(tmp_path / "run")]) == 0
 
 
+@pytest.mark.ci
 def test_figures_that_did_not_fit_are_drawn_by_resume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -631,6 +652,7 @@ def test_figures_that_did_not_fit_are_drawn_by_resume(
     assert (tmp_path / "run" / "trials.jsonl").exists()
 
 
+@pytest.mark.ci
 def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     entries: Callable[[str], str],
     monkeypatch: pytest.MonkeyPatch,
@@ -652,6 +674,7 @@ def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     assert not Path("none").exists()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -679,6 +702,7 @@ def test_a_policy_of_another_robot_or_rate_is_refused(
     assert why in capsys.readouterr().err
 
 
+@pytest.mark.ci
 def test_a_policy_competes(tmp_path: Path) -> None:
     pytest.importorskip("onnx")
     pytest.importorskip("onnxruntime")
@@ -691,6 +715,7 @@ def test_a_policy_competes(tmp_path: Path) -> None:
 # seeds
 
 
+@pytest.mark.ci
 def test_a_check_does_not_go_on_with_another_file_of_a_controller(
     tmp_path: Path, entries: Callable[[str], str]
 ) -> None:
@@ -714,6 +739,7 @@ def test_a_hidden_seed_is_neither_public_nor_reserved() -> None:
     assert (RESERVED[0], RESERVED[-1]) == (700_000, 799_999)
 
 
+@pytest.mark.ci
 def test_a_hidden_run_that_was_stopped_goes_on_with_its_seed_and_publishes_it(
     tmp_path: Path,
 ) -> None:
@@ -755,6 +781,7 @@ def test_only_a_hidden_run_draws_a_seed_and_takes_no_other(tmp_path: Path) -> No
 # a table that is run again
 
 
+@pytest.mark.ci
 def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> None:
     keys = [(5, 0), (6, 1), (5, 1), (6, 0)]
     rows: list[Episode] = []
@@ -767,6 +794,7 @@ def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> N
     assert sorted((row.seed, row.trial) for row in again.rows) == sorted(keys)
 
 
+@pytest.mark.ci
 def test_a_rival_at_1_hz_walks_as_by_the_parameter() -> None:
     file = Path(__file__).parents[1] / "docs" / "science" / "one_hertz.py"
     (row,) = episodes(f"{file}:geometric", scene="uturn+time_limit=6")
@@ -776,6 +804,7 @@ def test_a_rival_at_1_hz_walks_as_by_the_parameter() -> None:
     assert row.progress_m == result.rows[0].progress_m > 0.5
 
 
+@pytest.mark.ci
 def test_a_table_is_run_again_and_rows_that_differ_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -1004,13 +1033,16 @@ ELSEWHERE = "controller,scene,seed,trial,outcome,time_s,limit_s,processor"
     ("times", "code", "said"),
     [
         (["success,-5,0.3"] * 4, 2, "expected a finite number of 0 to limit_s"),
-        (
+        pytest.param(
             ["success,0.01,0.3"] * 4,
             2,
             "found mean times that differ by -96.7 % of the limit (p 0.0",
+            marks=pytest.mark.ci,
         ),
-        (["success,0.01,0.3"] * 3, 0, "They are too few to tell."),
-        (["timeout,0.3,0.3"] * 4, 0, "4 are of another version"),
+        pytest.param(
+            ["success,0.01,0.3"] * 3, 0, "They are too few to tell.", marks=pytest.mark.ci
+        ),
+        pytest.param(["timeout,0.3,0.3"] * 4, 0, "4 are of another version", marks=pytest.mark.ci),
     ],
 )
 def test_a_table_of_few_rows_of_another_processor_is_checked(

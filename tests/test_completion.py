@@ -37,6 +37,7 @@ def offered(script: Path, *words: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -75,6 +76,7 @@ def test_bash_offers(script: Path, words: list[str], expected: list[str]) -> Non
     assert expected or not found
 
 
+@pytest.mark.smoke
 def test_every_flag_of_a_command_is_offered(script: Path) -> None:
     flags = offered(script, "antenna", "springs", "--")
     assert {"--config", "--out", "--wire", "--wanted-n-mm-per-deg", "--help-all"} <= set(flags)

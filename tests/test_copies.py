@@ -72,6 +72,7 @@ def rows_of(tmp_path: Path, command: str, names: list[str], *words: str) -> list
     return list(csv.DictReader((tmp_path / "run" / "trials.csv").read_text().splitlines()))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["Stops", "Bases", "Binds", "Honest"])
 def test_a_trial_ends_at_its_limit_whatever_a_controller_writes(tmp_path: Path, name: str) -> None:
     words = ["--trials", "2", "--time-limit", "0.5", "--scene", "flat"]
@@ -81,6 +82,7 @@ def test_a_trial_ends_at_its_limit_whatever_a_controller_writes(tmp_path: Path, 
         assert {**one, "controller": ""} == {**other, "controller": ""}
 
 
+@pytest.mark.ci
 def test_a_competitor_cannot_stop_the_clock(tmp_path: Path) -> None:
     words = ["--trials", "1", "--scenes", "flat+time_limit=0.3"]
     plain, written = rows_of(tmp_path, "compete", ["Plain", "Stops"], *words)

@@ -141,6 +141,7 @@ def test_a_search_in_which_nothing_succeeds_ends() -> None:
     assert "bowls: far (successes only): none" in found.sentence
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("goals", "expected"),
     [
@@ -160,6 +161,7 @@ def test_unknown_measures_are_one_line(
     assert expected in said[-1]
 
 
+@pytest.mark.ci
 def test_successes_of_an_experiment_without_outcomes_are_refused(
     refused: Callable[..., str],
 ) -> None:

@@ -27,6 +27,7 @@ def ran(name: str, folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.ci
 def test_a_cart_stops_at_a_wall_that_its_antennae_feel(tmp_path: Path) -> None:
     out = ran("antenna_on_my_robot", tmp_path)
     gap, *flex, force = map(float, re.findall(r"-?\d+\.\d+", out))
@@ -54,6 +55,7 @@ def test_examples_are_short_and_say_what_they_are(path: Path) -> None:
     assert text.startswith('"""')
 
 
+@pytest.mark.ci
 def test_virtual_servos_are_moved_over_tcp(tmp_path: Path) -> None:
     out = ran("servo_bus", tmp_path).splitlines()
     assert out[0].endswith("[1, 2, 3]")
@@ -61,6 +63,7 @@ def test_virtual_servos_are_moved_over_tcp(tmp_path: Path) -> None:
     assert out[3].endswith("{1: 2148, 2: None, 3: 2348}")
 
 
+@pytest.mark.ci
 def test_a_swimmer_goes_as_far_as_published(tmp_path: Path) -> None:
     out = ran("swimmer", tmp_path)
     by_curvature, _ = map(float, re.findall(r"by curvature: (\S+), exact: (\S+)", out)[0])

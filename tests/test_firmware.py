@@ -291,6 +291,7 @@ def on_micropython(folder: Path, script: str) -> bytes:
     ).stdout
 
 
+@pytest.mark.ci
 def test_E10_micropython_encodes_the_same_bytes_and_allocates_nothing(tmp_path: Path) -> None:
     script = ON_BOARD.format(folder=str(tmp_path), boot=0x1234ABCD)
     *frames, grown, check = on_micropython(tmp_path, script).decode().split()
@@ -301,6 +302,7 @@ def test_E10_micropython_encodes_the_same_bytes_and_allocates_nothing(tmp_path: 
     assert int(check) == 0xCBF43926 == zlib.crc32(b"123456789")
 
 
+@pytest.mark.smoke
 def test_the_whole_program_runs_on_micropython(tmp_path: Path) -> None:
     decoder = FrameDecoder()
     frames = decoder.feed(on_micropython(tmp_path, WHOLE_PROGRAM.format(folder=str(tmp_path))))

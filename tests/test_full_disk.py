@@ -55,6 +55,7 @@ def tiny_disk() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
 
 
+@pytest.mark.ci
 def test_a_drive_goes_on_and_counts_what_is_not_logged_at_once(tmp_path: Path) -> None:
     drive = Drive(tmp_path / "run")
     with (
@@ -92,6 +93,7 @@ def test_a_drive_goes_on_and_counts_what_is_not_logged_at_once(tmp_path: Path) -
     assert f"The log is not complete: {found[0]}. Its files: drive.mcap." in out
 
 
+@pytest.mark.ci
 def test_a_twin_tells_its_failed_log_with_the_cause_and_ends_with_2(tmp_path: Path) -> None:
     said, _ = walked(tmp_path, "--scene", "flat", "--log", "t.mcap", code=2, limits=tiny_disk)
     *_, last = said.splitlines()
@@ -147,6 +149,7 @@ def removed_is_said(result: dict[str, Any], out: str) -> None:
     assert f"No log was kept: {found[0]}." in out
 
 
+@pytest.mark.smoke
 def test_a_drive_in_one_process_whose_folder_is_removed_says_what_is_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -153,6 +153,7 @@ def test_walks_by_name_become_the_result_that_the_tables_show():
     assert "the measured 0.70 is inside" in study.sentence(result)
 
 
+@pytest.mark.ci
 def test_result_does_not_depend_on_workers():
     config = study.GaitStudyConfig(
         cycles=2,

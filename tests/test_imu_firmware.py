@@ -245,6 +245,7 @@ def test_the_frame_has_its_layout() -> None:
     assert "frame kind 5 has 35 bytes, found 34" in short.reason
 
 
+@pytest.mark.ci
 def test_micropython_runs_the_driver(tmp_path: Path) -> None:
     """Its eleventh to twentieth read fail: five in a row, then it is left alone for a second."""
     shutil.copy(FIRMWARE / "imu.py", tmp_path / "imu.py")
@@ -258,6 +259,7 @@ def test_micropython_runs_the_driver(tmp_path: Path) -> None:
     assert samples[-1].misses == len(samples) - 10
 
 
+@pytest.mark.ci
 def test_micropython_goes_on_without_the_driver(tmp_path: Path) -> None:
     script = WHOLE_PROGRAM.format(folder=str(tmp_path))
     script = script.replace("import main", f"{INERTIAL}import main", 1)

@@ -47,6 +47,7 @@ def page(tmp_path: Path) -> Path:
     return tmp_path / "leaderboard.md"
 
 
+@pytest.mark.ci
 def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -> None:
     before = page.read_text()
     done = run(page.parent, "--check")
@@ -63,6 +64,7 @@ def test_the_board_is_written_between_its_marks_and_the_rest_stays(page: Path) -
     assert len(list((page.parent / "images").glob("leaderboard-*.png"))) == 3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("entry", "why"),
     [
@@ -78,6 +80,7 @@ def test_a_judge_without_an_entry_says_what_is_missing(entry: str, why: str) -> 
     assert why in done.stdout + done.stderr
 
 
+@pytest.mark.ci
 def test_a_page_without_its_marks_is_left_as_it_is(page: Path) -> None:
     page.write_text(page.read_text().replace("<!-- end of board -->", ""))
     before = page.read_text()
@@ -87,6 +90,7 @@ def test_a_page_without_its_marks_is_left_as_it_is(page: Path) -> None:
     assert page.read_text() == before
 
 
+@pytest.mark.ci
 def test_tables_of_several_runs_are_joined(page: Path, tmp_path: Path) -> None:
     file = page.with_suffix(".csv")
     (tmp_path / "a.csv").write_text(file.read_text())
@@ -98,6 +102,7 @@ def test_tables_of_several_runs_are_joined(page: Path, tmp_path: Path) -> None:
     assert file.read_text().count("closed") == 2
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -120,6 +125,7 @@ def test_tables_that_do_not_stand_together_leave_the_board_as_it_is(
     assert "found both" in done.stderr
 
 
+@pytest.mark.ci
 def test_a_seed_that_was_not_drawn_is_not_told_as_hidden(page: Path) -> None:
     file = page.with_suffix(".csv")
     file.write_text(file.read_text().replace("True", "False", 1))

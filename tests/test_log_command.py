@@ -204,6 +204,7 @@ def test_recover_says_what_it_leaves_out_and_touches_no_file_of_the_user(
     assert sorted(path.name for path in tmp_path.glob(".*")) == [".a-recovered.mcap"]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("words", [["recover"], ["export", "--out", "table.csv"]])
 def test_what_a_killed_command_left_goes_with_the_next_and_a_living_one_keeps_its_file(
     log: Path, words: list[str]

@@ -82,6 +82,7 @@ def test_a_study_runs_those_alone_that_it_has_not() -> None:
     assert same("run", "five")
 
 
+@pytest.mark.ci
 def test_fewer_trials_are_refused_and_nothing_changes(capsys: pytest.CaptureFixture[str]) -> None:
     assert study("run", 3) == 0
     before = {path: path.read_bytes() for path in Path("run").rglob("*") if path.is_file()}
@@ -96,6 +97,7 @@ def test_fewer_trials_are_refused_and_nothing_changes(capsys: pytest.CaptureFixt
     assert before == {path: path.read_bytes() for path in before}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("cut", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 30))])
 def test_a_run_that_was_killed_as_it_took_more_goes_on(cut: int) -> None:
     """At the line that says so: whole, or torn; with the result of before still there."""

@@ -226,6 +226,7 @@ def test_a_tcp_end_serves_one_client_at_a_time_and_lets_it_come_back() -> None:
     third.close()
 
 
+@pytest.mark.ci
 def test_X16_the_key_is_in_nothing_that_a_drive_over_udp_says(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.ci
+
 ALONE = "--no-figures --workers 1"
 SHORT = f"--time-limit 1 {ALONE}"
 ANTENNA = f"--profiles descending {ALONE}"

@@ -194,6 +194,7 @@ def test_a_controller_can_be_added_in_python_but_not_in_place_of_ours() -> None:
         CONTROLLERS.add("paper", open_loop)
 
 
+@pytest.mark.ci
 def test_what_is_added_in_python_is_known_in_worker_processes() -> None:
     CONTROLLERS.add("mine", closed_loop)
     SCENES.add("my_floor", FlatScene)
@@ -202,6 +203,7 @@ def test_what_is_added_in_python_is_known_in_worker_processes() -> None:
     assert [(row.controller, row.outcome) for row in found] == [("mine", "timeout")] * 2
 
 
+@pytest.mark.ci
 def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
     CONTROLLERS.add("mine", lambda *words: closed_loop(*words))
     changes = {"controllers": ["mine"], "trials": 2, "time_limit": 0.3}
@@ -218,6 +220,7 @@ def test_the_example_keeps_the_protocol() -> None:
     check_controller(EXAMPLE)
 
 
+@pytest.mark.ci
 def test_a_file_with_a_kind_brings_sentence_and_colour(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -271,6 +274,7 @@ def test_the_example_is_short() -> None:
     assert len(Path(EXAMPLE.rpartition(":")[0]).read_text().splitlines()) <= 40
 
 
+@pytest.mark.ci
 def test_the_example_runs_in_the_tunnel_in_worker_processes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -407,6 +411,7 @@ def test_a_controller_that_fails_makes_its_trial_invalid_and_no_other(
             assert (mine.progress_m, mine.force_mean_n) == (theirs.progress_m, theirs.force_mean_n)
 
 
+@pytest.mark.ci
 def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_told(
     capsys, tmp_path
 ):
@@ -427,6 +432,7 @@ def test_a_failing_controller_is_named_by_its_path_and_its_invalid_trials_are_to
     assert "ZeroDivisionError" in (tmp_path / "run" / "trials.csv").read_text()
 
 
+@pytest.mark.ci
 def test_one_worker_survives_a_controller_that_ends_its_process_and_prints(
     tmp_path: Path,
 ) -> None:

@@ -17,9 +17,12 @@ from browser import CHROMIUM, Tab, browser
 import antennate
 from antennate.cli import main
 
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
-)
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="no chromium here; `apt-get install chromium` brings it"
+    ),
+]
 ROOT = Path(__file__).parent.parent
 LOOKS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
 PAGES = (*("", "log/", "commands/", "performance/", "reliability/", "hardware/", "controllers/"),)

@@ -280,12 +280,13 @@ PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
 
 
-LONGEST = ("geometry", "climb", "dataset", "sweep")
+MARKS = {
+    **dict.fromkeys(("geometry", "climb", "dataset", "sweep"), pytest.mark.slow),
+    "compete": pytest.mark.ci,
+}
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONGEST else ()) for name in TINY]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in TINY])
 def test_every_parameter_of_an_experiment_is_read_or_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -168,6 +168,7 @@ def test_an_answer_that_is_no_number_is_hold(tmp_path: Path) -> None:
     assert not np.array_equal(yaw[0], yaw[1])
 
 
+@pytest.mark.ci
 def test_tunnel_says_in_how_many_decisions_the_answer_was_no_number(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,6 +188,7 @@ def test_tunnel_says_in_how_many_decisions_the_answer_was_no_number(
     assert [row["void_decisions"] for row in rows] == ["0", "0", "18", "18"]
 
 
+@pytest.mark.ci
 def test_compete_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: Path) -> None:
     """Of 100 s, in which the robot leaves nothing and reaches nothing, 1001 less three."""
     path = str(failing(tmp_path / "p.onnx"))
@@ -278,6 +280,7 @@ def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:
     assert set(maneuvers[-200:]) == {Maneuver.TURN_R}
 
 
+@pytest.mark.ci
 def test_its_log_replays_bit_for_bit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

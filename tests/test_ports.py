@@ -130,6 +130,7 @@ def test_E3_a_board_that_starts_anew_when_opened_is_waited_for() -> None:
     assert not port.wrote
 
 
+@pytest.mark.ci
 def test_L15_the_second_program_on_a_port_is_refused_and_told_the_pid_of_the_first(
     plug: Callable[[], Terminal], tmp_path: Path
 ) -> None:

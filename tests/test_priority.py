@@ -20,6 +20,7 @@ def scheduling() -> int:
     return os.sched_getscheduler(0)
 
 
+@pytest.mark.ci
 def test_the_loop_is_real_time_where_allowed_and_what_it_starts_is_ordinary() -> None:
     before, known = scheduling(), gc.get_freeze_count()
     with urgent() as got:
@@ -82,6 +83,7 @@ sys.exit(77 if got is Priority.ORDINARY else os.sched_getscheduler(0) & ~os.SCHE
 """Exit code 77 where that cannot be shown, else the scheduling after the block; 0 is ordinary."""
 
 
+@pytest.mark.ci
 def test_T3_a_user_with_a_limit_alone_leaves_the_loop_as_an_ordinary_process() -> None:
     done = subprocess.run([sys.executable, "-c", UNPRIVILEGED], capture_output=True, text=True)
     if done.returncode == 77:

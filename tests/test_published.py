@@ -121,6 +121,7 @@ def test_effects_of_unknowns(published):
     assert max(effects[name][1] for name in "abd") < 1.0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("group", ["tunnel", "wall"])
 def test_hidden_settings_are_a_study(tmp_path, group):
     run = part("hidden", group, "--count", 3, "--trials", 4)
@@ -141,6 +142,7 @@ def test_rows_are_read_as_they_were_kept(published):
     assert 0.2 < rows.outcomes["stiff jams"].mean() < 0.6
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "line"),
     [
@@ -189,6 +191,7 @@ def test_a_recording_that_was_refused_tells_that_it_was(published, tmp_path):
     ).all()
 
 
+@pytest.mark.ci
 def test_a_search_stays_near_the_likeliest_and_within_the_ranges(tmp_path):
     """One of 40 settings has the paper's numbers, at an end of a range."""
     columns = tomllib.loads(
@@ -239,6 +242,7 @@ def test_the_page_tells_what_the_rows_of_the_tunnel_say(published):
         assert f"{a} of {n} | {b} of {m} |" in page
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("controller", ["timed", "schedule", "paper"])
 def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path, capsys):
     slow = FOLDER / "published_tunnel_slow.toml"
@@ -256,6 +260,7 @@ def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path,
     assert (out / "trials.csv").exists(), said.err
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "line"),
     [
@@ -276,6 +281,7 @@ def test_parts_that_lack_something_say_so(words, line):
     assert run.stderr.count("\n") == 1
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("column", "cell", "line"),
     [

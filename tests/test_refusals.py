@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import io
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -233,7 +234,6 @@ tracks --files a.csv --points.left a b --points.right none --criteria.flex 1 :: 
 ROBOT = """
 robot --export mjc :: --export: expected one of mjcf or urdf, found mjc
 robot --export mjcf --scene tunle :: --scene: expected one of tunnel, :: did you mean tunnel?
-robot --export mjcf --scene missing.xml :: missing.xml: expected a readable file
 robot --export mjcf --scene tunnel --robot.width 0.5 :: at least robot.width, 0.5 m, found 0.4 m
 robot --export mjcf --scene tunnel --seed -4 :: --seed: expected a number of at least 0, found -4
 robot --export mjcf --seed 4 :: --seed: expected --scene beside it, found none
@@ -331,13 +331,22 @@ TOPICS = [
     ROBOT,
     TWIN,
 ]
-ROWS = [line.split(" :: ") for topic in TOPICS for line in topic.strip().splitlines()]
+COMPILED = """
+robot --export mjcf --scene missing.xml :: missing.xml: expected a readable file
+"""
+"""Of files that a process of its own compiles first."""
+
+
+def cases(topic: str, *marks: pytest.MarkDecorator) -> Iterator[Any]:
+    """The lines of a topic: words, and what stands in the line that refuses them."""
+    for line in topic.strip().splitlines():
+        words, *parts = line.split(" :: ")
+        yield pytest.param(words, parts, id=words or "none", marks=marks)
 
 
 @pytest.mark.parametrize(
     ("words", "parts"),
-    [(words, parts) for words, *parts in ROWS],
-    ids=[words or "none" for words, *_ in ROWS],
+    [*(case for topic in TOPICS for case in cases(topic)), *cases(COMPILED, pytest.mark.ci)],
 )
 def test_words_are_refused_in_one_line(
     words: str, parts: list[str], there: Path, refused: Callable[..., str], monkeypatch

@@ -188,6 +188,7 @@ def test_record_with_the_file_of_drive_gets_as_far_as_the_port(
     assert "/dev/null: not a serial port" in capsys.readouterr().err
 
 
+@pytest.mark.ci
 def test_a_file_that_a_user_left_in_the_clone_is_not_read_by_the_tests(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_text('[ports]\nbus = "ports/bus"\nesp32 = "ports/esp32"\n')
     others = Path(__file__).with_name("test_dependent_options.py")

@@ -44,6 +44,7 @@ def test_ours_keep_the_protocol(tmp_path):
         check_scene(scene)
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(not EXAMPLE.is_file(), reason="examples are not part of this copy")
 def test_a_scene_of_ones_own_is_walked_without_touching_the_package(tmp_path, capsys):
     check_scene(make_scene(f"{EXAMPLE}:Pillars"))
@@ -337,6 +338,7 @@ def test_entities_and_large_files_are_refused(tmp_path):
         MjcfScene(tmp_path / "none.xml")
 
 
+@pytest.mark.ci
 def test_a_bad_scene_is_told_before_anything_is_written(tmp_path, refused):
     path = mjcf(tmp_path, SITES + '<geom type="box" size=".1 .1 .1"/>')
     assert "room for the robot" in refused(
@@ -345,6 +347,7 @@ def test_a_bad_scene_is_told_before_anything_is_written(tmp_path, refused):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("code", "limit", "told"),
     [
@@ -369,6 +372,7 @@ def test_X2_a_named_file_is_compiled_by_another_process_first(tmp_path, monkeypa
     assert tried == [path]
 
 
+@pytest.mark.ci
 def test_a_good_model_and_a_bad_one_leave_the_word_to_the_reader(tmp_path):
     require_compiles(mjcf(tmp_path, SITES + WALL))
     require_compiles(mjcf(tmp_path, "<gem/>"))
@@ -396,6 +400,7 @@ def test_an_error_in_ones_own_scene_names_it_and_its_line(tmp_path, line, method
         check_start(TrialConfig(scene=f"{tmp_path / 'mine.py'}:Mine"))
 
 
+@pytest.mark.ci
 def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path, refused):
     """Chance may move the start of a trial, though the first one has room."""
     walls = [f'<geom type="box" size="2 .02 .1" pos="0 {y} .1"/>' for y in (-0.4, 0.4)]
@@ -415,6 +420,7 @@ def test_a_trial_that_starts_inside_a_wall_is_invalid(tmp_path, refused):
     assert "expected room for the robot at the start" in refused(*words, "--trial", str(blocked))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("workers", "ends", "told"),
     [
@@ -454,6 +460,7 @@ def test_a_trial_whose_scene_cannot_be_drawn_is_invalid_and_the_others_run(
     assert main([*words, "--out", str(tmp_path / "none")]) == 2
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("answer", "told"),
     [

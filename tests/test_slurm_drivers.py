@@ -14,6 +14,8 @@ import pytest
 import antennate
 from antennate.studies.trial_file import read_trials
 
+pytestmark = pytest.mark.ci
+
 HERE = Path(__file__).parent
 
 

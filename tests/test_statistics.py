@@ -41,6 +41,7 @@ def test_the_quantile_of_student_is_that_of_scipy_bit_for_bit(count: int) -> Non
     assert student95(count - 1) == t.ppf(0.975, count - 1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "words",
     [pytest.param(["tunnel"], marks=pytest.mark.slow), ["study", "plan.toml", "--trust-code"]],

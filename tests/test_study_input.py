@@ -119,6 +119,7 @@ def test_bad_words_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert not Path("runs").exists()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_a_measure_that_a_function_has_not_is_found_at_its_first_row(
     workers: str, capsys: pytest.CaptureFixture[str]

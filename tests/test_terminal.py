@@ -14,6 +14,7 @@ from terminal import Terminal
 from test_setup_zeros import ZEROS
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("columns", [80, 40])
 def test_the_viewer_shows_what_to_do_whatever_the_width(columns: int, tmp_path: Path) -> None:
     terminal = Terminal(columns)
@@ -61,6 +62,7 @@ COUNTERS = ("maneuver", "counts", "age", "touch", "drift", "missed_ticks", "miss
 COUNTERS += ("stale", "frames", "crc", "lost", "sent", "refused", "unlogged")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("columns", [60, 80, 120])
 def test_the_status_line_of_a_drive_has_all_its_labels(columns: int, tmp_path: Path) -> None:
     terminal = Terminal(columns)
@@ -73,6 +75,7 @@ def test_the_status_line_of_a_drive_has_all_its_labels(columns: int, tmp_path: P
     assert [word.partition("=")[0] for word in shown if "=" in word][: len(COUNTERS)] == [*COUNTERS]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("columns", [60, 80, 120])
 def test_zero_shows_every_joint_that_is_watched(columns: int) -> None:
     terminal = Terminal(columns)
@@ -90,6 +93,7 @@ def test_zero_shows_every_joint_that_is_watched(columns: int) -> None:
     assert shown == "yaw {} legs {} antennae {}".format(*numbers)
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("columns", [80, 200])
 def test_what_another_process_says_stays_when_the_status_line_changes(columns: int) -> None:
     source = (

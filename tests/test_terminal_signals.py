@@ -20,6 +20,7 @@ ANTENNATE = [sys.executable, "-m", "antennate"]
 INTERRUPTED = 130
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("moment", [0.0, 0.4, 1.0])
 def test_B19_ctrl_c_at_any_time_ends_it_in_order(tmp_path: Path, moment: float) -> None:
     """Typed at a moment after the folder of the run came, while other processes still start."""
@@ -59,6 +60,7 @@ def test_B19_ctrl_c_at_any_time_ends_it_in_order(tmp_path: Path, moment: float) 
     assert f"replay {out / result['logs'][0]}" in " ".join(text.split())
 
 
+@pytest.mark.smoke
 def test_ctrl_c_while_source_is_executed_keeps_the_exit_code(tmp_path: Path) -> None:
     """As `dataclasses` does at import: CPython would end itself by SIGINT after our exit code."""
     command = 'exec("raise KeyboardInterrupt")'

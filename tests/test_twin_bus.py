@@ -419,6 +419,7 @@ def test_L12_a_line_that_goes_away_is_a_port_error() -> None:
     port.close()
 
 
+@pytest.mark.smoke
 def test_B7_a_killed_program_leaves_a_robot_that_stops(server: PtyServer) -> None:
     """Servos slow enough to be on their way for seconds; 120 ms after the last packet all stand."""
     pytest.importorskip("serial")

@@ -14,6 +14,7 @@ PROGRAM = "import sys; from antennate.cli import main; sys.exit(main())"
 INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("pair", [(INT, TERM), (TERM, TERM), (HUP, HUP)])
 def test_a_twin_ends_in_order_however_often_it_is_asked_to(pair: tuple[int, int]) -> None:
     with subprocess.Popen(

@@ -122,6 +122,7 @@ def typing_twin(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
             process.terminate()
 
 
+@pytest.mark.ci
 def test_the_shipped_twin_takes_typed_touches_and_answers_others(tmp_path_factory) -> None:
     with typing_twin() as (process, board):
         assert process.stdin is not None

@@ -10,6 +10,8 @@ import pytest
 from browser import CHROMIUM, browser
 from view_rig import PATIENCE, child_of, shown
 
+pytestmark = pytest.mark.ci
+
 SCALES = """JSON.stringify(Object.values(window.__viserTestpoints?.uplots ?? {}).map(
     each => [...['min', 'max'].map(end => Math.round(1e3 * each.chart.scales.x[end]) / 1e3),
              each.chart.axes[0]._values?.join()]))"""

@@ -41,6 +41,7 @@ def page() -> Iterator[tuple[ViewProcess, list[str]]]:
         yield process, said
 
 
+@pytest.mark.smoke
 def test_a_view_is_given_up_at_once_and_one_line_says_why(
     page: tuple[ViewProcess, list[str]],
 ) -> None:
@@ -60,6 +61,7 @@ def children() -> set[str]:
     return set(Path(f"/proc/self/task/{os.getpid()}/children").read_text().split())
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(not LINUX, reason="only Linux has SCHED_IDLE")
 def test_every_thread_of_a_view_beside_a_drive_gives_way(request: pytest.FixtureRequest) -> None:
     others = children()  # those of tests before it, as of a pool of workers
@@ -70,6 +72,7 @@ def test_every_thread_of_a_view_beside_a_drive_gives_way(request: pytest.Fixture
     assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_IDLE}
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(not LINUX, reason="a stopped process goes on, as it is done on Linux")
 @pytest.mark.parametrize("armed", [False, True])
 def test_a_late_loop_gives_its_view_up_once_servos_have_torque(tmp_path: Path, armed: bool) -> None:
