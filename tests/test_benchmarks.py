@@ -131,6 +131,7 @@ def test_the_first_step_is_noted_once(loaded, monkeypatch, tmp_path):
     assert len((tmp_path / "note").read_text().split()) == 1
 
 
+@pytest.mark.ci
 def test_three_masters_are_put_to_the_same_test(loaded):
     """Ours takes no wrong and no stale value; how long anything takes is not judged here."""
     bus = loaded("bus")
@@ -153,6 +154,7 @@ def page(tmp_path):
     return tmp_path
 
 
+@pytest.mark.ci
 def test_the_page_tells_what_was_measured(page):
     assert "out of date" in run_page(page, "--check").stderr
     done = run_page(page)
@@ -165,6 +167,7 @@ def test_the_page_tells_what_was_measured(page):
     assert run_page(page, "--check").returncode == 0
 
 
+@pytest.mark.ci
 def test_the_page_says_what_is_missed_not_measured_and_busy(page):
     file = page / "performance.json"
     parts = json.loads(file.read_text())

@@ -16,6 +16,7 @@ from antennate.antenna.calibration import Calibration
 from antennate.studies.run_directory import RunDirectory
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kills", [24, pytest.param(500, marks=pytest.mark.slow)])
 def test_S13_a_killed_calibration_leaves_the_old_file_or_the_new_one(
     tmp_path: Path, kills: int

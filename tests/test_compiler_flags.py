@@ -127,6 +127,7 @@ def test_a_scene_obeys_it_as_the_engine_alone_does(name: str, tmp_path: Path) ->
     assert agree(facts(alone), in_simulation(path))
 
 
+@pytest.mark.ci
 def test_an_export_obeys_them_all_together(tmp_path: Path) -> None:
     said = " ".join(f'{name}="{value}"' for name, value in OBEYED.items())
     path = scene(tmp_path, f"<compiler {said}/>")
@@ -159,6 +160,7 @@ def test_a_scene_refuses_numerics_and_sizes(element: str, name: str, tmp_path: P
         MjcfScene(path)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("words", [["tunnel", "--trials", "1"], ["robot", "--export", "mjcf", "x"]])
 def test_commands_refuse_a_total_mass_in_one_line(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

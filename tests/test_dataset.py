@@ -291,6 +291,7 @@ def test_the_command_writes_a_run_and_says_what_it_found(
     assert (tmp_path / "run" / "push.parquet").exists()
 
 
+@pytest.mark.ci
 def test_the_network_of_the_examples_learns_from_it(outcome: Any, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
     data = EXPERIMENT.files(outcome)["push.parquet"]

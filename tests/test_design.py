@@ -66,6 +66,7 @@ def test_a_known_optimum_is_found() -> None:
     assert best[0]["values"]["x"] == pytest.approx(0.7, abs=0.1)
 
 
+@pytest.mark.ci
 def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]) -> None:
     """x^2 and (x - 1)^2 trade off from 0 to 1: there nothing dominates, elsewhere 0 or 1 does."""
     plan(proposals=24, settings={"noise": 0.01})

@@ -21,6 +21,7 @@ from antennate.studies.trial_file import TRIALS
 pytestmark = pytest.mark.usefixtures("there")
 
 
+@pytest.mark.ci
 def test_workers_do_not_change_a_byte() -> None:
     plan(settings={"noise": 0.1, "mode": "nan"})
     design("one", figures=True)
@@ -52,6 +53,7 @@ def test_a_search_cut_anywhere_goes_on_to_the_same_bytes(
         assert len(ran) == len(set(ran)) == trials - kept
 
 
+@pytest.mark.ci
 def test_a_killed_search_goes_on_to_the_same_bytes() -> None:
     plan(settings={"noise": 0.1, "sleep": 0.05})
     design("whole")
@@ -126,6 +128,7 @@ def test_too_few_trials_that_are_ok_fail_a_design() -> None:
     assert found.sentence.endswith("Designs that could not be judged: 13.")
 
 
+@pytest.mark.ci
 def test_failed_trials_can_be_run_again_and_proposals_stay() -> None:
     plan(settings={"mode": "file", "file": "bad", "noise": 0.1}, least_ok=0.9, validated=0)
     Path("bad").touch()
@@ -139,6 +142,7 @@ def test_failed_trials_can_be_run_again_and_proposals_stay() -> None:
     assert [each["values"] for each in after] == [each["values"] for each in before]
 
 
+@pytest.mark.ci
 def test_bad_words_and_late_findings_are_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,6 +54,7 @@ def test_the_twin_is_driven(tmp_path: Path) -> None:
         script.run()
 
 
+@pytest.mark.ci
 def test_the_robot_has_room_at_the_start_of_the_scene_of_the_page(tmp_path: Path) -> None:
     (text,) = (block.text for block in blocks(SCENES) if block.kind == "xml")
     (tmp_path / "room.xml").write_text(text)

@@ -131,6 +131,7 @@ def drive_with_faults(folder: Path) -> Drive:
     return drive
 
 
+@pytest.mark.ci
 def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     """It goes on until it is stopped, torque off, with its result and every tick in its log."""
     result = driven.result

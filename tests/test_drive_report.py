@@ -227,6 +227,7 @@ def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., in
 SILENT = "The robot was not armed: HOLD STALE: no fresh sample from the antenna board"
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("when", "check", "refused", "said"),
     [
@@ -270,6 +271,7 @@ def test_a_controller_that_does_not_exist_is_named_before_a_port_is_opened(
     assert "/no/board" not in said
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("fault", "cause", "skip"),
     [
@@ -301,6 +303,7 @@ def test_S1_S2_a_wire_that_broke_before_arming_is_named_while_one_waits_and_at_t
     assert json.loads((tmp_path / "result.json").read_text())["worst_state"] == "HOLD"
 
 
+@pytest.mark.ci
 def test_a_drive_that_ends_before_its_first_tick_has_a_result(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], shipped: Callable[..., int]
 ) -> None:
@@ -314,6 +317,7 @@ def test_a_drive_that_ends_before_its_first_tick_has_a_result(
     assert (tmp_path / "report.html").exists()
 
 
+@pytest.mark.ci
 def test_a_drive_without_a_log_says_so(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -376,6 +380,7 @@ def test_where_one_tick_in_a_hundred_is_missed_missed_answers_tell_a_late_comput
     assert all(f"{result['missed_answers']} answers of servos" in one for one in said)
 
 
+@pytest.mark.ci
 def test_a_servo_that_falls_silent_ends_a_drive_with_what_to_do_and_no_word_of_the_computer(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],

@@ -12,6 +12,8 @@ import pytest
 
 from antennate.sim.engine_setup import ENGINES, engines
 
+pytestmark = pytest.mark.ci
+
 PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
 (PIN,) = (each for each in PYPROJECT["project"]["dependencies"] if each.startswith("mujoco"))
 TUNNEL = ["tunnel", "--trials", "1", "--time-limit", "1", "--no-figures", "--out", "run"]

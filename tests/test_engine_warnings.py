@@ -55,11 +55,13 @@ def python(folder: Path, *words: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.ci
 def test_a_model_of_ones_own_keeps_its_warnings(tmp_path: Path) -> None:
     assert WARNING in python(tmp_path, "-c", OWN_MODEL)
     assert WARNING in (tmp_path / LOG).read_text()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_commands_and_their_workers_leave_no_log_of_the_engine(
     tmp_path: Path, workers: str

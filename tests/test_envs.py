@@ -110,6 +110,7 @@ def test_an_id_that_another_package_has_taken_stays_and_a_warning_says_so() -> N
         gym.registry["Tunnel-v1"] = ours
 
 
+@pytest.mark.ci
 def test_gymnasium_finds_them_by_the_package_which_stays_free_of_it() -> None:
     code = (
         "import sys, antennate; assert 'gymnasium' not in sys.modules; "
@@ -287,6 +288,7 @@ def observed(scene: str, numbers: list[int]) -> list[str]:
     return texts
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("scene", "resets"), [("Wall", 200), ("Broken", 20)])
 def test_resets_are_those_of_a_fresh_process_in_another_order(scene: str, resets: int) -> None:
     """benchmarks/envs.py does it with 4,096."""

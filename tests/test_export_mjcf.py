@@ -99,6 +99,7 @@ def simulated(robot: RobotSpec, scene: str, seed: int, gait: GaitParams) -> tupl
     return np.array(goals), np.array(states)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "scene", "seed", "gait"),
     [
@@ -241,6 +242,7 @@ def test_the_lone_robot_stands_on_the_floor_of_another_world() -> None:
     assert touching == {"ground", *(f"mine/{leg}" for leg in robot.leg_names)}
 
 
+@pytest.mark.ci
 def test_a_scene_of_a_file_takes_its_meshes_along(tmp_path: Path) -> None:
     """A mesh is moved to its centre anew each time it is read; here that rounds otherwise."""
     (tmp_path / "m").mkdir()

@@ -57,6 +57,7 @@ def until(true: Callable[[], object], feed: Feed, begin: int = 1) -> tuple[int, 
     return number, worst
 
 
+@pytest.mark.ci
 def test_the_viewer_keeps_every_tick_in_order(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -72,6 +73,7 @@ def test_the_viewer_keeps_every_tick_in_order(
     assert "touch=passed" in said
 
 
+@pytest.mark.ci
 def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_counted() -> None:
     """A pipe holds 1 MiB at most, 400 bytes a tick; 3000 more wait: 6000 do not fit twice."""
     count = "import sys; print(len(sys.stdin.buffer.read()))"
@@ -86,6 +88,7 @@ def test_G5_a_reader_that_stands_still_costs_no_time_and_what_it_misses_is_count
     assert not feed.failed
 
 
+@pytest.mark.ci
 def test_G5_a_recorder_that_starts_late_misses_no_tick(tmp_path: Path) -> None:
     """40 s of ticks with causes are sent before it reads a byte; the pipe alone holds 13 s."""
     log, go = tmp_path / "drive.mcap", tmp_path / "go"
@@ -106,6 +109,7 @@ def test_G5_a_recorder_that_starts_late_misses_no_tick(tmp_path: Path) -> None:
         assert [each.number for each in kept] == list(range(1, 4001))
 
 
+@pytest.mark.ci
 def test_G6_a_reader_that_dies_ends_nothing() -> None:
     """It dies at once, and so do those that follow: after three of them no more is started."""
     with Feed(script("pass"), b"first", restarts=3) as feed:
@@ -117,6 +121,7 @@ def test_G6_a_reader_that_dies_ends_nothing() -> None:
     assert not feed.complete
 
 
+@pytest.mark.ci
 def test_G6_a_recorder_that_is_killed_is_followed_by_one_with_a_new_file(tmp_path: Path) -> None:
     first, second = tmp_path / "drive.mcap", tmp_path / "drive-2.mcap"
     with Feed(viewer(first), HEADER.pack()) as feed:
@@ -138,6 +143,7 @@ def test_G6_a_recorder_that_is_killed_is_followed_by_one_with_a_new_file(tmp_pat
     assert number - 1 in numbers, "what is sent while the new one starts waits for it"
 
 
+@pytest.mark.ci
 def test_G6_a_record_that_is_required_is_given_up_with_its_process(tmp_path: Path) -> None:
     """So that the loop hears of a disk that fails, not only of a process that dies."""
     taken = tmp_path / "drive.mcap"
@@ -150,6 +156,7 @@ def test_G6_a_record_that_is_required_is_given_up_with_its_process(tmp_path: Pat
         assert log.header == HEADER
 
 
+@pytest.mark.ci
 def test_G6_a_record_that_is_required_is_not_kept_while_its_process_stands_still() -> None:
     """It has said that it keeps what it gets, and then takes nothing more."""
     stuck = f"import os, time; os.write(1, {KEPT!r}); time.sleep(60)"
@@ -162,6 +169,7 @@ def test_G6_a_record_that_is_required_is_not_kept_while_its_process_stands_still
         os.kill(feed.pid, signal.SIGKILL)
 
 
+@pytest.mark.ci
 def test_G6_ticks_that_a_killed_process_had_not_kept_yet_are_counted(tmp_path: Path) -> None:
     """It stood still with them in its pipe; none of them was dropped before."""
     first, second = tmp_path / "drive.mcap", tmp_path / "drive-2.mcap"
@@ -180,6 +188,7 @@ def test_G6_ticks_that_a_killed_process_had_not_kept_yet_are_counted(tmp_path: P
         assert count(first) == len(list(log))
 
 
+@pytest.mark.ci
 def test_G6_ticks_that_went_to_a_process_which_never_began_are_shown_by_the_next(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -207,6 +216,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.ci
 def test_G6_a_display_that_is_gone_costs_no_tick_of_the_log(tmp_path: Path) -> None:
     log = tmp_path / "drive.mcap"
     words = [sys.executable, "-c", GONE, str(log)]
@@ -218,6 +228,7 @@ def test_G6_a_display_that_is_gone_costs_no_tick_of_the_log(tmp_path: Path) -> N
         assert (len(list(kept)), kept.end) == (300, 300)
 
 
+@pytest.mark.ci
 def test_a_killed_loop_is_told_from_one_that_ended(tmp_path: Path) -> None:
     log = tmp_path / "drive.mcap"
     loop = (
@@ -244,6 +255,7 @@ def test_a_stream_that_breaks_off_is_no_end(cut: int) -> None:
         list(messages(io.BytesIO(whole[:cut])))
 
 
+@pytest.mark.ci
 def test_a_log_that_cannot_be_written_is_said_once_and_the_status_line_goes_on(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -261,6 +273,7 @@ def test_a_log_that_cannot_be_written_is_said_once_and_the_status_line_goes_on(
     assert taken.read_text() == "another drive"
 
 
+@pytest.mark.ci
 def test_a_signal_does_not_end_the_viewer_before_the_loop(tmp_path: Path) -> None:
     log = tmp_path / "drive.mcap"
     with Feed(viewer(log), HEADER.pack()) as feed:
@@ -285,6 +298,7 @@ def _holds_a_tick(log: Path) -> bool:
         return False
 
 
+@pytest.mark.ci
 def test_the_loop_can_wait_until_somebody_looks(tmp_path: Path) -> None:
     go = tmp_path / "go"
     late = (
@@ -300,12 +314,14 @@ def test_the_loop_can_wait_until_somebody_looks(tmp_path: Path) -> None:
         assert feed.keeps
 
 
+@pytest.mark.ci
 def test_nobody_is_waited_for_who_is_gone_for_good() -> None:
     with Feed(script("pass"), b"first") as feed:
         until(lambda: feed.watched, feed)
         assert feed.failed
 
 
+@pytest.mark.ci
 def test_the_other_process_is_not_reached_by_the_terminal() -> None:
     """Ctrl-C goes to the process group of the terminal; the recorder is in one of its own."""
     with Feed(script("import sys; sys.stdin.buffer.read()"), HEADER.pack()) as feed:

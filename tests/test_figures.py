@@ -211,6 +211,7 @@ def test_the_users_settings_change_no_figure(monkeypatch):
     assert style.render(study()) == plain
 
 
+@pytest.mark.ci
 def test_a_command_draws_though_its_terminal_belongs_to_a_notebook(tmp_path):
     words = [sys.executable, "-m", "antennate", "robot", "--out", tmp_path / "run", "--no-config"]
     own = os.environ | {"MPLBACKEND": "module://a_package_that_is_elsewhere"}

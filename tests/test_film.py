@@ -73,6 +73,7 @@ def test_from_the_side_a_walk_is_seen_lower_and_nearer_and_is_the_same() -> None
     assert above.targets[:, 2] == pytest.approx(0.033, abs=0.01)  # the links, not the floor
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("view", ["above", "side"])
 def test_ground_floor_and_sky_are_told_apart_in_a_picture(view: Any) -> None:
     """The floor before the step is grey, ground is warmer, and the sky is white."""
@@ -181,6 +182,7 @@ def test_a_film_of_the_tunnel_ends_with_a_word_on_the_outcome(
     assert ending(row, TunnelConfig()) == word
 
 
+@pytest.mark.ci
 def test_a_thin_antenna_is_seen_and_the_physics_keeps_its_own() -> None:
     """It is at least three pixels wide; a leg is as it is."""
     require_drawing()
@@ -232,6 +234,7 @@ def test_without_an_encoder_it_is_told(
     assert "expected PyAV with an encoder for H.264" in refusal(capsys, "--video")
 
 
+@pytest.mark.ci
 def test_without_a_driver_the_package_is_named(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -282,6 +285,7 @@ def test_the_filmed_trial_is_that_of_the_study() -> None:
     assert len(made.positions) == len(made.t) == len(made.bands[0].states)
 
 
+@pytest.mark.ci
 def test_a_film_is_written_and_the_study_stays_as_it_is(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -315,6 +319,7 @@ def test_a_film_is_written_and_the_study_stays_as_it_is(
     assert not Path("filmed/films/open.mp4").exists()
 
 
+@pytest.mark.ci
 def test_the_film_of_a_log_needs_room_before_it_is_drawn(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,6 +336,7 @@ def test_the_film_of_a_log_needs_room_before_it_is_drawn(
     assert [path.name for path in Path().iterdir()] == ["log.mcap"]
 
 
+@pytest.mark.ci
 def test_an_encoder_that_fails_is_no_fault_of_the_file(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -219,6 +219,7 @@ RISING, FALLING, ONE = 1, -1, 0
 """How times of messages follow one another [ns]."""
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("step", "size", "count", "pad", "said"),
     [

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 from view_rig import shown
 from websockets.sync.client import ClientConnection, connect
 
@@ -29,6 +30,7 @@ def advertised(connection: ClientConnection) -> dict[str, dict[str, str]]:
             return {channel["topic"]: channel for channel in message["channels"]}
 
 
+@pytest.mark.ci
 def test_a_running_simulation_can_be_read_live(tmp_path: Path) -> None:
     """Another program gets the topics of a log, in the same form, while the trial runs."""
     words = "tunnel --controllers open --trials 1 --scene flat --time-limit 3600 --foxglove"

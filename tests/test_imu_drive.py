@@ -454,6 +454,7 @@ def drive_by_command(run: Path) -> tuple[int, str, str]:
     return process.returncode, said, "".join([*lines, more])
 
 
+@pytest.mark.ci
 def test_the_command_drives_on_without_it(tmp_path: Path) -> None:
     """Exit code 0, named in the status line and in the last lines; its log replays to the bit.
 

@@ -145,6 +145,7 @@ def test_an_interrupted_shard_is_no_bad_input_and_goes_on(capsys, tmp_path, monk
     assert json.loads((tmp_path / "part" / "shard.json").read_text())["trials"] == 2
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_disk_that_is_full_before_a_trial_has_ended_keeps_the_logs(tmp_path, workers):
     """Several trials run in lockstep. A chunk that was taken in part holds more whole ticks."""
@@ -272,6 +273,7 @@ def test_help_lists_no_option_that_is_always_refused(
     assert OF_WORKERS - listed == missing
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_walls_of_which_none_is_valid_end_with_2(
     workers: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -284,6 +286,7 @@ def test_walls_of_which_none_is_valid_end_with_2(
     assert "No trial is valid" in capsys.readouterr().out
 
 
+@pytest.mark.ci
 def test_a_shard_of_a_finished_study_leaves_it_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,7 @@ def numbers(line: str) -> list[str]:
     return [cell if re.search("[ /]", cell) else f"{float(cell):g}" for cell in found]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("script", "page", "count"), [("learned.py", "envs.md", 22), ("tuning.py", "leaderboard.md", 6)]
 )

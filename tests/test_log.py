@@ -555,6 +555,7 @@ def test_a_new_cause_within_a_state_is_an_event_and_a_known_one_is_none(tmp_path
     ]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kills", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
     tmp_path: Path, kills: int

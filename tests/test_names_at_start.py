@@ -32,7 +32,9 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (["tunnel", *SHORT], "figures/trajectories.png"),
         (["tunnel", *SHORT, "--video"], "films/open.mp4"),
-        (["compete", "--trials", "1", "--controllers", "open"], "README.md"),
+        pytest.param(
+            ["compete", "--trials", "1", "--controllers", "open"], "README.md", marks=pytest.mark.ci
+        ),
         (["dataset"], "gap.parquet"),
         (["dataset"], "README.md"),
         (["reproduce", "--quick"], "figures/sigmoid.svg"),

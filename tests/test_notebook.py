@@ -155,6 +155,7 @@ def test_an_own_class_runs_and_may_be_defined_again() -> None:
         antennate.run("tunnel", controllers=(again,), workers=2, trials=4)
 
 
+@pytest.mark.ci
 def test_an_own_class_of_a_module_runs_in_workers() -> None:
     result = antennate.run(
         "tunnel", controllers=("open", open_loop), trials=1, time_limit=1.0, workers=2

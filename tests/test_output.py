@@ -45,6 +45,7 @@ def is_whole(folder: Path) -> bool:
     return "</html>" in (found / "report.html").read_text()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("redirection", "reason"),
     [("> /dev/full", "No space left on device"), (">&-", "it is closed")],
@@ -61,6 +62,7 @@ def test_an_output_that_cannot_be_written_costs_no_result(
     assert is_whole(tmp_path)
 
 
+@pytest.mark.ci
 def test_a_reader_that_goes_early_is_no_error(tmp_path: Path) -> None:
     done = run('| head -1; exit "${PIPESTATUS[0]}"', tmp_path)
     assert done.returncode == 0
@@ -80,6 +82,7 @@ def test_a_table_for_an_output_that_knows_ascii_alone(
     assert is_whole(tmp_path)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("redirection", ["2> /dev/full", "2>&- >&- <&-"])
 def test_a_standard_error_that_cannot_be_written_costs_nothing(
     redirection: str, tmp_path: Path
@@ -93,6 +96,7 @@ def test_a_standard_error_that_cannot_be_written_costs_nothing(
         assert (tmp_path / "run" / "figures" / "springs.svg").stat().st_size > 1000
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("command", [["--version"], ["--help"]])
 def test_help_for_a_full_disk_is_an_error(command: list[str], tmp_path: Path) -> None:
     with Path("/dev/full").open("w") as full:
@@ -104,6 +108,7 @@ def test_help_for_a_full_disk_is_an_error(command: list[str], tmp_path: Path) ->
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.ci
 def test_a_terminal_of_twenty_columns(tmp_path: Path) -> None:
     """One process walks on both kinds, as it takes longer to start than to walk."""
     source = """if True:
@@ -229,6 +234,7 @@ def Talks(control, robot, batch):
 """
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_what_a_controller_prints_does_not_stand_beside_the_json(
     workers: str, tmp_path: Path

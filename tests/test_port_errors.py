@@ -52,6 +52,7 @@ def test_permission_names_the_group_of_the_device(
     assert error.cure == "run `sudo usermod -aG dialout $USER`, log out and in again"
 
 
+@pytest.mark.ci
 def test_L15_a_second_program_is_told_the_pid_of_the_first() -> None:
     """The first one is another process without the master's end, as one that uses a real port."""
     master, slave = os.openpty()

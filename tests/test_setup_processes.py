@@ -16,6 +16,8 @@ from first_hour import ANTENNATE, OrderedTwin
 
 from antennate.messages import command_words
 
+pytestmark = pytest.mark.ci
+
 SMALL = ["--robot.links", "2"]
 """Seven servos: one yaw joint, four legs, two antennae."""
 

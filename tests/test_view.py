@@ -61,9 +61,11 @@ def keep(request: pytest.FixtureRequest) -> Keep:
 
 
 @pytest.fixture
-def tab(tmp_path: Path) -> Iterator[Tab]:
+def tab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Tab]:
     """A tab of a browser."""
     with browser(tmp_path / "browser") as found:
+        if not request.config.getoption("--pictures"):
+            found.draw_little()
         yield found
 
 

@@ -50,6 +50,7 @@ def test_a_page_of_two_trials_shows_ten_seconds_of_each_and_stays_when_they_have
         browser(tmp_path / "browser") as tab,
         shown(*words.split(), folder=tmp_path) as view,
     ):
+        tab.draw_little()
         tab.open(view.link)
         tab.until(SECOND)
         wanted = json.dumps([[0, 1, "-10,-5,0"]] * 4, separators=(",", ":"))
