@@ -19,6 +19,8 @@ from stated import STATED
 
 from antennate.telemetry.reader import count
 
+pytestmark = pytest.mark.ci
+
 HERE = Path(__file__).parent
 EXAMPLE = f"{HERE.parent / 'examples' / 'own_controller.py'}:OwnController"
 ANTENNATE = [sys.executable, "-m", "antennate"]
@@ -131,7 +133,6 @@ def drive_with_faults(folder: Path) -> Drive:
     return drive
 
 
-@pytest.mark.ci
 def test_E1_a_reset_or_a_broken_wire_ends_no_drive(driven: Drive) -> None:
     """It goes on until it is stopped, torque off, with its result and every tick in its log."""
     result = driven.result

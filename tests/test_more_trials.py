@@ -52,6 +52,7 @@ def noted() -> list[str]:
     return lines
 
 
+@pytest.mark.ci
 def test_a_tunnel_takes_more_trials_and_is_the_same_as_at_once() -> None:
     words = [*TUNNEL, "--workers", "1", "--log"]
     assert main([*words, "--trials", "1", "--out", "run"]) == 0

@@ -282,7 +282,7 @@ PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 
 MARKS = {
     **dict.fromkeys(("geometry", "climb", "dataset", "sweep"), pytest.mark.slow),
-    "compete": pytest.mark.ci,
+    **dict.fromkeys(("compete", "tunnel"), pytest.mark.ci),
 }
 
 

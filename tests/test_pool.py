@@ -25,6 +25,7 @@ def no_step(done: int, total: int) -> None:
     pass
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("workers", [1, 2])
 def test_results_come_in_the_order_of_the_tasks(workers: int) -> None:
     steps: list[tuple[int, int]] = []
@@ -34,6 +35,7 @@ def test_results_come_in_the_order_of_the_tasks(workers: int) -> None:
     assert steps == [(1, 3), (2, 3), (3, 3)]
 
 
+@pytest.mark.ci
 def test_a_failing_task_is_named() -> None:
     with pytest.raises(WorkerError, match="ZeroDivisionError"):
         gather(halves, [(1, 0), (2, 0)], 2, no_step)
@@ -55,6 +57,7 @@ def test_a_process_that_may_begin_no_other_is_told(
         gather(halves, [(1, 2)], Workers(1, timeout=9.0), no_step)
 
 
+@pytest.mark.ci
 def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:
     """Also with the usual hour: only such a process can be given up."""
     for workers, own in ((Workers(1), True), (Workers(1, timeout=3600.0), False)):
@@ -62,6 +65,7 @@ def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:
         assert (found == [os.getpid()]) == own
 
 
+@pytest.mark.ci
 def test_groups_share_no_chunk() -> None:
     tasks = [*zip("aaabb", range(5), strict=True)]
     how: dict[str, Any] = {"chunk": 2, "together": True, "group": lambda group, number: group}
@@ -73,6 +77,7 @@ def lost(place: int, failure: Failure) -> Any:
     return (failure.status, failure.reason)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("chunk", "function"), [(2, trouble), (5, trouble_together)], ids=["one by one", "together"]
 )
@@ -102,6 +107,7 @@ def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
     assert tries[3] == 3
 
 
+@pytest.mark.ci
 def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
     script = tmp_path / "careless.py"
     script.write_text(
@@ -115,6 +121,7 @@ def test_a_script_without_the_main_guard_is_told_of_it(tmp_path: Path) -> None:
     assert 'needs `if __name__ == "__main__":`' in done.stderr
 
 
+@pytest.mark.ci
 def test_a_program_that_workers_cannot_import_is_told_so(tmp_path: Path) -> None:
     """It has the guard, but came through standard input."""
     program = (
@@ -133,6 +140,7 @@ def test_a_program_that_workers_cannot_import_is_told_so(tmp_path: Path) -> None
     assert "Process SpawnProcess" not in done.stderr
 
 
+@pytest.mark.ci
 def test_too_few_open_files_for_workers_are_one_line(tmp_path: Path) -> None:
     """Three are standard; each worker takes some."""
 
@@ -155,6 +163,7 @@ def test_too_few_open_files_for_workers_are_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.ci
 def test_a_worker_that_dies_is_noticed() -> None:
     with pytest.raises(WorkerError, match="ended with code 3"):
         gather(die, [(1,), (2,)], 2, no_step)
@@ -164,6 +173,7 @@ def test_there_is_at_least_one_core() -> None:
     assert core_count() >= 1
 
 
+@pytest.mark.ci
 def test_any_executor_can_be_the_engine() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
         workers = Workers(2, make_engine(executor))
@@ -204,6 +214,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
 def test_workers_end_when_the_program_is_killed(tmp_path: Path) -> None:
     (tmp_path / "killed.py").write_text(KILLED)

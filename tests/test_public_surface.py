@@ -27,6 +27,7 @@ def in_fresh_process(code: str) -> str:
     ).stdout
 
 
+@pytest.mark.ci
 def test_the_import_loads_nothing_heavy() -> None:
     code = "import json, sys, antennate; print(json.dumps(sorted(sys.modules)))"
     loaded = set(json.loads(in_fresh_process(code)))
@@ -34,6 +35,7 @@ def test_the_import_loads_nothing_heavy() -> None:
     assert [name for name in loaded if name.startswith("antennate.")] == []
 
 
+@pytest.mark.ci
 def test_the_import_is_cheaper_than_that_of_numpy() -> None:
     """Side by side in one process and the best of three, so that a busy machine does not matter."""
     code = """if True:
@@ -44,6 +46,7 @@ def test_the_import_is_cheaper_than_that_of_numpy() -> None:
     assert min(float(in_fresh_process(code)) for _ in range(3)) < 0.5
 
 
+@pytest.mark.ci
 def test_simple_names_need_no_engine() -> None:
     names = ["AntennaFrame", "TimeSeries", "read_esp32", "spring_stiffness", "equilibrium"]
     code = f"""if True:

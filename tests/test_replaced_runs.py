@@ -180,6 +180,7 @@ def slow_study(free: int) -> subprocess.Popen[bytes]:
     return program(*words, "--workers", "1", "--no-figures", FREE=str(free))
 
 
+@pytest.mark.ci
 def test_killed_before_its_first_trial_the_old_run_is_beside_it() -> None:
     before = contents("run")
     killed_once(Path("begun"), slow_study(free=0))
@@ -244,6 +245,7 @@ Path("codes.json").write_text(json.dumps(codes))
 """
 
 
+@pytest.mark.ci
 def test_killed_at_any_change_of_a_file_the_old_run_is_whole(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -266,6 +268,7 @@ def test_killed_at_any_change_of_a_file_the_old_run_is_whole(
     assert seen == {"run", "run.old"}
 
 
+@pytest.mark.ci
 def test_a_file_system_without_room_costs_no_old_run() -> None:
     """No file can have a single byte; the folder has its name again."""
     before = files()

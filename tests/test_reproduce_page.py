@@ -17,6 +17,8 @@ from antennate.studies.columns import content
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.statistics import Discordance
 
+pytestmark = pytest.mark.ci
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 

@@ -363,7 +363,10 @@ RUNS: dict[str, tuple[type[Params], Callable[..., None], list[dict[str, Any]]]] 
 }
 
 
-@pytest.mark.parametrize("command", RUNS)
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(c, marks=pytest.mark.ci if c in ("drive", "teleop") else ()) for c in RUNS],
+)
 def test_every_parameter_of_a_command_of_the_robot_is_read_or_refused(
     command: str, tmp_path: Path, monkeypatch: Patch
 ) -> None:

@@ -331,6 +331,7 @@ def twin() -> Iterator[Served]:
         yield serving
 
 
+@pytest.mark.ci
 def test_the_first_ping_after_the_ready_line_is_answered(twin: Served) -> None:
     serial = pytest.importorskip("serial")
     with serial.Serial(twin.path, 57_600, timeout=0.5) as line:
@@ -342,6 +343,7 @@ def test_the_first_ping_after_the_ready_line_is_answered(twin: Served) -> None:
         assert twin.order("plug 3").startswith("not done: plug: expected all or one of 1, 2")
 
 
+@pytest.mark.ci
 def test_only_a_client_at_the_speed_of_a_servo_is_heard() -> None:
     """Linux has no name for 4.5 and 10.5 Mbit/s, but programs set them."""
     serial = pytest.importorskip("serial")

@@ -13,6 +13,8 @@ import pytest
 
 from antennate.cli import main
 
+pytestmark = pytest.mark.ci
+
 PLAN = 'experiment = "springs"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 3.5, 4.0, 4.5]\n'
 TRIALS = "trials.jsonl"
 

@@ -183,6 +183,7 @@ def walked(
     return said, plan
 
 
+@pytest.mark.ci
 def test_a_twin_logs_goals_readings_and_physics(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -463,6 +464,7 @@ begun.wait()
 """A log whose thread writes for some time while 44 more ticks wait."""
 
 
+@pytest.mark.ci
 def test_a_person_who_is_impatient_while_it_is_closed_costs_no_tick(tmp_path: Path) -> None:
     code = (
         "main = threading.main_thread().ident\n"
@@ -476,6 +478,7 @@ def test_a_person_who_is_impatient_while_it_is_closed_costs_no_tick(tmp_path: Pa
         assert sum(1 for _ in log) == log.end == 300
 
 
+@pytest.mark.ci
 def test_a_log_whose_simulation_is_killed_is_not_closed(tmp_path: Path) -> None:
     """All but the last half of a second is read; a second log at the same place is refused."""
     code = f"""

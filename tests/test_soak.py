@@ -17,6 +17,7 @@ for samples once a period: how long they wait for it and the shortest delay of t
 seen. 2 ms are the error of ages (E6)."""
 
 
+@pytest.mark.ci
 def test_K1_faults_in_quick_succession_are_all_seen_and_no_hold_is_without_one() -> None:
     events = schedule(np.random.default_rng(1), hours=2, hour=150.0, apart=20.0)
     soak = Soak(events)

@@ -39,7 +39,7 @@ HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'study_trials.py'}:trial"
 
 
-pytestmark = pytest.mark.usefixtures("there")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("there")]
 
 
 def plan(name: str = "plan.toml", **more: Any) -> str:

@@ -37,6 +37,8 @@ from antennate.studies.submitted import Submitted
 from antennate.studies.trial_file import read_trials
 from antennate.studies.work import Call, Work
 
+pytestmark = pytest.mark.ci
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 VARY = {"x": [0.5, 1.5]}

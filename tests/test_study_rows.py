@@ -63,7 +63,7 @@ REASONS = [
 PLAN = 'experiment = "own.py:trial"\ntrials = {}\n[vary]\n"deep.x" = [1]\n'
 
 
-pytestmark = pytest.mark.usefixtures("there")
+pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("there")]
 
 
 def study(own: str, trials: int, *more: str) -> tuple[int, list[dict[str, str]]]:

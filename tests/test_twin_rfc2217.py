@@ -139,6 +139,7 @@ def test_modem_lines_do_not_wake_a_dead_board() -> None:
     assert robot.take() == b""
 
 
+@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # within pyserial
 def test_E3_a_client_of_pyserial_resets_the_twins_board_and_sets_the_speed_of_its_bus() -> None:
     command = [sys.executable, "-m", "antennate", "twin", "--rfc2217", "0"]

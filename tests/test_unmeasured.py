@@ -162,6 +162,7 @@ def twin(monkeypatch: pytest.MonkeyPatch) -> LockstepClock:
     return clock
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [

@@ -11,6 +11,8 @@ from view_rig import LIVE, Shown, ask, cookie, shown
 
 from antennate import simulate
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture(scope="module")
 def view(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:

@@ -254,6 +254,7 @@ FLAT = ["--trials", "1", "--controllers", "open", "--scene", "flat", "--time-lim
 TUNNEL = ["tunnel", *FLAT, "--view"]
 
 
+@pytest.mark.ci
 def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     """Nothing is run and nothing left."""
     with ViewProcess(0, "antennate.cli.pages") as view:
@@ -293,6 +294,7 @@ def ended(process: int) -> bool:
     return not there
 
 
+@pytest.mark.ci
 def test_a_page_whose_process_dies_ends_the_command_with_2(trial: Path) -> None:
     with shown("log", "view", trial.name, "--port", "0", folder=trial.parent) as view:
         assert view.link
@@ -302,6 +304,7 @@ def test_a_page_whose_process_dies_ends_the_command_with_2(trial: Path) -> None:
         assert "Traceback" not in "".join(view.lines)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_command_and_its_page(trial: Path, stop: signal.Signals) -> None:
     with shown("log", "view", trial.name, "--port", "0", folder=trial.parent) as view:
@@ -313,6 +316,7 @@ def test_a_signal_ends_the_command_and_its_page(trial: Path, stop: signal.Signal
         assert len(view.lines) == 1
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("package", "flags", "extra"),
     [
@@ -331,6 +335,7 @@ def test_a_missing_package_is_told_in_one_line(
     assert extra in text
 
 
+@pytest.mark.ci
 def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     """Its own server finds that out."""
     with socket.socket() as taken:
@@ -343,6 +348,7 @@ def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) ->
     assert "--foxglove-port" in text
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "flag"),
     [

@@ -149,6 +149,7 @@ def test_trials_share_their_chance_across_arms_and_differ_among_each_other() -> 
     assert abs(one.tip - other.tip).max() > 1e-5
 
 
+@pytest.mark.ci
 def test_same_table_on_one_and_two_workers() -> None:
     config = WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]})
     one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)
