@@ -266,6 +266,7 @@ def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.ci
 def test_the_page_of_a_log_names_its_own_option(tmp_path: Path) -> None:
     """`view` has --port, not --view-port."""
     simulate("open", scene="flat", time_limit=0.1, log=tmp_path / "trial.mcap")
