@@ -197,15 +197,18 @@ def _place(path: Path) -> Path:
     return place
 
 
-def lock(file: BinaryIO) -> bool:
+def lock(file: BinaryIO | int) -> bool | None:
     """Say that a process works on a file, until it is closed; whether nobody else does.
 
-    The system frees the lock when that process ends, however it ends.
+    The system frees the lock when that process ends, however it ends. None on a file system that
+    has no locks.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # another process holds it, or the file system has no locks
+    except BlockingIOError:
         return False
+    except OSError:
+        return None
     return True
 
 

@@ -12,9 +12,9 @@ import csv
 import io
 import json
 import math
+import operator
 import re
 import sys
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
@@ -64,11 +64,9 @@ def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
     Raises:
         ConfigError: It is neither text nor bytes nor pieces of text.
     """
-    if not isinstance(content, str | bytes | Iterator):
-        raise ConfigError(f"content: expected text, bytes or pieces, found {shown(content)}")
-    for piece in (content,) if isinstance(content, str | bytes) else content:
+    for piece in content if isinstance(content, Iterator) else [content]:
         if not isinstance(piece, str | bytes):
-            raise ConfigError(f"content: expected pieces of text, found {shown(piece)}")
+            raise ConfigError(f"content: expected text, bytes or pieces, found {shown(piece)}")
         yield piece.encode() if isinstance(piece, str) else piece
 
 
@@ -130,7 +128,7 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     try:
         lines = csv.reader(io.StringIO(text), strict=True)
         names = next(lines, [])
-        if twice := [name for name, count in Counter(names).items() if count > 1]:
+        if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"the column {twice[0]!r} twice")
         rows: list[dict[str, Any]] = []
         for line in filter(None, lines):
@@ -204,9 +202,6 @@ def _toml(value: Any) -> str:
     return repr(value)
 
 
-_KIND = "@"
-
-
 def encoded(value: Any) -> Any:
     """A value as what JSON can hold.
 
@@ -215,29 +210,26 @@ def encoded(value: Any) -> Any:
     """
     match value:
         case Enum():
-            return {_KIND: _name(value), "value": value.value}
+            return {"@": _name(value), "value": value.value}
         case np.ndarray() | np.generic():
             data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
-            kind = "array" if isinstance(value, np.ndarray) else "scalar"
-            return {_KIND: kind, "dtype": value.dtype.str, "shape": value.shape, "data": data}
+            return {"@": "array", "dtype": value.dtype.str, "shape": value.shape, "data": data}
         case None | bool() | int() | float() | str():
             return value
         case BaseModel():
-            return {_KIND: _name(value), "fields": value.model_dump_json()}
+            return {"@": _name(value), "fields": value.model_dump_json()}
         case tuple():
-            return {_KIND: "tuple", "of": [encoded(item) for item in value]}
+            return {"@": "tuple", "of": encoded([*value])}
         case list():
             return [encoded(item) for item in value]
         case Mapping():
-            pairs = [(encoded(key), encoded(item)) for key, item in value.items()]
-            if all(isinstance(key, str) and key != _KIND for key, _ in pairs):
-                return dict(pairs)
-            return {_KIND: "dict", "of": pairs}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {_KIND: _name(value)} | {
-            field.name: encoded(getattr(value, field.name)) for field in fields(value)
-        }
-    raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
+            if all(isinstance(key, str) and key != "@" for key in value):
+                return {key: encoded(item) for key, item in value.items()}
+            return {"@": "dict", "of": [[encoded(k), encoded(v)] for k, v in value.items()]}
+    if not is_dataclass(value) or isinstance(value, type):
+        raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
+    said = {field.name: encoded(getattr(value, field.name)) for field in fields(value)}
+    return {"@": _name(value), **said}
 
 
 def decoded(data: Any, packages: Collection[str] | None) -> Any:
@@ -245,72 +237,50 @@ def decoded(data: Any, packages: Collection[str] | None) -> Any:
 
     Args:
         data: What JSON held.
-        packages: Top-level packages whose classes may be named; None for what objects of any class
-            say in place of them.
+        packages: Top-level packages whose classes may be named; None for the fields of an object in
+            place of it, whatever its class.
 
     Raises:
-        ValueError: It is nothing that `encoded` makes.
+        ValueError: It names a class that is not trusted, not imported or of another form.
     """
-    if isinstance(data, list):
-        return [decoded(item, packages) for item in data]
-    if not isinstance(data, dict):
-        return data
-    kind = data.get(_KIND)
-    if kind is None:
-        return {key: decoded(item, packages) for key, item in data.items()}
+    match data:
+        case list():
+            return [decoded(item, packages) for item in data]
+        case {"@": "tuple", "of": items}:
+            return tuple(decoded(items, packages))
+        case {"@": "dict", "of": pairs}:
+            return dict(decoded(pairs, packages))
+        case {"@": "array", "dtype": dtype, "shape": shape, "data": text}:
+            flat = np.frombuffer(base64.b64decode(text), np.dtype(dtype))
+            return flat.reshape(shape).copy()[()]
+        case {"@": name, **said} if packages is not None:
+            return _object(name, said, packages)
+        case dict():
+            return {key: decoded(item, packages) for key, item in data.items() if key != "@"}
+        case _:
+            return data
+
+
+def _object(name: str, said: Mapping[str, Any], packages: Collection[str]) -> Any:
+    """An object of a class that is imported already, of a trusted package."""
+    module, _, path = name.partition(":")
+    if module.partition(".")[0] not in packages:
+        raise ValueError(f"expected a class of {' or '.join(packages)}, found {name}")
     try:
-        if kind == "tuple":
-            return tuple(decoded(item, packages) for item in data["of"])
-        if kind == "dict":
-            return {decoded(k, packages): decoded(item, packages) for k, item in data["of"]}
-        if kind in ("array", "scalar"):
-            flat = np.frombuffer(base64.b64decode(data["data"]), np.dtype(data["dtype"]))
-            array = flat.reshape(data["shape"]).copy()
-            return array if kind == "array" else array[()]
-        if packages is None:
-            return _plain(data)
-        return _object(_class(kind, packages), data, packages)
-    except (KeyError, TypeError, AttributeError) as error:
+        kind: Any = operator.attrgetter(path)(sys.modules[module])
+        if issubclass(kind, Enum):
+            return kind(said["value"])
+        if issubclass(kind, BaseModel):
+            return kind.model_validate_json(said["fields"])
+        if is_dataclass(kind):
+            return kind(**decoded(said, packages))
+    except (LookupError, TypeError, AttributeError) as error:
         raise ValueError(f"expected a result, found {error}") from None
-
-
-def _object(kind: type, data: Mapping[str, Any], packages: Collection[str]) -> Any:
-    if issubclass(kind, Enum):
-        return kind(data["value"])
-    if issubclass(kind, BaseModel):
-        return kind.model_validate_json(data["fields"])
-    if not is_dataclass(kind):
-        raise TypeError(f"the class {kind.__name__}")
-    return kind(**{k: decoded(item, packages) for k, item in data.items() if k != _KIND})
+    raise ValueError(f"expected a dataclass, found {name}")
 
 
 def _name(value: Any) -> str:
     return f"{type(value).__module__}:{type(value).__qualname__}"
-
-
-def _class(name: str, packages: Collection[str]) -> type:
-    """A class that is imported already, of a trusted package."""
-    module, _, path = name.partition(":")
-    if module.partition(".")[0] not in packages or module not in sys.modules:
-        raise TypeError(f"a class of {module}")
-    kind: Any = sys.modules[module]
-    for part in path.split("."):
-        kind = getattr(kind, part)
-    if not isinstance(kind, type):
-        raise TypeError(f"no class {name}")
-    return kind
-
-
-def plain_row(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A row as a table has it, from what `encoded` made of its dataclass."""
-    return {key: strict(decoded(item, None)) for key, item in data.items() if key != _KIND}
-
-
-def _plain(data: Mapping[str, Any]) -> Any:
-    """What an object of any class says: an enumeration, a model, or the fields of a dataclass."""
-    if data.keys() == {_KIND, "value"}:
-        return data["value"]
-    return json.loads(data["fields"]) if data.keys() == {_KIND, "fields"} else plain_row(data)
 
 
 def dumped(value: Any) -> str:

@@ -2,7 +2,9 @@
 
 Files are written whole, and listed in `files.txt`. While a run goes on, finished trials are
 appended to `trials.jsonl`, which stays where more trials may follow. A directory that holds a run
-is left alone unless told otherwise; then it is renamed to NAME.old first.
+is left alone unless told otherwise: with `--overwrite` NAME is renamed to NAME.old, and where there
+is one to NAME.old2, and so on. The rename is one step, so a process that is killed at any moment
+leaves the old run whole, under one of the two names.
 
 ```python
 with RunDirectory.create("tunnel", "runs/mine") as run:
@@ -38,8 +40,11 @@ from antennate.studies.run_files import (
     ROOM,
     TABLE,
     VERSIONS,
+    files_of,
+    read_as,
+    writing,
 )
-from antennate.studies.run_times import begun_line, with_end
+from antennate.studies.run_times import date_line
 from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions
@@ -67,7 +72,7 @@ class RunDirectory:
         self._created: Sequence[Path] = ()
         self._lock: int | None = None
         self.kept = self._complete = False
-        self._described: dict[str, str] = {}
+        self._described: Sequence[str] = ()
 
     @classmethod
     def create(
@@ -102,15 +107,16 @@ class RunDirectory:
                 works on it; or, to overwrite it, it holds no run.
         """
         run, before = cls(run_files.place_of(command, path)), False
-        place, resume = run.path, resume if identity is not None else None
-        with run_files.writing(place):
+        place = run.path
+        with writing(place):
             run._created = [p for p in (place, *place.parents) if not p.exists()]
             place.mkdir(parents=True, exist_ok=path is not None)
             run_files.sweep(place)
-            run.old = run_files.set_aside(place) if overwrite and any(place.iterdir()) else None
             try:
-                place.mkdir(exist_ok=True)
-                before = run_files.goes_on(place, resume)
+                if overwrite and any(place.iterdir()):
+                    run.old = run_files.set_aside(place)
+                    place.mkdir()
+                before = run_files.goes_on(place, resume if identity is not None else None)
                 run._begin(identity, tasks, before, retry)
             except BaseException:
                 run._leave(stays=before)
@@ -128,13 +134,20 @@ class RunDirectory:
         if identity is not None:
             self.trials = TrialFile(place / TRIALS)
             self.trials.begin(identity, tasks if before else None)
-            whole = not self.trials.damaged and self.trials.holds_all(tasks)
-            self.finished = before and not retry and whole and run_files.is_finished(place)
-            self.untouched, self.kept = self.finished, self.finished or bool(self.trials.others)
+            whole = before and not retry and self.trials.holds_all(tasks)
+            self.finished = self.untouched = whole and self._is_finished()
+            self.kept = self.finished or bool(self.trials.others)
         if before and not self.finished:
             run_files.remove_run(
-                place, lambda file: file.parent.name != LOGS and file.name != TRIALS
+                place, lambda file: file.parent.name == LOGS or file.name == TRIALS
             )
+
+    def _is_finished(self) -> bool:
+        """Whether it has the whole result of a run that was not interrupted."""
+        try:
+            return not self.result().get("interrupted")
+        except (BadInputError, AttributeError):
+            return False
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -154,7 +167,7 @@ class RunDirectory:
         Raises:
             BadInputError: There is none, or it is damaged.
         """
-        return run_files.read_as(self.path / RESULT, json.loads)
+        return read_as(self.path / RESULT, json.loads)
 
     def rows(self) -> list[dict[str, Any]]:
         """The finished trials: those of trials.csv, or of a run that was stopped.
@@ -163,13 +176,15 @@ class RunDirectory:
             BadInputError: The file is damaged, or is of a run that a version before did not end.
         """
         if (self.path / TABLE).exists():
-            return run_files.read_as(self.path / TABLE, formats.from_csv)
-        if old := run_files.before_this_version(self.path):
+            return read_as(self.path / TABLE, formats.from_csv)
+        if (self.path / TRIALS).exists() or (self.path / RESULT).exists():
+            return read_trials(self.path / TRIALS).rows() if (self.path / TRIALS).exists() else []
+        if old := [name for name in run_files.BEFORE if (self.path / name).exists()]:
             raise BadInputError(
-                f"{self.path}: expected {TRIALS}, found {old} of a version before; go on with that "
-                "version, which writes its result"
+                f"{self.path}: expected {TRIALS}, found {old[0]} of a version before; go on with "
+                "that version, which writes its result"
             )
-        return read_trials(self.path / TRIALS).rows() if (self.path / TRIALS).exists() else []
+        return []
 
     def config(self, model: type[Config]) -> Config:
         """The configuration of the run.
@@ -186,7 +201,7 @@ class RunDirectory:
             BadInputError: The file is damaged, or no file of a run has such a name.
         """
         path = run_files.inside(self.path, name)
-        return run_files.read_as(path, str) if path.exists() else ""
+        return read_as(path, str) if path.exists() else ""
 
     def versions(self) -> dict[str, str]:
         """What versions.json says; empty if there is none.
@@ -195,13 +210,13 @@ class RunDirectory:
             BadInputError: It is damaged.
         """
         path = self.path / VERSIONS
-        found = run_files.read_as(path, json.loads) if path.exists() else {}
+        found = read_as(path, json.loads) if path.exists() else {}
         return {name: str(value) for name, value in found.items()}
 
     def made(self, folder: str, ending: str) -> list[Path]:
         """Files of the run in a folder of it; of a run of an older version all that are there."""
         files = sorted((self.path / folder).glob(f"*{ending}"))
-        own = run_files.files_of(self.path)
+        own = files_of(self.path)
         return [file for file in files if file in own or not own]
 
     @property
@@ -221,22 +236,25 @@ class RunDirectory:
             OutputError: It cannot be written.
         """
         checks.instance("config", config, Params)
-        self._described = {CONFIG: formats.to_toml(config), VERSIONS: self._versions()}
-        if command:
-            self._described[COMMAND] = f"{shlex.join(command)}\n{begun_line(self.can_go_on)}"
-        for name, text in self._described.items():
-            self.write(name, text)
+        line = date_line("resumed" if self.can_go_on else "begun")
+        words = f"{shlex.join(command)}\n{line}" if command else ""
+        self._described = formats.to_toml(config), words
+        self._describe()
 
-    def _versions(self) -> str:
-        """Versions of what the numbers depend on, and the models of the processors."""
-        trials = self.trials
-        known = trials.identity["versions"] if trials and trials.identity else versions()
-        models = (trials.processors if trials else []) or [processor()]
-        return formats.to_json({**known, "processor": " and ".join(models)})
+    def _describe(self, end: str = "") -> None:
+        """Write what was described, with the models of the processors that are known by now."""
+        for config, words in [self._described] if self._described else []:
+            self.write(CONFIG, config)
+            trials = self.trials
+            known = trials.identity["versions"] if trials and trials.identity else versions()
+            models = (trials.processors if trials else []) or [processor()]
+            self.write(VERSIONS, formats.to_json({**known, "processor": " and ".join(models)}))
+            if words:
+                self.write(COMMAND, words + end)
 
     def keep_room(self) -> None:
         """Keep room for the result, so that a disk that fills meanwhile does not cost it."""
-        with run_files.writing(self.path / ROOM):
+        with writing(self.path / ROOM):
             (self.path / ROOM).write_bytes(bytes(_KEPT_FREE))
 
     def append(self, row: Any) -> None:
@@ -263,20 +281,16 @@ class RunDirectory:
         """
         checks.mapping("result", result)
         checks.instance("rows", rows, Iterable)
-        if table := formats.to_csv(formats.as_mapping(row) for row in rows):
-            self.write(TABLE, table)
-        with run_files.writing(self.path / ROOM):
-            (self.path / ROOM).unlink(missing_ok=True)
-        for name, text in self._described.items():
-            if not (self.path / name).exists():
-                self.write(name, text)
-        if not self.finished and self.text(VERSIONS) not in ("", self._versions()):
-            self.write(VERSIONS, self._versions())
-        self.write(RESULT, formats.to_json(result))
-        if text := self.text(COMMAND):
-            self.write(COMMAND, with_end(text))
+        table = formats.to_csv(formats.as_mapping(row) for row in rows)
+        text = formats.to_json(result)
         self.kept = True
-        self._complete = not result.get("interrupted") or self.trials is None
+        with writing(self.path / ROOM):
+            (self.path / ROOM).unlink(missing_ok=True)
+        if table:
+            self.write(TABLE, table)
+        self._describe(date_line("ended"))
+        self.write(RESULT, text)
+        self._complete = not result.get("interrupted")
 
     def write(self, name: str, content: str | bytes | Iterator[str]) -> None:
         """Put one file into the directory, whole or not at all; a long text comes in pieces.
@@ -304,7 +318,7 @@ class RunDirectory:
         """
         names = list(names)
         self.require_free(names)
-        with run_files.writing(self.path / FILES):
+        with writing(self.path / FILES):
             self.path.mkdir(exist_ok=True)
             run_files.add_to_list(self.path, names)
             for folder in {(self.path / name).parent for name in names}:
@@ -352,9 +366,7 @@ class RunDirectory:
             if self._lock is not None and stays:
                 run_files.trim_list(self.path, self._lock)
             elif self._lock is not None:
-                run_files.remove_run(
-                    self.path, lambda file: self.old is not None or _is_before(file)
-                )
+                run_files.remove_run(self.path)
             if not stays and self.old is not None:
                 self.old.rename(self.path)
             for folder in () if stays else self._created:
@@ -362,8 +374,3 @@ class RunDirectory:
         if self._lock is not None:
             os.close(self._lock)
         self._lock = None
-
-
-def _is_before(file: Path) -> bool:
-    """Whether a file is of those that stand there before anything is measured, or a log."""
-    return file.name in (CONFIG, VERSIONS, COMMAND, TRIALS, ROOM) or file.parent.name == LOGS

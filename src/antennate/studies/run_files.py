@@ -1,17 +1,14 @@
-"""Which files of a run a folder holds, and whether another run may take it.
+"""Files of a run, by name, and the list of those that a run has written.
 
 `files.txt` lists the files that a run writes, each before it is made. Without that list a folder
-holds no run of this program, and is never overwritten. With `--overwrite`, NAME is renamed to
-NAME.old, and where there is one to NAME.old2, and so on: nothing is removed. The rename is one
-step, so a process that is killed at any moment leaves the old run whole, under one of the two
-names.
+holds no run of this program, and what it does not list is somebody else's: it is neither removed
+nor written over.
 """
 
 from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -51,9 +48,7 @@ _NAMES = (
     *(*_MADE, REPORT, *LOG_PARTS),
 )
 """Every file that a run may write beside its figures."""
-
-
-_BEFORE = ("trials.store.jsonl", "trials.partial.jsonl")
+BEFORE = ("trials.store.jsonl", "trials.partial.jsonl")
 """Files of the trials of versions before, which are not gone on with."""
 
 
@@ -94,74 +89,58 @@ def trim_list(place: Path, handle: int) -> None:
     names = [name for name in before if os.path.lexists(place / name)]
     if names != before:
         text = "".join(f"{line}\n" for line in (_TITLE, *names)).encode()
-        os.pwrite(handle, text, 0)
-        os.ftruncate(handle, len(text))
+        os.ftruncate(handle, os.pwrite(handle, text, 0))
 
 
 def files_of(place: Path) -> list[Path]:
-    """Files of its run that a folder holds, by their list, which comes last."""
-    names = listed(place)
-    if names is None:
-        return []
-    return [*(place / name for name in names if _is_file_within(place, name)), place / FILES]
+    """Files of its run that a folder holds, by their list, which comes last; none behind a link."""
+    names, home = listed(place), place.resolve()
+    files = [place / name for name in names or () if os.path.lexists(place / name)]
+    within = [file for file in files if file.parent.resolve().is_relative_to(home)]
+    return [] if names is None else [*within, place / FILES]
 
 
-def _is_file_within(place: Path, name: str) -> bool:
-    """Whether there is such a file in the folder or one within it, none behind a link."""
-    path = Path(name)
-    folders = [place / each for each in path.parents if each != Path()]
-    sound = not path.is_absolute() and ".." not in path.parts and all(map(is_folder, folders))
-    return sound and os.path.lexists(place / path) and not is_folder(place / path)
-
-
-def sweep(place: Path) -> None:
-    """Remove what killed processes left in a folder that wrote files of its run."""
-    names = {FILES, *(listed(place) or ())}
-    remove_abandoned(place, names.__contains__)
-    for folder in FOLDERS:
-        if is_folder(place / folder):
-            remove_abandoned(place / folder, lambda name, f=folder: f"{f}/{name}" in names)
-
-
-def remove_run(place: Path, goes: Callable[[Path], bool] = lambda file: True) -> None:
-    """Remove files of its run from a folder; if none is left, the list and folders that get empty.
+def remove_run(place: Path, kept: Callable[[Path], bool] = lambda file: False) -> None:
+    """Remove files of its run from a folder; if none is left, their list, and emptied folders.
 
     Args:
         place: The folder.
-        goes: Which of the files.
+        kept: Which of the files stay.
 
     Raises:
         OSError: A file cannot be removed.
     """
     *files, last = files_of(place) or [place / FILES]
-    for file in filter(goes, files):
-        file.unlink()
+    for file in files:
+        if not kept(file):
+            file.unlink()
     for folder in {file.parent for file in files} | {place / name for name in FOLDERS}:
-        if folder != place and is_folder(folder):
-            with contextlib.suppress(OSError):  # it holds files of somebody else
-                folder.rmdir()
+        with contextlib.suppress(OSError):  # there is none, or it holds other files
+            folder.rmdir()
     if files_of(place) == [last]:
         last.unlink()
+
+
+def sweep(place: Path) -> None:
+    """Remove what killed processes left in a folder that wrote files of its run."""
+    names = {FILES, *(listed(place) or ())}
+    for folder in ("", *FOLDERS):
+        if not folder or not (place / folder).is_symlink():
+            remove_abandoned(place / folder, lambda name, f=folder: str(Path(f, name)) in names)
 
 
 def place_of(command: str, path: str | Path | None) -> Path:
     """The folder for a run of a command: the one of a path, or the next that nobody has named.
 
     Raises:
-        BadInputError: The path is none, or leads to no folder, or no folder can have such a name.
+        ConfigError: The path is none, or no folder can have such a name.
     """
-    if path == "":
-        raise OutputError("expected the name of a folder, found an empty one")
     if "/" in checks.text("command", command):
         raise ConfigError(f"command: expected a name without a slash, found {command}")
-    if path is None:
-        places = (Path("runs") / f"{command}-{number}" for number in itertools.count(1))
-        return next(place for place in places if not place.exists())
-    place = checks.path("path", path)
-    if os.path.lexists(place) and not place.is_dir():
-        what = "a file" if place.exists() else "a link to nothing"
-        raise OutputError(f"{place}: expected a folder, found {what}; give another --out")
-    return place
+    if path is not None:
+        return checks.path("path", path)
+    places = (Path("runs") / f"{command}-{number}" for number in itertools.count(1))
+    return next(place for place in places if not place.exists())
 
 
 def goes_on(place: Path, resume: bool | None) -> bool:
@@ -174,79 +153,46 @@ def goes_on(place: Path, resume: bool | None) -> bool:
     Raises:
         OutputError: It holds another run, or files of somebody with names that a run writes.
     """
-    for folder in FOLDERS:
-        if (place / folder).is_symlink():
-            raise OutputError(f"expected {place / folder} within its run, found a link")
+    if links := [place / name for name in FOLDERS if (place / name).is_symlink()]:
+        raise OutputError(f"expected {links[0]} within its run, found a link")
     held = files_of(place)
-    named = (place / name for name in _NAMES)
-    others = [file for file in named if os.path.lexists(file) and file not in held]
+    named = [place / name for name in _NAMES if os.path.lexists(place / name)]
+    others = [file for file in named if file not in held]
+    begun = place / TRIALS in held
     if not others and held in ([], [place / FILES]):
         return False  # what a process leaves that is killed as it begins
-    begun = place / TRIALS in held
     if resume and begun and not others:
         return True
-    if resume and (old := [name for name in _BEFORE if place / name in held]) and not begun:
-        raise OutputError(
-            f"{place}: expected a run of this version to go on with, found {old[0]} of one before; "
-            "go on with that version, choose another folder, or give --overwrite"
-        )
-    if resume and place / RESULT in held:
-        raise OutputError(
-            f"{place}: expected an unfinished run, found a finished one, which takes no more "
-            "trials; choose another folder, or give --overwrite to run all of them anew"
-        )
-    first = place / RESULT if place / RESULT in held else [*others, *held][0]
+    telling = sorted(held, key=lambda file: (file.name not in BEFORE, file.name != RESULT))
     raise OutputError(
-        f"expected {'an unfinished run' if resume else 'a folder without a run'}, found {first}; "
-        "choose another"
+        f"expected {'an unfinished run of this version' if resume else 'a folder without a run'}, "
+        f"found {[*others, *telling][0]}; choose another"
         + (" or give --overwrite" if place / FILES in held else "")
         + (" or --resume" if begun and resume is False else "")
     )
-
-
-def before_this_version(place: Path) -> str:
-    """File of trials of a version before, of a run without a result; empty if there is none."""
-    names = (name for name in _BEFORE if (place / name).exists())
-    return "" if (place / RESULT).exists() else next(names, "")
 
 
 def set_aside(place: Path) -> Path:
     """Rename a folder that holds a run; its new name.
 
     Raises:
-        OutputError: It holds no run of ours, cannot have another name, or a process works on it.
+        OutputError: It holds no run of ours, or a process works on it.
         OSError: It cannot be renamed.
     """
     if listed(place) is None and {path.name for path in place.iterdir()} != {JOBS}:
-        first = min((path.name for path in place.iterdir()), default="none")
+        first = min(path.name for path in place.iterdir())
         raise OutputError(
             f"{place}: expected a run of this program to overwrite, whose files {FILES} lists, "
             f"found {first}, which is of none; choose another folder"
         )
-    if place.is_symlink():
-        raise OutputError(f"{place}: expected a folder to rename, found a link; give its own name")
-    if place.resolve() in (Path.cwd(), *Path.cwd().parents):
-        raise OutputError(
-            f"{place}: expected a folder to rename, found the working directory or one above it; "
-            "go to another directory, or choose another folder"
-        )
-    numbers = itertools.count(2)
-    old = place.parent / f"{place.name}.old"
-    while os.path.lexists(old):
-        old = place.parent / f"{place.name}.old{next(numbers)}"
+    names = (f"{place.name}.old{number}" for number in ("", *range(2, 10**6)))
+    old = next(old for name in names if not os.path.lexists(old := place.parent / name))
     lock = locked(place / FILES) if (place / FILES).exists() else None
-    place.rename(old)
-    if lock is not None:
-        os.close(lock)
-    return old
-
-
-def is_finished(place: Path) -> bool:
-    """Whether a folder holds the whole result of a run that was not interrupted."""
     try:
-        return not json.loads((place / RESULT).read_bytes()).get("interrupted")
-    except (OSError, ValueError, AttributeError):
-        return False
+        return place.rename(old)
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
 def read_as(path: Path, decode: Callable[[str], T]) -> T:
@@ -268,18 +214,6 @@ def read_as(path: Path, decode: Callable[[str], T]) -> T:
         ) from None
 
 
-def inside(place: Path, name: str) -> Path:
-    """The file or folder of a name in a run's folder.
-
-    Raises:
-        ConfigError: The name leads out of it.
-    """
-    path = Path(checks.text("name", name))
-    if path.is_absolute() or ".." in path.parts or not name.isprintable():
-        raise ConfigError(f"name: expected one within the run, found {name}")
-    return place / path
-
-
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Tell of what the system refuses while a file or folder is written.
@@ -293,6 +227,13 @@ def writing(path: Path) -> Iterator[None]:
         raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None
 
 
-def is_folder(folder: Path) -> bool:
-    """Whether it is a folder itself, and no link to one."""
-    return folder.is_dir() and not folder.is_symlink()
+def inside(place: Path, name: str) -> Path:
+    """The file or folder of a name in a run's folder.
+
+    Raises:
+        ConfigError: The name leads out of it.
+    """
+    path = Path(checks.text("name", name))
+    if path.is_absolute() or ".." in path.parts or not name.isprintable():
+        raise ConfigError(f"name: expected one within the run, found {name}")
+    return place / path

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import datetime
 import re
+from datetime import UTC, datetime
 
 _DATE = "%Y-%m-%d %H:%M:%S UTC"
 _DATES = re.compile(r"^# (begun|resumed|ended) (.*)$", re.MULTILINE)
 
 
-def begun_line(resumed: bool = False) -> str:
-    """The line of a run that begins now, or goes on."""
-    return f"# {'resumed' if resumed else 'begun'} {_now()}\n"
-
-
-def with_end(text: str) -> str:
-    """What was written, with the line of a run that ends now."""
-    kept = (line for line in text.splitlines(True) if not line.startswith("# ended "))
-    return f"{''.join(kept)}# ended {_now()}\n"
+def date_line(what: str) -> str:
+    """The line of a run that is `begun`, `resumed` or `ended` now."""
+    return f"# {what} {datetime.now(UTC).strftime(_DATE)}\n"
 
 
 def when_run(text: str) -> str:
     """When, and for how long; empty if it does not tell."""
     try:
-        dates = {
-            what: datetime.datetime.strptime(when, _DATE).replace(tzinfo=datetime.UTC)
-            for what, when in _DATES.findall(text)
-        }
+        dates = {what: datetime.strptime(when, _DATE) for what, when in _DATES.findall(text)}
     except ValueError:
         return ""
     for what, words, it in (("begun", "Run on", "it"), ("resumed", "Resumed on", "the rest")):
@@ -45,7 +36,3 @@ def span(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{minutes:.0f} min" if minutes < 100 else f"{hours:.1f} h"
-
-
-def _now() -> str:
-    return datetime.datetime.now(datetime.UTC).strftime(_DATE)

@@ -18,7 +18,6 @@ that process ends, however it ends.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -31,8 +30,8 @@ from pathlib import Path
 from typing import Any
 
 from antennate.errors import BadInputError, OutputError
-from antennate.files import read_limited
-from antennate.studies.formats import as_mapping, dumped, encoded, plain_row, strict
+from antennate.files import lock, read_limited
+from antennate.studies.formats import as_mapping, decoded, dumped, encoded, strict
 from antennate.studies.identity import but_trials, differences
 
 TRIALS = "trials.jsonl"
@@ -43,6 +42,7 @@ _SYNC = 1.0
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
 _RESULT, _FIRST = "result", "first"
 """Where the row of a trial stands in its result."""
+_ANEW = "choose another folder or give --overwrite"
 
 
 @dataclass
@@ -64,30 +64,31 @@ class Content:
     damaged: int = 0
 
     def read(self, data: bytes) -> Content:
-        """Take lines.
-
-        Trials before the line that says what is run are of nothing that is known: they go.
-        """
+        """Take lines."""
         for content in map(_sound, filter(None, data.split(b"\n"))):
-            if content is None:
-                self.damaged += 1
-            elif "identity" in content:
-                if self.identity is None or "keys" in content:
-                    self._turn_to(content["identity"], content.get("keys", {}))
-            elif "key" in content:
-                self.records[content["key"]] = content
-            elif "row" in content:
-                self.others[content["row"]] = content["values"]
-            elif "processor" in content:
-                self.processors.append(content["processor"])
+            match content:
+                case None:
+                    self.damaged += 1
+                case {"identity": identity}:
+                    self._turn_to(identity, content.get("keys"))
+                case {"key": key}:
+                    self.records[key] = content
+                case {"row": number, "values": values}:
+                    self.others[number] = values
+                case {"processor": model}:
+                    self.processors.append(model)
+                case _:
+                    pass
         return self
 
-    def _turn_to(self, identity: Any, keys: Mapping[str, str]) -> None:
-        """Go on with what is run from here on; trials of before that it holds have other keys."""
-        if self.identity is None:
-            keys, self.processors = {}, []
+    def _turn_to(self, identity: Any, keys: Mapping[str, str] | None) -> None:
+        """Go on with what is run from here on; trials of before that it holds have other keys.
+
+        Without keys it is the beginning: trials before that are of nothing that is known, and go.
+        """
         self.identity, self.others = identity, {}
-        moved = {keys[key]: record for key, record in self.records.items() if key in keys}
+        self.processors = [] if keys is None else self.processors
+        moved = {new: self.records[old] for old, new in (keys or {}).items() if old in self.records}
         self.records = {key: {**record, "key": key} for key, record in moved.items()}
 
     def rows(self) -> list[dict[str, Any]]:
@@ -97,13 +98,14 @@ class Content:
         """
         found: list[dict[str, Any]] = []
         for record in self.records.values():
-            match record.get("rows", ()):
-                case "result":
-                    found.append(plain_row(record["result"]))
-                case "first":
-                    found.append(plain_row(record["result"]["of"][0]))
-                case listed:
-                    found += listed
+            match record:
+                case {"rows": "result", "result": row} | {
+                    "rows": "first",
+                    "result": {"of": [row, *_]},
+                }:
+                    found.append(strict(decoded(row, None)))
+                case _:
+                    found += record.get("rows", ())
         return [*found, *(row for row in self.others.values() if row not in found)]
 
 
@@ -149,27 +151,24 @@ class TrialFile(Content):
             OutputError: It cannot be written.
         """
         before, place = self.identity, self.path.parent
-        if before is None and self.records:
-            raise BadInputError(
-                f"{self.path}: expected what is run in its first line, found that damaged, and "
-                f"{len(self.records)} sound trials; choose another folder or give --overwrite"
-            )
         if before is None:
+            if self.records:
+                raise BadInputError(
+                    f"{self.path}: expected what is run in its first line, found that damaged, and "
+                    f"{len(self.records)} sound trials; {_ANEW}"
+                )
             self._write(line({"identity": identity}))
-            self._turn_to(identity, {})
-        elif not (changes := differences(before, identity)):
-            return
-        elif tasks is None or but_trials(before) != but_trials(identity):
-            raise BadInputError(
-                f"{place}: expected the run that it was begun with, found another: "
-                f"{changes}; choose another folder or give --overwrite"
-            )
-        else:
+            self._turn_to(identity, None)
+        elif changes := differences(before, identity):
+            if tasks is None or but_trials(before) != but_trials(identity):
+                raise BadInputError(
+                    f"{place}: expected the run that it was begun with, found another: {changes}; "
+                    f"{_ANEW}"
+                )
             old, new = tasks(before["config"]), tasks(identity["config"])
             if len(new) < len(old):
                 raise BadInputError(
-                    f"{place}: expected no fewer trials than this run has, found {changes}; "
-                    "choose another folder for fewer"
+                    f"{place}: expected no fewer trials than this run has, found {changes}; {_ANEW}"
                 )
             places = {task: key_of(0, i) for i, task in enumerate(new)}
             keys = {key_of(0, i): places[task] for i, task in enumerate(old) if task in places}
@@ -177,9 +176,9 @@ class TrialFile(Content):
             self._turn_to(identity, keys)
 
     def holds_all(self, tasks: Tasks | None) -> bool:
-        """Whether no trial of what is run is missing, as far as its tasks are known."""
+        """Whether no line is damaged and no trial missing, as far as the tasks are known."""
         count = 0 if tasks is None or self.identity is None else len(tasks(self.identity["config"]))
-        return all(key_of(0, place) in self.records for place in range(count))
+        return not self.damaged and all(key_of(0, i) in self.records for i in range(count))
 
     @contextlib.contextmanager
     def trial(self, key: str, result: Any, **more: Any) -> Iterator[None]:
@@ -209,19 +208,18 @@ class TrialFile(Content):
         finally:
             self._rows = None
 
-    def append(self, key: str, content: Mapping[str, Any], elsewhere: bool = False) -> None:
+    def append(self, key: str, content: Mapping[str, Any]) -> None:
         """Keep one trial, and its processor, if that is a new one.
 
         Args:
             key: Its key.
             content: What else its line says.
-            elsewhere: Whether it stays in another file, too.
 
         Raises:
             OutputError: The disk is full, or the like; what was kept before stays whole.
         """
-        new = b"".join(line({"processor": model}) for model in self._seen)
-        self._write(new + line({"key": key, **content}), is_trial=not elsewhere)
+        lines = [*({"processor": model} for model in self._seen), {"key": key, **content}]
+        self._write(b"".join(map(line, lines)), is_trial=True)
         self.processors += self._seen
         self._seen.clear()
 
@@ -241,7 +239,7 @@ class TrialFile(Content):
         number, values = self._count, strict(as_mapping(row))
         self._count += 1
         data = line({"row": number, "values": values})
-        if number not in self.others or dumped(self.others[number]) != dumped(values):
+        if self.others.get(number) != values:
             self._write(data)
         self.others[number] = values
         return True
@@ -253,11 +251,9 @@ class TrialFile(Content):
 
     def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
         """Keep trials that stay in other files too, and the processors that they ran on."""
-        for model in processors:
-            self.saw(model)
-        for key, content in records.items():
-            self.append(key, content, elsewhere=True)
-            self.records[key] = content
+        self.processors, self.records = [*dict.fromkeys(processors)], {**records}
+        lines = [*({"processor": model} for model in self.processors), *records.values()]
+        self._write(b"".join(map(line, lines)))
 
     def _write(self, data: bytes, is_trial: bool = False) -> None:
         try:
@@ -317,15 +313,11 @@ def locked(path: Path, flags: int = 0) -> int:
         OutputError: Another process works on it.
     """
     handle = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o666)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    if lock(handle) is False:  # None on a file system without locks
         os.close(handle)
         raise OutputError(
             f"{path.parent}: expected a run that nobody works on, found another process at it"
-        ) from None
-    except OSError:
-        pass  # a file system without locks
+        )
     return handle
 
 
