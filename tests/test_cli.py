@@ -296,16 +296,16 @@ def test_bad_folders(capsys, tmp_path):
     (tmp_path / "file").write_text("mine")
     for words in ((), ("--overwrite",)):
         line = refusal(capsys, *QUICK, "--out", "file", *words)
-        assert "file: expected a folder, found a file; give another --out" in line
+        assert "expected to write file, found: File exists" in line
     (tmp_path / "link").symlink_to("nowhere")
     line = refusal(capsys, *QUICK, "--out", "link", "--overwrite")
-    assert "link: expected a folder, found a link to nothing; give another --out" in line
+    assert "expected to write link, found: File exists" in line
     assert "Not a directory" in refusal(capsys, *QUICK, "--out", "file/sub")
     assert (tmp_path / "file").read_text() == "mine"
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "config.toml").write_text("trials = 1\n")
     line = refusal(capsys, *QUICK, "--out", "mine")
-    assert "found mine/config.toml; choose another" in line
+    assert "mine: expected no file config.toml but of this run" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
 
 

@@ -248,7 +248,7 @@ def test_a_finished_run_that_cannot_grow_takes_no_more_trials_and_says_so(tmp_pa
     run = tmp_path / "run"
     with RunDirectory.create("touch", run, identity={"versions": {}, "trials": 1}) as folder:
         folder.finish({"schema": 1})
-    with pytest.raises(OutputError, match="found a finished one, which takes no more trials"):
+    with pytest.raises(OutputError, match="expected an unfinished run of this version"):
         RunDirectory.create("touch", run, identity={"versions": {}, "trials": 2}, resume=True)
 
 

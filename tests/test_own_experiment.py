@@ -201,7 +201,7 @@ def test_text_that_looks_like_a_number_stays_text(tmp_path: Path) -> None:
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"expected the folder of a run, found no result\.json"):
         RunDirectory.open(tmp_path)
-    with pytest.raises(BadInputError, match="found an empty one"):
+    with pytest.raises(BadInputError, match="path: expected a path, found ''"):
         RunDirectory.create("wall", "")
 
 

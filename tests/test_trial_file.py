@@ -163,7 +163,7 @@ def test_a_run_of_a_version_before_is_read_or_refused_in_one_line(
     for _ in range(2):
         assert main([*RUNS["wall"], *WORKER, "wall", "--resume"]) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert f"found {old} of one before; go on with that version" in line
+        assert f"expected an unfinished run of this version, found wall/{old}; choose" in line
         assert {path: path.read_bytes() for path in before} == before
         Path("wall/result.json").unlink(missing_ok=True)
         Path("wall/trials.csv").unlink(missing_ok=True)

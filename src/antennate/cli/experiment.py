@@ -22,9 +22,7 @@ from antennate.errors import (
     AntennateError,
     BadInputError,
     ConfigError,
-    LogError,
     OutputError,
-    WorkerError,
     raised,
 )
 from antennate.experiments import FITTED, fitted
@@ -39,6 +37,7 @@ from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.studies.tables import Interim, Table
+from antennate.studies.trial_file import Content
 from antennate.telemetry import FilmView
 
 if TYPE_CHECKING:
@@ -184,22 +183,12 @@ def _file_of(experiment: Experiment[Any, Any], path: Path | None) -> Path | None
     return ours or path
 
 
-@dataclass(frozen=True)
-class Shards:
-    """Trials of all shards: their folders, what was run, records by key, and where they ran."""
-
-    folders: Sequence[Path]
-    identity: dict[str, Any]
-    records: dict[str, Any]
-    processors: Sequence[str]
-
-
 def carry_out(
     experiment: Experiment[Any, Any],
     argv: Sequence[str],
     config: Params,
     options: Options,
-    shards: Shards | None = None,
+    shards: Content | None = None,
 ) -> int:
     """Run what has been parsed, or put shards together that were run.
 
@@ -229,15 +218,12 @@ def carry_out(
         workers = replace(workers, trials=run.trials, shared=environment(kind, config))
         try:
             if shards and run.trials is not None:
-                run.trials.take(shards.records, shards.processors)
+                run.trials.take(shards)
             outcome = _outcome(experiment, config, options, workers, run, view)
         except KeyboardInterrupt:
             if shards is None and run.can_go_on:
                 again = _go_on(experiment.name, argv, run.path)
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
-            raise
-        except (LogError, OutputError, WorkerError):
-            run.kept = shards is None and (run.kept or bool(run.made(LOGS, ".mcap")))
             raise
         except ShardEnd as end:
             part = {"shard": options.shard, "trials": end.count, "of": end.total}
@@ -299,7 +285,7 @@ def _folder(
     config: Params,
     options: Options,
     identity: dict[str, Any],
-    shards: Shards | None,
+    shards: Content | None,
 ) -> contextlib.AbstractContextManager[RunDirectory]:
     """The run directory; shards are put together in a new one."""
     how: dict[str, Any] = {}

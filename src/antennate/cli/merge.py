@@ -6,13 +6,13 @@ import json
 from collections import Counter
 from collections.abc import Sequence, Set
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.experiment import Options, Shards, carry_out, shard_of
+from antennate.cli.experiment import Options, carry_out, shard_of
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions
 from antennate.errors import BadInputError, ConfigError
@@ -21,7 +21,7 @@ from antennate.studies.identity import differences
 from antennate.studies.pool import places_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import SHARD, read_as
-from antennate.studies.trial_file import TRIALS, read_trials
+from antennate.studies.trial_file import TRIALS, Content, read_trials
 
 DESCRIPTION = """\
 Put the shards of one run together: the table and the result are the same as without shards.
@@ -82,11 +82,9 @@ def _part(text: str) -> _Part:
             raise ValueError("no shard I/N of a number of trials")
 
 
-def _gathered(shards: Sequence[Path]) -> Shards:
+def _gathered(shards: Sequence[Path]) -> Content:
     """What all shards say is run, and their trials."""
-    identity: Any = None
-    records: dict[str, Any] = {}
-    processors: list[str] = []
+    found = Content()
     parts: list[_Part] = []
     for shard in shards:
         if not (shard / SHARD).is_file():
@@ -94,16 +92,16 @@ def _gathered(shards: Sequence[Path]) -> Shards:
         parts.append(read_as(shard / SHARD, _part))
         RunDirectory.open(shard).versions()  # one that was cut is refused
         content = read_trials(shard / TRIALS)
-        if identity is not None and (changes := differences(identity, content.identity)):
+        found.identity = found.identity or content.identity
+        if changes := differences(found.identity, content.identity):
             raise BadInputError(
                 f"{shard}: expected a shard of the same run as {shards[0]}, found {changes}"
             )
-        identity = identity or content.identity
         _require_whole(shard, parts[-1], places_of(content.records))
-        records |= content.records
-        processors += content.processors
-    _require_all(parts[0], places_of(records))
-    return Shards(shards, identity, records, processors)
+        found.records |= content.records
+        found.processors += content.processors
+    _require_all(parts[0], places_of(found.records))
+    return found
 
 
 def _require_whole(shard: Path, part: _Part, trials: Set[int]) -> None:

@@ -272,11 +272,10 @@ def _object(name: str, said: Mapping[str, Any], packages: Collection[str]) -> An
             return kind(said["value"])
         if issubclass(kind, BaseModel):
             return kind.model_validate_json(said["fields"])
-        if is_dataclass(kind):
-            return kind(**decoded(said, packages))
+        fields(kind)  # of a dataclass; else a TypeError
+        return kind(**decoded(said, packages))
     except (LookupError, TypeError, AttributeError) as error:
         raise ValueError(f"expected a result, found {error}") from None
-    raise ValueError(f"expected a dataclass, found {name}")
 
 
 def _name(value: Any) -> str:

@@ -25,25 +25,11 @@ from pathlib import Path
 from typing import Any
 
 from antennate import checks
-from antennate.errors import BadInputError, OutputError
+from antennate.errors import AntennateError, BadInputError, OutputError
 from antennate.files import writing_whole
 from antennate.params.base import Config, Params, read_file
 from antennate.studies import formats, run_files
-from antennate.studies.run_files import (
-    COMMAND,
-    CONFIG,
-    FIGURES,
-    FILES,
-    LOGS,
-    REPORT,
-    RESULT,
-    ROOM,
-    TABLE,
-    VERSIONS,
-    files_of,
-    read_as,
-    writing,
-)
+from antennate.studies.run_files import FILES, LOGS, REPORT, RESULT, ROOM, TABLE, read_as, writing
 from antennate.studies.run_times import date_line
 from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
@@ -72,7 +58,7 @@ class RunDirectory:
         self._created: Sequence[Path] = ()
         self._lock: int | None = None
         self.kept = self._complete = False
-        self._described: Sequence[str] = ()
+        self._described: tuple[str, str] | None = None
 
     @classmethod
     def create(
@@ -116,6 +102,7 @@ class RunDirectory:
                 if overwrite and any(place.iterdir()):
                     run.old = run_files.set_aside(place)
                     place.mkdir()
+                run.require_free(run_files.NAMES)
                 before = run_files.goes_on(place, resume if identity is not None else None)
                 run._begin(identity, tasks, before, retry)
             except BaseException:
@@ -135,19 +122,13 @@ class RunDirectory:
             self.trials = TrialFile(place / TRIALS)
             self.trials.begin(identity, tasks if before else None)
             whole = before and not retry and self.trials.holds_all(tasks)
-            self.finished = self.untouched = whole and self._is_finished()
+            ended = whole and (place / RESULT).exists() and not self.result().get("interrupted")
+            self.finished = self.untouched = ended
             self.kept = self.finished or bool(self.trials.others)
         if before and not self.finished:
             run_files.remove_run(
                 place, lambda file: file.parent.name == LOGS or file.name == TRIALS
             )
-
-    def _is_finished(self) -> bool:
-        """Whether it has the whole result of a run that was not interrupted."""
-        try:
-            return not self.result().get("interrupted")
-        except (BadInputError, AttributeError):
-            return False
 
     @classmethod
     def open(cls, path: str | Path) -> RunDirectory:
@@ -157,7 +138,7 @@ class RunDirectory:
             BadInputError: It holds no run, or the path is none.
         """
         place = checks.path("path", path)
-        if not any((place / name).exists() for name in (RESULT, TRIALS, CONFIG)):
+        if not any((place / name).exists() for name in (RESULT, TRIALS, run_files.CONFIG)):
             raise BadInputError(f"{place}: expected the folder of a run, found no {RESULT}")
         return cls(place)
 
@@ -177,9 +158,10 @@ class RunDirectory:
         """
         if (self.path / TABLE).exists():
             return read_as(self.path / TABLE, formats.from_csv)
-        if (self.path / TRIALS).exists() or (self.path / RESULT).exists():
-            return read_trials(self.path / TRIALS).rows() if (self.path / TRIALS).exists() else []
-        if old := [name for name in run_files.BEFORE if (self.path / name).exists()]:
+        if (self.path / TRIALS).exists():
+            return read_trials(self.path / TRIALS).rows()
+        old = [name for name in run_files.BEFORE if (self.path / name).exists()]
+        if old and not (self.path / RESULT).exists():
             raise BadInputError(
                 f"{self.path}: expected {TRIALS}, found {old[0]} of a version before; go on with "
                 "that version, which writes its result"
@@ -192,7 +174,7 @@ class RunDirectory:
         Raises:
             BadInputError: It is missing or damaged, or is of another command.
         """
-        return read_file(self.path / CONFIG, model)
+        return read_file(self.path / run_files.CONFIG, model)
 
     def text(self, name: str) -> str:
         """The content of one of its text files; empty if there is none.
@@ -209,14 +191,14 @@ class RunDirectory:
         Raises:
             BadInputError: It is damaged.
         """
-        path = self.path / VERSIONS
+        path = self.path / run_files.VERSIONS
         found = read_as(path, json.loads) if path.exists() else {}
         return {name: str(value) for name, value in found.items()}
 
     def made(self, folder: str, ending: str) -> list[Path]:
         """Files of the run in a folder of it; of a run of an older version all that are there."""
         files = sorted((self.path / folder).glob(f"*{ending}"))
-        own = files_of(self.path)
+        own = run_files.files_of(self.path)
         return [file for file in files if file in own or not own]
 
     @property
@@ -243,14 +225,16 @@ class RunDirectory:
 
     def _describe(self, end: str = "") -> None:
         """Write what was described, with the models of the processors that are known by now."""
-        for config, words in [self._described] if self._described else []:
-            self.write(CONFIG, config)
-            trials = self.trials
-            known = trials.identity["versions"] if trials and trials.identity else versions()
-            models = (trials.processors if trials else []) or [processor()]
-            self.write(VERSIONS, formats.to_json({**known, "processor": " and ".join(models)}))
-            if words:
-                self.write(COMMAND, words + end)
+        if self._described is None:
+            return
+        trials, (config, words) = self.trials, self._described
+        known = trials.identity["versions"] if trials and trials.identity else versions()
+        models = (trials.processors if trials else []) or [processor()]
+        text = formats.to_json({**known, "processor": " and ".join(models)})
+        self.write(run_files.CONFIG, config)
+        self.write(run_files.VERSIONS, text)
+        if words:
+            self.write(run_files.COMMAND, words + end)
 
     def keep_room(self) -> None:
         """Keep room for the result, so that a disk that fills meanwhile does not cost it."""
@@ -330,7 +314,8 @@ class RunDirectory:
         Raises:
             OutputError: There is such a file, which this run has not made.
         """
-        own = run_files.listed(self.path) or ()
+        listed = run_files.listed(self.path)
+        own = () if listed is None else (FILES, *listed)
         for name in names:
             if name not in own and os.path.lexists(self.path / name):
                 raise OutputError(
@@ -349,14 +334,16 @@ class RunDirectory:
 
         for name, figure in checks.mapping("figures", figures).items():
             for suffix, data in render(figure).items():
-                self.write(f"{FIGURES}/{name}.{suffix}", data)
+                self.write(f"{run_files.FIGURES}/{name}.{suffix}", data)
 
     def __enter__(self) -> RunDirectory:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         complete = kind is None and self._complete  # else what is missing can be written again
-        self._leave(self.kept or self.can_go_on, spent=complete and not self.keeps_trials)
+        failed = kind is not None and issubclass(kind, AntennateError)
+        stays = self.kept or self.can_go_on or (failed and bool(self.made(LOGS, ".mcap")))
+        self._leave(stays, spent=complete and not self.keeps_trials)
 
     def _leave(self, stays: bool, spent: bool = False) -> None:
         """Let others take the folder, as it is or without this run."""

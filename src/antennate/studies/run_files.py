@@ -43,7 +43,7 @@ LOG_PARTS = tuple(part(Path(LOG), number).name for number in range(1, MOST_PARTS
 ROOM = ".room"
 """File that keeps room for the result."""
 _MADE = ("conditioning.toml", "recording.csv", "ticks.csv", "bom.csv", "points.csv", "frames.csv")
-_NAMES = (
+NAMES = (
     *(FILES, RESULT, TRIALS, SHARD, TABLE, CONFIG, VERSIONS, COMMAND, ROOM, BY_HAND, CALIBRATION),
     *(*_MADE, REPORT, *LOG_PARTS),
 )
@@ -151,23 +151,20 @@ def goes_on(place: Path, resume: bool | None) -> bool:
         resume: Whether a run that it holds is to go on; None if the command goes on with none.
 
     Raises:
-        OutputError: It holds another run, or files of somebody with names that a run writes.
+        OutputError: It holds another run, or a folder of a run leads elsewhere.
     """
     if links := [place / name for name in FOLDERS if (place / name).is_symlink()]:
         raise OutputError(f"expected {links[0]} within its run, found a link")
     held = files_of(place)
-    named = [place / name for name in _NAMES if os.path.lexists(place / name)]
-    others = [file for file in named if file not in held]
     begun = place / TRIALS in held
-    if not others and held in ([], [place / FILES]):
+    if held in ([], [place / FILES]):
         return False  # what a process leaves that is killed as it begins
-    if resume and begun and not others:
+    if resume and begun:
         return True
-    telling = sorted(held, key=lambda file: (file.name not in BEFORE, file.name != RESULT))
+    first = min(held, key=lambda file: (file.name not in BEFORE, file.name != RESULT))
     raise OutputError(
         f"expected {'an unfinished run of this version' if resume else 'a folder without a run'}, "
-        f"found {[*others, *telling][0]}; choose another"
-        + (" or give --overwrite" if place / FILES in held else "")
+        f"found {first}; choose another or give --overwrite"
         + (" or --resume" if begun and resume is False else "")
     )
 

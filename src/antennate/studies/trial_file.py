@@ -42,7 +42,6 @@ _SYNC = 1.0
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
 _RESULT, _FIRST = "result", "first"
 """Where the row of a trial stands in its result."""
-_ANEW = "choose another folder or give --overwrite"
 
 
 @dataclass
@@ -150,30 +149,27 @@ class TrialFile(Content):
             BadInputError: It is something else, or fewer trials; the text says what differs.
             OutputError: It cannot be written.
         """
-        before, place = self.identity, self.path.parent
-        if before is None:
-            if self.records:
+        before, where = self.identity, "choose another folder or give --overwrite"
+        if before is None and self.records:
+            raise BadInputError(
+                f"{self.path}: expected what is run in its first line, found that damaged, and "
+                f"{len(self.records)} sound trials; {where}"
+            )
+        keys = None
+        if before is not None:
+            if not (changes := differences(before, identity)):
+                return
+            grows = tasks is not None and but_trials(before) == but_trials(identity)
+            old, new = (tasks(of["config"]) if tasks and grows else () for of in (before, identity))
+            if not grows or len(new) < len(old):
                 raise BadInputError(
-                    f"{self.path}: expected what is run in its first line, found that damaged, and "
-                    f"{len(self.records)} sound trials; {_ANEW}"
+                    f"{self.path.parent}: expected the run that it was begun with, or more trials "
+                    f"of it, found another: {changes}; {where}"
                 )
-            self._write(line({"identity": identity}))
-            self._turn_to(identity, None)
-        elif changes := differences(before, identity):
-            if tasks is None or but_trials(before) != but_trials(identity):
-                raise BadInputError(
-                    f"{place}: expected the run that it was begun with, found another: {changes}; "
-                    f"{_ANEW}"
-                )
-            old, new = tasks(before["config"]), tasks(identity["config"])
-            if len(new) < len(old):
-                raise BadInputError(
-                    f"{place}: expected no fewer trials than this run has, found {changes}; {_ANEW}"
-                )
-            places = {task: key_of(0, i) for i, task in enumerate(new)}
+            places = {task: key_of(0, place) for place, task in enumerate(new)}
             keys = {key_of(0, i): places[task] for i, task in enumerate(old) if task in places}
-            self._write(line({"identity": identity, "keys": keys}))
-            self._turn_to(identity, keys)
+        self._write(line({"identity": identity, **({} if keys is None else {"keys": keys})}))
+        self._turn_to(identity, keys)
 
     def holds_all(self, tasks: Tasks | None) -> bool:
         """Whether no line is damaged and no trial missing, as far as the tasks are known."""
@@ -249,10 +245,10 @@ class TrialFile(Content):
         if model not in [*self.processors, *self._seen]:
             self._seen.append(model)
 
-    def take(self, records: Mapping[str, Any], processors: Sequence[str]) -> None:
+    def take(self, content: Content) -> None:
         """Keep trials that stay in other files too, and the processors that they ran on."""
-        self.processors, self.records = [*dict.fromkeys(processors)], {**records}
-        lines = [*({"processor": model} for model in self.processors), *records.values()]
+        self.processors, self.records = [*dict.fromkeys(content.processors)], content.records
+        lines = [*({"processor": model} for model in self.processors), *self.records.values()]
         self._write(b"".join(map(line, lines)))
 
     def _write(self, data: bytes, is_trial: bool = False) -> None:
