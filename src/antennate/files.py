@@ -43,6 +43,19 @@ def open_regular(path: Path) -> BinaryIO:
     return os.fdopen(handle, "rb")
 
 
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Tell of what the system refuses while a file or folder is written.
+
+    Raises:
+        OutputError: It refuses something.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None
+
+
 def require_room(path: Path, least: float, error: type[BadInputError] = OutputError) -> None:
     """Check that a disk has room for a file that is to be written.
 

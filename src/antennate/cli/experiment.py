@@ -221,7 +221,7 @@ def carry_out(
                 run.trials.take(shards)
             outcome = _outcome(experiment, config, options, workers, run, view)
         except KeyboardInterrupt:
-            if shards is None and run.can_go_on:
+            if shards is None and run.keeps_trials and run.can_go_on:
                 again = _go_on(experiment.name, argv, run.path)
                 sys.stderr.write(f"no result yet, but what has ended is kept\nto go on: {again}\n")
             raise
@@ -340,7 +340,7 @@ def _end(
     result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
-    if argv is not None and interrupted and run.can_go_on:
+    if argv is not None and interrupted and run.keeps_trials and run.can_go_on:
         again = f"to go on: {_go_on(experiment.name, argv, run.path)}\n"
     if interrupted and (options.shard is not None or not outcome.rows):
         sys.stderr.write(again)

@@ -124,7 +124,7 @@ def from_csv(text: str) -> list[dict[str, Any]]:
     Raises:
         ValueError: It is no such table.
     """
-    usual = csv.field_size_limit(max(len(text), csv.field_size_limit()))
+    csv.field_size_limit(max(len(text), csv.field_size_limit()))
     try:
         lines = csv.reader(io.StringIO(text), strict=True)
         names = next(lines, [])
@@ -140,8 +140,6 @@ def from_csv(text: str) -> list[dict[str, Any]]:
         return rows
     except csv.Error as error:
         raise ValueError(str(error)) from None
-    finally:
-        csv.field_size_limit(usual)
 
 
 def _cell(value: Any) -> Any:

@@ -26,10 +26,10 @@ from typing import Any
 
 from antennate import checks
 from antennate.errors import AntennateError, BadInputError, OutputError
-from antennate.files import writing_whole
+from antennate.files import writing, writing_whole
 from antennate.params.base import Config, Params, read_file
 from antennate.studies import formats, run_files
-from antennate.studies.run_files import FILES, LOGS, REPORT, RESULT, ROOM, TABLE, read_as, writing
+from antennate.studies.run_files import FILES, LOGS, REPORT, RESULT, ROOM, TABLE, read_as
 from antennate.studies.run_times import date_line
 from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
@@ -123,8 +123,7 @@ class RunDirectory:
             self.trials.begin(identity, tasks if before else None)
             whole = before and not retry and self.trials.holds_all(tasks)
             ended = whole and (place / RESULT).exists() and not self.result().get("interrupted")
-            self.finished = self.untouched = ended
-            self.kept = self.finished or bool(self.trials.others)
+            self.finished = self.untouched = self.kept = ended
         if before and not self.finished:
             run_files.remove_run(
                 place, lambda file: file.parent.name == LOGS or file.name == TRIALS
@@ -252,7 +251,7 @@ class RunDirectory:
             raise OutputError(f"{self.path}: expected a run that goes on, found a finished one")
         if not self.finished:
             self.trials = self.trials or TrialFile(self.path / TRIALS)
-            self.kept |= self.trials.add_row(row)
+            self.trials.add_row(row)
 
     def finish(self, result: Mapping[str, Any], rows: Iterable[Any] = ()) -> None:
         """Write the table of the rows, if there are any, and the result.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
@@ -211,19 +211,6 @@ def read_as(path: Path, decode: Callable[[str], T]) -> T:
         ) from None
 
 
-@contextlib.contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Tell of what the system refuses while a file or folder is written.
-
-    Raises:
-        OutputError: It refuses something.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"expected to write {path}, found: {error.strerror or error}") from None
-
-
 def inside(place: Path, name: str) -> Path:
     """The file or folder of a name in a run's folder.
 
@@ -231,6 +218,6 @@ def inside(place: Path, name: str) -> Path:
         ConfigError: The name leads out of it.
     """
     path = Path(checks.text("name", name))
-    if path.is_absolute() or ".." in path.parts or not name.isprintable():
+    if path.is_absolute() or ".." in path.parts:
         raise ConfigError(f"name: expected one within the run, found {name}")
     return place / path

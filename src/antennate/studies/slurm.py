@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antennate.errors import ConfigError, OutputError, WorkerError, in_one_line
+from antennate.errors import ConfigError, WorkerError, in_one_line
+from antennate.files import writing
 from antennate.lookup import require_package
 from antennate.messages import shortened
 from antennate.studies.formats import decoded, encoded
@@ -146,12 +147,10 @@ class Slurm:
         if call.folder is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
         folder = call.folder / JOBS
-        try:
+        with writing(folder):
             folder.mkdir(exist_ok=True)
             for file in folder.glob("*.jsonl"):  # of jobs whose driver has ended
                 file.unlink(missing_ok=True)
-        except OSError as error:
-            raise OutputError(f"expected to write {folder}, found: {error.strerror}") from None
         _Driver(call, folder, self._executor(folder)[0]).run(count)
 
     def _executor(self, folder: Path) -> tuple[Any, list[warnings.WarningMessage]]:

@@ -5,7 +5,7 @@
 | `identity` | what is run; with `keys`, that there are more trials, and the keys of those before |
 | `processor` | a model of processor, on which trials that follow ran |
 | `key`, `result` | one trial: what its worker returned, with every bit, and its rows (`rows`) |
-| `row`, `values` | a row that belongs to no trial, and its number |
+| `key`, `rows` | a row that belongs to no trial, by its number (`row.0`) |
 
 Rows of a trial are `result` or `first` where the result, or the first part of it, is the row, so
 that it stands there once; else they are listed.
@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate.errors import BadInputError, OutputError
-from antennate.files import lock, read_limited
+from antennate.files import lock, read_limited, writing
 from antennate.studies.formats import as_mapping, decoded, dumped, encoded, strict
 from antennate.studies.identity import but_trials, differences
 
@@ -42,6 +42,8 @@ _SYNC = 1.0
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
 _RESULT, _FIRST = "result", "first"
 """Where the row of a trial stands in its result."""
+_ROW = "row."
+"""Begins the key of a row that belongs to no trial."""
 
 
 @dataclass
@@ -50,15 +52,13 @@ class Content:
 
     Attributes:
         identity: What is run, None where no sound line says it.
-        records: Trials by key; of a key that comes twice the last counts.
-        others: Rows that belong to no trial, by number.
+        records: Trials, and rows of none, by key; of a key that comes twice the last counts.
         processors: Models of the processors that they ran on.
         damaged: Lines that failed their checksum.
     """
 
     identity: Any = None
     records: dict[str, Any] = field(default_factory=dict)
-    others: dict[int, Any] = field(default_factory=dict)
     processors: list[str] = field(default_factory=list)
     damaged: int = 0
 
@@ -72,8 +72,6 @@ class Content:
                     self._turn_to(identity, content.get("keys"))
                 case {"key": key}:
                     self.records[key] = content
-                case {"row": number, "values": values}:
-                    self.others[number] = values
                 case {"processor": model}:
                     self.processors.append(model)
                 case _:
@@ -85,7 +83,7 @@ class Content:
 
         Without keys it is the beginning: trials before that are of nothing that is known, and go.
         """
-        self.identity, self.others = identity, {}
+        self.identity = identity
         self.processors = [] if keys is None else self.processors
         moved = {new: self.records[old] for old, new in (keys or {}).items() if old in self.records}
         self.records = {key: {**record, "key": key} for key, record in moved.items()}
@@ -95,17 +93,16 @@ class Content:
 
         A trial that was first shown on a page, which keeps its row alone, is a trial since.
         """
-        found: list[dict[str, Any]] = []
-        for record in self.records.values():
+        found, others = list[dict[str, Any]](), list[dict[str, Any]]()
+        for key, record in self.records.items():
             match record:
-                case {"rows": "result", "result": row} | {
-                    "rows": "first",
-                    "result": {"of": [row, *_]},
-                }:
+                case {"rows": "result", "result": row}:
+                    found.append(strict(decoded(row, None)))
+                case {"rows": "first", "result": {"of": [row, *_]}}:
                     found.append(strict(decoded(row, None)))
                 case _:
-                    found += record.get("rows", ())
-        return [*found, *(row for row in self.others.values() if row not in found)]
+                    (others if key.startswith(_ROW) else found).extend(record.get("rows", ()))
+        return [*found, *(row for row in others if row not in found)]
 
 
 class TrialFile(Content):
@@ -125,10 +122,8 @@ class TrialFile(Content):
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.path = path
-        try:
+        with writing(path):
             self._file = locked(path, os.O_CREAT | os.O_APPEND)
-        except OSError as error:
-            raise OutputError(f"expected to write {path}, found: {error.strerror}") from None
         self._synced, self._seen, self._count = 0.0, list[str](), 0
         self._rows: list[Any] | None = None
         data = read_limited(path, sys.maxsize)
@@ -219,8 +214,8 @@ class TrialFile(Content):
         self.processors += self._seen
         self._seen.clear()
 
-    def add_row(self, row: Any) -> bool:
-        """Keep a row, a dataclass or a mapping; whether it has a line of its own.
+    def add_row(self, row: Any) -> None:
+        """Keep a row, a dataclass or a mapping: within a trial with it, else in a line of its own.
 
         One that the file has from a process before is not written again.
 
@@ -231,14 +226,12 @@ class TrialFile(Content):
         """
         if self._rows is not None:
             self._rows.append(row if is_dataclass(row) else as_mapping(row))
-            return False
-        number, values = self._count, strict(as_mapping(row))
-        self._count += 1
-        data = line({"row": number, "values": values})
-        if self.others.get(number) != values:
-            self._write(data)
-        self.others[number] = values
-        return True
+            return
+        key, self._count = f"{_ROW}{self._count}", self._count + 1
+        content = {"key": key, "rows": [strict(as_mapping(row))]}
+        if self.records.get(key) != content:
+            self._write(line(content), is_trial=True)
+        self.records[key] = content
 
     def saw(self, model: str) -> None:
         """Name the processor of the trials that come next; it is kept with the first of them."""
