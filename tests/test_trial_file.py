@@ -62,7 +62,7 @@ def test_rows_of_a_run_that_was_killed_are_those_of_its_table(name: str, once: i
     """A row that is the first of what a trial returned stands there, and nowhere else."""
     table = RunDirectory.open(name).rows()
     assert [line["rows"] for line in lines(name) if "key" in line].count("first") == once
-    assert not any("row" in line for line in lines(name))
+    assert not any(line.get("key", "").startswith("row") for line in lines(name))
     assert cells(stopped(name).rows()) == cells(table)
 
 
@@ -111,9 +111,9 @@ def test_rows_of_no_trial_are_lines_of_their_own_and_come_once() -> None:
             run(count)
         expected = rows[: max(2, count)]
         assert RunDirectory.open("dice").rows() == expected
-        assert [line["values"] for line in lines("dice") if "row" in line] == expected
+        assert [line["rows"] for line in lines("dice") if "key" in line] == [[r] for r in expected]
     with Path("dice/trials.jsonl").open("ab") as file:
-        file.write(b'{"crc":"00000000","row":4,"values":{"trial":4,"eyes":1.0}}\n{"crc":')
+        file.write(b'{"crc":"00000000","key":"row.4","rows":[{"trial":4,"eyes":1.0}]}\n{"crc":')
     assert RunDirectory.open("dice").rows() == rows
 
 
@@ -145,7 +145,8 @@ def test_a_row_that_a_trial_returns_stands_once_also_where_a_page_had_shown_it()
     for shown_or_run in (lambda run: run.append(throw(0)), on_workers, on_workers):
         with pytest.raises(KeyboardInterrupt):
             stop(shown_or_run)
-    assert [line.get("rows") for line in lines("dice") if "key" in line] == ["result"] * 3
+    kept = [line["rows"] for line in lines("dice") if "key" in line]
+    assert kept == [[{"trial": 0, "eyes": 0.0}], "result", "result", "result"]
     assert [row["eyes"] for row in RunDirectory.open("dice").rows()] == [0.0, None, 2 / 3]
 
 
