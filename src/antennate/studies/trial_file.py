@@ -40,8 +40,6 @@ Tasks = Callable[[Mapping[str, Any]], Sequence[Any]]
 _SYNC = 1.0
 """Time within which lines reach the disk itself, so that a power cut costs no more [s]."""
 _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
-_RESULT, _FIRST = "result", "first"
-"""Where the row of a trial stands in its result."""
 _ROW = "row."
 """Begins the key of a row that belongs to no trial."""
 
@@ -314,9 +312,9 @@ def _rows(rows: Sequence[Any], result: Any) -> Any:
     """The rows of a trial, or where in its result its only one stands."""
     if len(rows) == 1 and is_dataclass(rows[0]):
         if rows[0] is result:
-            return _RESULT
+            return "result"
         if isinstance(result, tuple) and rows[0] is result[0]:
-            return _FIRST
+            return "first"
     return [strict(as_mapping(row)) for row in rows]
 
 
