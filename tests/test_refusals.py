@@ -262,6 +262,7 @@ record --marks 1 2 --speed 0.1 :: expected marks or speed
 drive --key k --esp32 /dev/nowhere --bus /dev/null :: --key: expected
 drive --bus y --esp32 udp://127.0.0.1:4210 :: ANTENNATE_KEY set
 drive --bus y --esp32 ftp://127.0.0.1:4210 :: expected a path, tcp:// or udp://
+drive --bus y --esp32 rfc2217://127.0.0.1:4210 :: tcp://HOST:PORT, of ser2net in raw mode
 drive --bus y --esp32 tcp://127.0.0.1 :: ://HOST:PORT such as
 drive --bus y --esp32 tcp://127.0.0.1:70000 :: ://HOST:PORT such as
 drive --bus y --esp32 tcp://key@127.0.0.1:4210 :: a key never goes there

@@ -24,7 +24,7 @@ from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
 from antennate.cli.terminal import progress, stop_signals, today, write
-from antennate.dxl.endpoints import Endpoint, Rfc2217Endpoint, TcpEndpoint
+from antennate.dxl.endpoints import Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
@@ -61,7 +61,6 @@ _OF_SERVOS = (
     "no_config",
     "servos",
     "tcp",
-    "rfc2217",
     "orders",
 )
 """What servos alone read."""
@@ -108,9 +107,6 @@ class Places(RobotFileOptions, RecordOptions, PageOptions):
 
     tcp: str | None = option(
         None, "TCP: the board on PORT, the bus on PORT+1; 0 takes any", "[HOST:]PORT"
-    )
-    rfc2217: str | None = option(
-        None, "TCP likewise, with speed, DTR and RTS for clients that need them", "[HOST:]PORT"
     )
     udp: str | None = option(None, "the board on a UDP port instead, likewise", "[HOST:]PORT")
     key: Path | None = option(
@@ -259,8 +255,7 @@ def _serve_servos(
     demands = [read(text) for text in config.fault]
     faults = Faults(demands, [entry.id for entry in entries], alone=True)
     box = ServoBox(entries, config.plugged, config.push)
-    kind, host, port = _tcp(places)
-    bus = None if kind is None else kind(host, port)
+    bus = None if places.tcp is None else TcpEndpoint(*_place("--tcp", places.tcp))
     with ServoServer(box, faults, bus, orders) as server, urgent(LEVEL + 1):
         server.run(_until(config, server.paths, lambda: True))
     return OK
@@ -310,27 +305,18 @@ def _say_lost(failure: str) -> None:
 
 def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
-    kind, host, port = _tcp(places)
     board: Endpoint | None = None
+    bus: Endpoint | None = None
+    if places.tcp is not None:
+        host, port = _place("--tcp", places.tcp)
+        if places.udp is None:
+            board = TcpEndpoint(host, port)
+        bus = TcpEndpoint(host, port and port + 1)
     if places.udp is not None:
         board = UdpEndpoint(
             *_place("--udp", places.udp), read_key(places.key), size=robot.sample_size
         )
-    elif kind is Rfc2217Endpoint:
-        board = Rfc2217Endpoint(host, port, robot.set_lines)
-    elif kind is not None:
-        board = kind(host, port)
-    return board, None if kind is None else kind(host, port and port + 1)
-
-
-def _tcp(places: Places) -> tuple[type[TcpEndpoint] | None, str, int]:
-    """The kind of TCP endpoint that is wanted, if any, with its host and port."""
-    if places.tcp is not None and places.rfc2217 is not None:
-        raise ConfigError("--rfc2217: expected none beside --tcp, found both")
-    for kind, text in ((TcpEndpoint, places.tcp), (Rfc2217Endpoint, places.rfc2217)):
-        if text is not None:
-            return kind, *_place(kind.flag, text)
-    return None, "", 0
+    return board, bus
 
 
 def _place(flag: str, text: str) -> tuple[str, int]:

@@ -102,7 +102,6 @@ class TwinRobot:
         self._stream = bytearray()
         self._buffer = bytearray(self._encoder.size)
         self._ticks = self._walked = self._booted = 0
-        self._held_in_reset = self._off = False
         self.converter = Converter(boot_id, mains)
         self._chance = np.random.default_rng(boot_id) if standing_noise else None
         self._imu_params = robot.imu
@@ -228,21 +227,8 @@ class TwinRobot:
     def receive(self, data: bytes) -> None:
         """Let the board take bytes from the host: it greets if it is asked to."""
         asked = frame.encode_request() in self.noise(data)
-        if asked and not (self.board_silent or self._off) and self._ticks >= self._booted:
+        if asked and not self.board_silent and self._ticks >= self._booted:
             self._greet()
-
-    def set_lines(self, dtr: bool, rts: bool) -> None:
-        """Let modem lines act on the board as on the usual one for the ESP32.
-
-        RTS alone holds it in reset; DTR alone presses BOOT, which ends its stream until the next
-        reset. The table is that of `hardware.ports.serial_line`.
-        """
-        held = rts and not dtr
-        if self._held_in_reset and not held:
-            self.break_board("reset")
-            self._off = False
-        self._held_in_reset = held
-        self._off |= dtr != rts
 
     def break_board(self, what: str) -> None:
         """Let the board fall silent or speak again, or start anew after BOOT_TICKS."""
@@ -314,7 +300,7 @@ class TwinRobot:
     def _sample(self) -> None:
         """One sample of the board, and a greeting now and then."""
         since = self._ticks - self._booted
-        if self.board_silent or self._off or since < 0:
+        if self.board_silent or since < 0:
             return
         if since % round(GREETING_PERIOD / self._period) == 0:
             self._greet()

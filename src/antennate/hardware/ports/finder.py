@@ -101,7 +101,10 @@ def finder(
 
         return lambda: TcpPort(host, port)
     if scheme != "udp":
-        raise BadInputError(f"{flag}: expected a path, tcp:// or udp://, found {address!r}")
+        raise BadInputError(
+            f"{flag}: expected a path, tcp:// or udp://, found {address!r}; a serial line on the "
+            "network is tcp://HOST:PORT, of ser2net in raw mode, or a pseudo-terminal of socat"
+        )
     if key is None:
         raise BadInputError(
             f"{address}: expected the key of the board; give --key FILE, or --insecure-udp for a "
