@@ -120,12 +120,11 @@ def test_it_slides_on_the_edge_of_the_friction_cone_and_sticks_inside(friction: 
         """Forces of contact and places of the tip along the bar, in the last half second."""
         seen: list[tuple[float, float, float]] = []
 
-        def watch(held: Bench) -> None:
-            seen.append((*held.contact_force(), held.tip()[0]))
-
         for (x, y), (u, v) in zip(way, np.gradient(way, period, axis=0), strict=True):
             held.command(x, y, u, v, 0.5)
-            held.step(round(period / physics.timestep), watch)
+            for _ in range(round(period / physics.timestep)):
+                held.step()
+                seen.append((*held.contact_force(), held.tip()[0]))
         last = np.array(seen[-1000:])
         forces = last[:, :2]
         return forces[np.hypot(*forces.T) > 0], last[:, 2]  # it is not on in every step

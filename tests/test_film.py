@@ -16,19 +16,10 @@ import numpy as np
 import pytest
 
 import antennate
-from antennate import experiments
 from antennate.cli import main
 from antennate.errors import AntennateError, BadInputError
-from antennate.experiments.bench import BenchRecorder
-from antennate.experiments.calibrate.run import CalibrateConfig
-from antennate.experiments.calibrate.run import push as record_push
-from antennate.experiments.force.experiment import traverse
-from antennate.experiments.force.physics import ForceConfig
-from antennate.experiments.sweep.experiment import map_cell
-from antennate.experiments.sweep.physics import SweepConfig
 from antennate.experiments.tunnel.experiment import ending, films
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
-from antennate.params.bench import SweepParams
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
@@ -193,7 +184,7 @@ def test_a_thin_antenna_is_seen_and_the_physics_keeps_its_own() -> None:
         </worldbody></mujoco>"""
     )
     sides = ((0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0))
-    shot = film.Shot(2.0, elevation=90.0, flat=True, grid=10.0)
+    shot = film.Shot(2.0, elevation=90.0)
     with Camera(model, shot, (200, 200), sides) as camera:
         picture = camera.picture(np.zeros(0), np.zeros(3)).astype(int)
     blue = picture[60:140, 100, 2] - picture[60:140, 100, 0] > 60
@@ -348,57 +339,3 @@ def test_an_encoder_that_fails_is_no_fault_of_the_file(
     told = capsys.readouterr().err.splitlines()[-1]
     assert told.startswith("antennate log: error: video: expected to encode it with ")
     assert [path.name for path in Path().iterdir()] == ["log.mcap"]
-
-
-@pytest.mark.parametrize(
-    ("name", "settings", "condition", "traces", "speed"),
-    [
-        ("gait", {"cycles": 2, "settling_cycles": 0}, "turn_l", 2, 1.0),
-        (
-            *("wall", {"profiles": ("descending",), "wall": {"travel": 0.06, "speed": 0.05}}),
-            *("descending", 2, 1.0),
-        ),
-        ("touch", {"profiles": ("stiff",), "walls": ("flat",), "speeds": (0.1,)}, "stiff", 3, 1.0),
-        ("sweep", {"profiles": ("stiff",), "sweep": {"frequency": 1.5}}, "stiff", 2, 1.0),
-        ("ringdown", {}, "antenna", 1, 0.2),
-        ("calibrate", {}, "0.1 m_s", 2, 0.2),
-        ("force", {"profiles": ("stiff",)}, "stiff", 2, 0.25),
-    ],
-)
-def test_other_experiments_are_recorded_at_the_pace_of_their_films(
-    name: str, settings: dict[str, Any], condition: str, traces: int, speed: float
-) -> None:
-    experiment = experiments.load(name)
-    assert experiment.films is not None
-    made = experiment.films(experiment.config(**settings), 0)[condition]()
-    assert np.diff(made.t) == pytest.approx(speed / RATE, abs=0.011 if speed == 1.0 else 0.0011)
-    assert len(made.t) > 20
-    assert np.ptp(made.traces[0].values) > 1.0, "the antenna bends"
-    assert len(made.traces) == traces
-    for shown in (*(trace.values for trace in made.traces), *(b.states for b in made.bands)):
-        assert len(shown) == len(made.t) == len(made.positions) == len(made.targets)
-
-
-def test_a_recording_has_no_rig_to_film(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("push.csv").write_text("t,counts,bend\n0,100,0\n")
-    assert main(["calibrate", "--recording", "push.csv", "--video", "--out", "run"]) == 2
-    told = capsys.readouterr().err
-    assert told.endswith("video: expected the rig, which alone can be filmed, found a recording\n")
-    assert told.count("\n") == 1
-    assert not Path("run").exists()
-
-
-def test_a_watched_bench_moves_as_an_unwatched_one() -> None:
-    """To the last bit, although the watcher asks for everything that films show."""
-    config = SweepConfig(profiles=("stiff",), sweep=SweepParams(frequency=2.0))
-    cell = ("stiff", "fixed", 0, 0.65, 1.2, 0.5)
-    seen = BenchRecorder(config.antenna)
-    assert map_cell(config, *cell, seen.watch) == map_cell(config, *cell)
-    assert seen.film("stiff", "wall").bands[0].states.any(), "it touched the wall"
-    push = CalibrateConfig()
-    watched = record_push(push, 0, BenchRecorder(push.antenna).watch)
-    plain = record_push(push, 0)
-    assert watched.samples.counts.tobytes() == plain.samples.counts.tobytes()
-    force = ForceConfig()
-    seen = BenchRecorder(force.antenna)
-    assert traverse(force, "stiff", 3, seen.watch)[0] == traverse(force, "stiff", 3)[0]

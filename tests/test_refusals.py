@@ -38,6 +38,7 @@ calibrate --solver=mujoco :: it is gone: leave it out
 tunnel --bogus :: expected a known flag, found '--bogus'
 gait --tunnel.free-width 1 :: expected a known flag
 antenna springs --video :: expected a flag of this command, found --video
+gait --video :: expected a flag of this command, found --video
 """
 VALUES = """
 tunnel --json yes :: expected flags only, found 'yes'
@@ -87,7 +88,7 @@ record --marks 0,5 1,0 :: --marks: expected numbers separated by spaces, with de
 TOGETHER = """
 tunnel --video-view side :: --video
 tunnel --video-view below --video :: --video-view :: expected one of above or side
-bench wall --video-view side --video :: expected a known flag
+bench wall --video :: expected a flag of this command, found --video
 log plot no.mcap --video-view side :: expected `film` beside it, found plot
 tunnel --video-trial 0 --video --no-video :: beside it, found none
 tunnel --slurm timeout_min=1 --engine dask :: beside it, found --engine dask

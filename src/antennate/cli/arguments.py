@@ -300,8 +300,7 @@ _ELSEWHERE = {
     "--readings": "tunnel and log replay take it; no other command changes what is read",
     "--knows": "only tunnel takes it: no robot knows what a simulation does",
     "--log": "tunnel, gait and twin take it; drive and drive teleop always keep a log",
-    "--video": "tunnel, gait, climb, calibrate, twin, bench wall, bench touch, bench sweep, "
-    "bench force and antenna ringdown take it; `antennate log film` makes a film of any log",
+    "--video": "tunnel, climb and twin take it; `antennate log film` makes a film of any log",
     "--view": "tunnel, gait, climb, bench wall, twin, drive, drive teleop and log replay take it; "
     "`antennate log view` shows any log",
 }

@@ -1,26 +1,13 @@
-"""What experiments with one antenna on the bench share: readings of its sensor, and films."""
+"""Readings of the flex sensor that experiments with one antenna on the bench share."""
 
 from __future__ import annotations
-
-import math
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from antennate.antenna import sensor as flex_sensor
 from antennate.params.control import ConditioningParams
-from antennate.robots.antenna import AntennaSpec, SensorParams
-from antennate.sim.bench import Bench
+from antennate.robots.antenna import SensorParams
 from antennate.types import Floats, Ints
-
-if TYPE_CHECKING:
-    from antennate.telemetry.film import Film
-
-_LAST = 0.05
-"""Time over which force is averaged and contact is held [s] (assumed)."""
 
 
 def recorded(sensor: SensorParams, flex: Floats, noise: Floats) -> Floats:
@@ -82,92 +69,3 @@ def between(grid: Floats, table: Floats, at: Floats) -> Floats:
     share = (at - grid[below]) / (grid[below + 1] - grid[below])
     column = np.arange(len(at))
     return (1.0 - share) * table[below, column] + share * table[below + 1, column]
-
-
-class BenchRecorder:
-    """Watches a bench, and makes its film.
-
-    A contact that lasts is not on in every physics step. So a picture shows the mean force of what
-    was seen in the last 50 ms, and contact if there was any.
-
-    Args:
-        antenna: The antenna of the bench.
-        speed: How many times faster than real time the film is.
-    """
-
-    def __init__(self, antenna: AntennaSpec, speed: float = 1.0) -> None:
-        from antennate.telemetry.film import FilmRecorder  # slow to import
-
-        self._antenna, self._recorder = antenna, FilmRecorder(speed)
-        self._model: Any = None
-        self._start = 0.0
-        self._forces: deque[tuple[float, float, bool]] = deque()
-
-    def watch(self, bench: Bench) -> None:
-        """Offer a moment; the film begins with the first."""
-        if self._model is None:
-            self._model, self._start = bench.model, bench.t
-        t = bench.t - self._start
-        self._forces.append((t, math.hypot(*bench.contact_force()), bench.touching()))
-        while self._forces[0][0] < t - _LAST:
-            self._forces.popleft()
-        if not self._recorder.due(t):
-            return
-        self._recorder.take(
-            t,
-            bench.data.qpos,
-            bench.joints().mean(axis=0),
-            flex=[math.degrees(bench.flex())],
-            force=[float(np.mean([force for _, force, _ in self._forces]))],
-            touching=int(any(touching for *_, touching in self._forces)),
-        )
-
-    def film(self, title: str, obstacle: str | None, form: str = ".0f") -> Film:
-        """The film: flex, and force and contact if there is an obstacle.
-
-        Args:
-            title: What it shows.
-            obstacle: What the antenna touches, None for nothing.
-            form: Format of the flex [deg].
-
-        Raises:
-            BadInputError: Nothing was seen.
-        """
-        from antennate.telemetry import film
-
-        if not len(self._recorder):
-            raise film.nothing(title)
-        traces = [film.trace("flex [deg]", self._recorder.values("flex"), form)]
-        bands = []
-        if obstacle is not None:
-            traces.append(film.trace("force [N]", self._recorder.values("force")))
-            touching = np.array(self._recorder.values("touching"))[:, np.newaxis]
-            bands = film.contact_bands(touching, (obstacle,))
-        shot = film.bench_shot(self._antenna)
-        return self._recorder.film(title, self._model, shot, traces, bands)
-
-
-def bench_films(
-    conditions: Callable[[Any], Iterable[str]],
-    trial: Callable[..., str],
-    obstacle: str | None,
-    speed: float = 1.0,
-    form: str = ".0f",
-) -> Callable[[Any, int], Mapping[str, Callable[[], Film]]]:
-    """The `films` of an experiment on the bench: of each condition a trial, run once more.
-
-    Args:
-        conditions: conditions(config): their names.
-        trial: trial(config, condition, number, watch): runs one; the title of its film.
-        obstacle: What the antenna touches, None for nothing.
-        speed: Speed of the film over that of the antenna.
-        form: Format of the flex [deg].
-    """
-
-    def record(config: Any, condition: str, number: int) -> Film:
-        recorder = BenchRecorder(config.antenna, speed)
-        return recorder.film(trial(config, condition, number, recorder.watch), obstacle, form)
-
-    return lambda config, number: {
-        condition: partial(record, config, condition, number) for condition in conditions(config)
-    }

@@ -208,25 +208,18 @@ class Bench:
         self.carriage.command(x, y, speed_x, speed_y)
         self.data.ctrl[self._base_servo] = base
 
-    def step(self, count: int = 1, watch: Watch | None = None) -> None:
-        """Advance by `count` physics steps; `watch` looks at the bench after each of them.
+    def step(self, count: int = 1) -> None:
+        """Advance by `count` physics steps.
 
         Raises:
             SimulationError: A command is not finite, the engine warned, time stood still, or the
                 state left all bounds.
         """
         with self._checked(count):
-            if watch is None:
-                mujoco.mj_step(self.model, self.data, count)
-                return
-            for _ in range(count):
-                mujoco.mj_step(self.model, self.data)
-                watch(self)
+            mujoco.mj_step(self.model, self.data, count)
 
-    def press(self, count: int, watch: Watch | None = None) -> Floats:
+    def press(self, count: int) -> Floats:
         """Advance by `count` physics steps and return the mean over them of `contact_force`.
-
-        `watch` looks at the bench after each step.
 
         A contact that lasts is not on in every step; its mean converges, its share of steps does
         not.
@@ -240,8 +233,6 @@ class Bench:
                 mujoco.mj_step(self.model, self.data)
                 if self.data.ncon:
                     total += self.contact_force()
-                if watch is not None:
-                    watch(self)
         return total / count
 
     @contextmanager

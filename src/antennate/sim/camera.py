@@ -14,14 +14,11 @@ from numpy.typing import NDArray
 from antennate.sim import engine_setup
 from antennate.sim.engine import mujoco
 from antennate.sim.parts import ANTENNA_BIT
-from antennate.sim.shapes import FLOOR, Colour, colours
+from antennate.sim.shapes import Colour, colours
 from antennate.types import Floats
 
 Picture = NDArray[np.uint8]
 _LINE: Colour = (0.8, 0.8, 0.8, 1.0)
-_RIGHT_ANGLE = 90.0 if mujoco.mj_version() < 4_000_000 else 0.0
-"""Field of view of a camera without perspective that sees twice its distance [deg]: the engine
-takes an angle before 4.0, the height that is seen after; 0 then."""
 _SAMPLES = 4
 """Samples of a pixel: thin antennae would flicker otherwise."""
 _THIN = 1.5
@@ -29,8 +26,8 @@ _THIN = 1.5
 _SKY, _HORIZON = 255, 30.0
 """Grey of what is behind all, and elevation below which it is in the picture [deg]: half the field
 of view, and some more."""
-_GRID = 16
-"""Grid lines to either side of the middle."""
+_GRID, _SPACING = 16, 0.25
+"""Grid lines to either side of the middle, and their distance [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,20 +35,14 @@ class Shot:
     """From where a camera looks.
 
     Attributes:
-        distance: From what it looks at [m]; of a flat shot half the height of the picture [m].
+        distance: From what it looks at [m].
         elevation: Below the horizon it looks by so much [deg].
         azimuth: Its heading [deg]; 90 has x to the right and y to the back.
-        flat: Whether it draws without perspective.
-        grid: Distance of the lines on the floor [m].
-        floor: Height of a floor that is drawn where the model has none [m].
     """
 
     distance: float
     elevation: float = 70.0
     azimuth: float = 90.0
-    flat: bool = False
-    grid: float = 0.25
-    floor: float | None = None
 
 
 class Camera:
@@ -82,15 +73,13 @@ class Camera:
         os.environ.setdefault("PYOPENGL_PLATFORM", name)
         self._model = copy.copy(model)
         _prepare(self._model, size, sides)
-        _thicken(self._model, shot, size[1])
+        _thicken(self._model, shot.distance, size[1])
         self._data = mujoco.MjData(self._model)
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 500)
         self._option = mujoco.MjvOption()
-        self._shot, self._sees_sky = shot, shot.elevation < _HORIZON
+        self._sees_sky = shot.elevation < _HORIZON
         self._camera = _aimed(shot)
-        if shot.flat:
-            self._model.vis.global_.fovy = _RIGHT_ANGLE or 2 * shot.distance
         self._driver = importlib.import_module(f"mujoco.{name}").GLContext(*size)
         self._driver.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
@@ -119,7 +108,7 @@ class Camera:
             mujoco.mjtCatBit.mjCAT_ALL.value,
             self._scene,
         )
-        _add_floor(self._scene, self._shot, target)
+        _add_grid(self._scene, target)
         self._driver.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._context)
         pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
@@ -142,7 +131,6 @@ def _aimed(shot: Shot) -> mujoco.MjvCamera:
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.distance, camera.azimuth, camera.elevation = shot.distance, shot.azimuth, -shot.elevation
-    camera.orthographic = int(shot.flat)
     return camera
 
 
@@ -157,30 +145,26 @@ def _prepare(model: mujoco.MjModel, size: tuple[int, int], sides: tuple[Colour, 
     model.geom_rgba[:] = colours(model, sides)
 
 
-def _thicken(model: mujoco.MjModel, shot: Shot, height: int) -> None:
+def _thicken(model: mujoco.MjModel, distance: float, height: int) -> None:
     """Draw thin antennae thicker than they are; the model is only drawn."""
-    angle = np.radians(model.vis.global_.fovy)
-    seen = 2 * shot.distance * (1.0 if shot.flat else np.tan(angle / 2))
+    seen = 2 * distance * np.tan(np.radians(model.vis.global_.fovy) / 2)
     thin = (model.geom_contype & ANTENNA_BIT) != 0
     thin &= model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE.value
     model.geom_size[thin, 0] = np.maximum(model.geom_size[thin, 0], _THIN * seen / height)
 
 
-def _add_floor(scene: mujoco.MjvScene, shot: Shot, target: Floats) -> None:
-    """A floor if there is none, with lines around the target, so that one sees it move."""
-    height = shot.floor or 0.0
-    middle = np.round(target[:2] / shot.grid) * shot.grid
-    half, width = _GRID * shot.grid, shot.grid / 150
-    if shot.floor is not None:
-        _add_box(scene, [2 * half, 2 * half, width], [*middle, height - 2 * width], FLOOR)
+def _add_grid(scene: mujoco.MjvScene, target: Floats) -> None:
+    """Lines on the floor around the target, so that one sees it move."""
+    middle = np.round(target[:2] / _SPACING) * _SPACING
+    half, width = _GRID * _SPACING, _SPACING / 150
     for k in range(-_GRID, _GRID + 1):
-        across = middle + k * shot.grid
-        _add_box(scene, [half, width, width / 10], [middle[0], across[1], height], _LINE)
-        _add_box(scene, [width, half, width / 10], [across[0], middle[1], height], _LINE)
+        across = middle + k * _SPACING
+        _add_line(scene, [half, width, width / 10], [middle[0], across[1], 0.0])
+        _add_line(scene, [width, half, width / 10], [across[0], middle[1], 0.0])
 
 
-def _add_box(scene: mujoco.MjvScene, size: Sequence[float], at: Sequence[float], c: Colour) -> None:
+def _add_line(scene: mujoco.MjvScene, size: Sequence[float], at: Sequence[float]) -> None:
     geom = scene.geoms[scene.ngeom]
-    box = mujoco.mjtGeom.mjGEOM_BOX
-    mujoco.mjv_initGeom(geom, box, size, at, np.eye(3).ravel(), np.array(c, dtype=np.float32))
+    box, colour = mujoco.mjtGeom.mjGEOM_BOX, np.array(_LINE, dtype=np.float32)
+    mujoco.mjv_initGeom(geom, box, size, at, np.eye(3).ravel(), colour)
     scene.ngeom += 1

@@ -32,7 +32,7 @@ Colour = tuple[float, float, float, float]
 
 _UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 """The engine's colour of a geom that has none of its own."""
-FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
+_FLOOR: Colour = (0.97, 0.97, 0.97, 1.0)
 _GROUND: Colour = (0.90, 0.88, 0.83, 1.0)
 _OBSTACLE: Colour = (0.88, 0.80, 0.66, 0.6)
 _BODY: Colour = (0.34, 0.34, 0.38, 1.0)
@@ -50,7 +50,7 @@ def colours(model: mujoco.MjModel, sides: tuple[Colour, Colour]) -> NDArray[np.f
     bare = (painted == _UNPAINTED).all(axis=1) & (model.geom_matid < 0)
     kind = model.geom_contype
     painted[bare & ((kind & GROUND_BIT) != 0)] = _GROUND
-    painted[bare & ((kind & FLOOR_BIT) != 0)] = FLOOR
+    painted[bare & ((kind & FLOOR_BIT) != 0)] = _FLOOR
     for bit, colour in (
         (OBSTACLE_BIT, _OBSTACLE),
         (BODY_BIT, _BODY),

@@ -18,7 +18,6 @@ import numpy as np
 from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.errors import BadInputError, MissingPackageError
 from antennate.messages import extra
-from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import RobotSpec
 from antennate.sim import engine_setup
 from antennate.sim.camera import Camera, Picture, Shot
@@ -44,6 +43,8 @@ _CONTACTS = {
     int(Contact.CONTACT): ("contact", "#222222"),
     int(Contact.UNKNOWN): ("unknown", "#CC79A7"),
 }
+_LENGTHS = 2.8
+"""Distance of the camera over the length of the robot."""
 _NEARER = 0.55
 """Distance from the side over that from above: its height needs no room in the picture."""
 _LOW = 14.0
@@ -149,7 +150,7 @@ class FilmRecorder:
             BadInputError: Nothing was kept.
         """
         if not self._kept:
-            raise nothing(title)
+            raise _nothing(title)
         targets = _smooth(np.array([where for *_, where in self._kept]), RATE)
         positions = np.array([position for _, position, _ in self._kept])
         return Film(title, model, shot, self.t, positions, targets, traces, bands, ending)
@@ -161,12 +162,11 @@ class WalkRecorder(FilmRecorder):
     Args:
         robot: The robot.
         speed: How many times faster than real time the film is.
-        width: Width of the picture over the length of the robot.
     """
 
-    def __init__(self, robot: RobotSpec, speed: float = 1.0, width: float = 2.8) -> None:
+    def __init__(self, robot: RobotSpec, speed: float = 1.0) -> None:
         super().__init__(speed)
-        self._shot, self._model = Shot(width * robot.length), None
+        self._shot, self._model = Shot(_LENGTHS * robot.length), None
 
     def see(self, world: World, t: float, **values: Any) -> None:
         """Offer a moment [s] with `counts` and whatever else is to be shown; see `take`."""
@@ -187,7 +187,7 @@ class WalkRecorder(FilmRecorder):
             BadInputError: Nothing was kept.
         """
         if not len(self):
-            raise nothing(title)
+            raise _nothing(title)
         maneuver = self.values("maneuver")
         decides = bool((maneuver >= 0).any())
         return self.walk(
@@ -201,7 +201,7 @@ class WalkRecorder(FilmRecorder):
         )
 
 
-def nothing(title: str) -> BadInputError:
+def _nothing(title: str) -> BadInputError:
     """What is raised where there is nothing to see."""
     return BadInputError(f"video: {title}: expected a trial that begins, found no tick")
 
@@ -211,12 +211,6 @@ def _smooth(path: Floats, half: int) -> Floats:
     padded = np.concatenate([path[:1].repeat(half, 0), path, path[-1:].repeat(half, 0)])
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(padded, axis=0)])
     return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
-def bench_shot(antenna: AntennaSpec) -> Shot:
-    """The bench from above, with an antenna in most of the picture and lines every 20 mm."""
-    below = -2.0 * antenna.radius
-    return Shot(0.8 * antenna.length, elevation=90.0, flat=True, grid=0.02, floor=below)
 
 
 def trace(label: str, values: Floats, form: str = ".2f") -> Trace:

@@ -236,7 +236,6 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     result=CalibrateResult,
-    films=calibrate.films,
     files=_files,
     parts="pushes",
     captions={

@@ -11,7 +11,7 @@ from pydantic import Field
 from antennate.params.base import Params, number
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bench, Slider, Watch, compile_bench
+from antennate.sim.bench import Bench, Slider, compile_bench
 from antennate.types import Floats
 
 _Speed = Annotated[float, Field(gt=0, le=1)]
@@ -56,16 +56,14 @@ class Push:
     speed: float
     gap: float
 
-    def run(self, ticks: int, watch: Watch | None = None) -> tuple[Floats, Floats, Floats]:
+    def run(self, ticks: int) -> tuple[Floats, Floats, Floats]:
         """Time [s], flex [rad] and way of the rod from the first touch [m], each shape (ticks,).
-
-        `watch` looks at the bench after each physics step.
 
         Raises:
             SimulationError: The physics became invalid.
         """
         t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
-        flex, y = self._pushed(self._commands(t), watch)
+        flex, y = self._pushed(self._commands(t))
         return t, flex, y + self._touch
 
     @property
@@ -87,7 +85,7 @@ class Push:
         y = -self._touch - self.gap + np.where(back, 2 * whole - way, way)
         return np.stack([y, np.where(back, -self.speed, self.speed)], axis=-1)
 
-    def _pushed(self, places: Floats, watch: Watch | None) -> tuple[Floats, Floats]:
+    def _pushed(self, places: Floats) -> tuple[Floats, Floats]:
         """Flex [rad] and place of the rod [m] before the commands of each tick."""
         model = compile_bench(self.physics, self.antenna, probe_radius=self.rig.rod_radius)
         for i, factor in enumerate(self.factors):
@@ -101,6 +99,6 @@ class Push:
             rows.append((bench.flex(), float(rod.position[1])))
             for y, speed in commands:
                 rod.command(self.rig.place, y, 0.0, speed)
-                bench.step(self._steps, watch)
+                bench.step(self._steps)
         flex, y = np.array(rows).T
         return flex, y

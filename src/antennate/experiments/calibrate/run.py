@@ -20,8 +20,8 @@ from antennate.antenna.calibration import Calibration, Kind
 from antennate.antenna.curves import Samples, plateau_of, white_noise
 from antennate.antenna.sensor import reading_noise
 from antennate.control.conditioning import bending_level
-from antennate.errors import CalibrationError, ConfigError
-from antennate.experiments.bench import bench_films, mean_since, recorded
+from antennate.errors import CalibrationError
+from antennate.experiments.bench import mean_since, recorded
 from antennate.experiments.calibrate.next_push import (
     Assessment,
     Pushes,
@@ -37,7 +37,6 @@ from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
-from antennate.sim.bench import Watch
 from antennate.studies.experiment import Outcome
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep, no_step
@@ -45,8 +44,6 @@ from antennate.types import Floats
 
 _BETTER = 0.2
 """How much more of the level each direction alone explains where hysteresis is asked about."""
-_FILM_SPEED = 0.2
-"""Speed of a film over that of the rod: the fastest push takes a third of a second."""
 _OF_THE_RIG = ("rig", "variation", "physics", "seed")
 
 
@@ -189,8 +186,8 @@ class CalibrateOutcome(Outcome):
         return "\n".join(["[control.conditioning]", *lines]) + "\n"
 
 
-def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Recording:
-    """One push of the rig; `watch` looks at the bench after each physics step.
+def push(config: CalibrateConfig, trial: int) -> Recording:
+    """One push of the rig.
 
     Raises:
         SimulationError: The physics became invalid.
@@ -203,7 +200,7 @@ def push(config: CalibrateConfig, trial: int, watch: Watch | None = None) -> Rec
     ways = 2 if rig.withdraw else 1
     ticks = ways * int(np.ceil((gap + rig.depth) / speed * config.antenna.sensor.rate)) + 1
     noise = reading_noise(config.antenna.sensor, rng, (ticks,))
-    t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(ticks, watch)
+    t, flex, way = Push(config.physics, config.antenna, rig, factors, speed, gap).run(ticks)
     counts = recorded(config.antenna.sensor, flex, noise)
     bend = way / rig.depth
     inside = (bend >= 0) & (bend <= 1)
@@ -235,23 +232,6 @@ def record(
     joined[-1] = np.arange(2, len(joined[0]) + 2)
     whole = Recording(np.concatenate([p.t for p in parts]), Samples(*joined), "")
     return replace(whole, sha256=hashlib.sha256(write(whole).encode()).hexdigest())
-
-
-def _filmed(config: CalibrateConfig) -> list[str]:
-    """The speeds of which there are films, by name."""
-    if config.recording is not None:
-        raise ConfigError("video: expected the rig, which alone can be filmed, found a recording")
-    return [f"{speed:g} m_s" for speed in config.rig.speeds]
-
-
-def _film(config: CalibrateConfig, name: str, trial: int, watch: Watch) -> str:
-    """The first push at a speed, for its film; the title."""
-    push(config, _filmed(config).index(name) * config.rig.pushes, watch)
-    return f"{name.replace('_', '/')}, {1 / _FILM_SPEED:g} times slower"
-
-
-films = bench_films(_filmed, _film, "rod", _FILM_SPEED)
-"""A film of the first push at each speed, in slow motion."""
 
 
 def averaged(recording: Recording, averaging_time: float) -> Recording:

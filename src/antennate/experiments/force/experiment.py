@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antennate.antenna.statics import Chain, about, equilibrium, with_profile
-from antennate.experiments.bench import bench_films, between
+from antennate.experiments.bench import between
 from antennate.experiments.force.explained import by_group, explained
 from antennate.experiments.force.physics import (
     ForceConfig,
@@ -39,7 +39,6 @@ from antennate.experiments.force.result import (
     TraverseRow,
     Traverses,
 )
-from antennate.sim.bench import Watch
 from antennate.studies.columns import shown
 from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers, gather
@@ -157,10 +156,8 @@ def study_profile(config: ForceConfig, profile: str) -> ProfileOutcome:
     return ProfileOutcome(profile, result, rows, plain, dragged)
 
 
-def traverse(
-    config: ForceConfig, profile: str, k: int, watch: Watch | None = None
-) -> tuple[TraverseRow, Traverse]:
-    """The k-th traverse of a profile; `watch` looks at the bench after each physics step."""
+def traverse(config: ForceConfig, profile: str, k: int) -> tuple[TraverseRow, Traverse]:
+    """The k-th traverse of a profile."""
     antenna, limit = with_profile(config.antenna, profile), math.radians(config.hinge_limit_deg)
     chance = float(np.random.default_rng([config.seed, 1, k]).uniform())
     share = (k + chance) / config.traverses
@@ -174,7 +171,6 @@ def traverse(
         post_radius=config.post_radius,
         limit=limit,
         rate=antenna.sensor.rate,
-        watch=watch,
     )
     row = TraverseRow(
         seed=config.seed,
@@ -260,17 +256,6 @@ def sentence(result: ForceResult) -> str:
     )
 
 
-_SPEED = 0.25
-"""Speed of the film over that of the base: a picture for each sample at 100 Hz."""
-
-
-def _film(config: ForceConfig, profile: str, trial: int, watch: Watch) -> str:
-    """Drag the antenna past the post for a film, the middle traverse; the title."""
-    row, _ = traverse(config, profile, config.traverses // 2, watch)
-    invalid = f": {row.status}" if row.reason else ""
-    return f"{profile}, {1 / _SPEED:g} times slower{invalid}"
-
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     ForceConfig,
@@ -279,7 +264,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=ForceResult,
     row=TraverseRow,
-    films=bench_films(lambda config: config.profiles, _film, "post", _SPEED),
     parts="profiles",
     captions={
         "force": "Force over flex, at rest and on the move, and the share of the force "

@@ -22,7 +22,7 @@ from antennate.params.base import Params, number, require_different, require_who
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, require_own_curve
-from antennate.sim.bench import Ball, Bench, Watch, compile_bench
+from antennate.sim.bench import Ball, Bench, compile_bench
 from antennate.types import Bools, Floats, Ints
 
 _CLEARANCE = 0.03
@@ -60,7 +60,6 @@ def drag(
     post_radius: float,
     limit: float,
     rate: float,
-    watch: Watch | None = None,
 ) -> Traverse:
     """Drag the antenna past a post until it slips off or a hinge exceeds its limit.
 
@@ -72,7 +71,6 @@ def drag(
         post_radius: Radius of the post [m].
         limit: Largest hinge angle that still counts [rad].
         rate: Samples a second [Hz].
-        watch: Looks at the bench after each physics step.
     """
     post = Ball(overlap * antenna.length, -(post_radius + antenna.radius + _CLEARANCE), post_radius)
     bench = Bench(compile_bench(physics, antenna, [post]), antenna)
@@ -84,7 +82,7 @@ def drag(
     try:
         while bench.t < end and bench.t - last < _LOST:
             bench.command(0.0, -way(bench.t, speed), 0.0, -speed_at(bench.t, speed), 0.0)
-            force = float(np.linalg.norm(bench.press(steps, watch)))
+            force = float(np.linalg.norm(bench.press(steps)))
             if abs(bench.hinges()).max() > limit:
                 break
             if force > 0.0:

@@ -7,13 +7,10 @@ drifts. FORWARD is walked again for numbers that are not known, drawn from their
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from antennate.colours import called
 from antennate.experiments.gait.config import GaitStudyConfig, drawn
@@ -37,7 +34,6 @@ from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Maneuver
 
 if TYPE_CHECKING:
-    from antennate.telemetry.film import Film
     from antennate.telemetry.view.simulation import SimulationView
 
 
@@ -247,33 +243,6 @@ def _best(found: Optimised | None) -> str:
     return f"; optimised for {found.goal}, {best.speed_m_s:.3f} m/s{at}"
 
 
-def films(config: GaitStudyConfig, trial: int) -> dict[str, Callable[[], Film]]:
-    """A film of each maneuver; walks have no chance, so that `trial` says nothing."""
-    return {m.name.lower(): partial(_record, config, m) for m in MANEUVERS}
-
-
-def _record(config: GaitStudyConfig, maneuver: Maneuver) -> Film:
-    """Walk one maneuver and record it.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
-    from antennate.telemetry import film  # slow to import
-
-    recorder = film.WalkRecorder(config.robot, width=2.2)
-
-    def watch(world: World, frame: AntennaFrame) -> None:
-        recorder.see(world, world.t, counts=frame.counts[0], centre=world.links().mean(axis=0))
-
-    walk_flat(config, maneuver.name.lower(), config.gait, maneuver, watch)
-    way = recorder.values("centre") - recorder.values("centre")[0]
-    return recorder.walk(
-        maneuver.name,
-        [film.trace("way of the middle: x, y [m]", way)],
-        [film.maneuver_band(np.full(len(recorder), int(maneuver)))],
-    )
-
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     GaitStudyConfig,
@@ -282,7 +251,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=GaitResult,
     check=check,
-    films=films,
     parts="walks",
     logs=log_names,
     shown=True,

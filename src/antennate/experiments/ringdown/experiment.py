@@ -13,7 +13,6 @@ from pydantic import Field
 
 from antennate import figures as style
 from antennate.antenna.dynamics import LinearChain, Mode, cone_ratio, fitted_mode, least_damping
-from antennate.experiments.bench import bench_films
 from antennate.experiments.ringdown.result import (
     ANIMAL_CYCLE,
     ANIMALS,
@@ -30,7 +29,7 @@ from antennate.params.base import Params, number, paths_of, read_file
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import MOST_HINGES, AntennaSpec, SensorParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
+from antennate.sim.bench import Bench, compile_bench
 from antennate.studies.columns import columns, content
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.tables import Table
@@ -89,7 +88,7 @@ class RingdownOutcome(Outcome):
         return self.found
 
 
-def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
+def run(config: RingdownConfig) -> RingdownOutcome:
     """Bend the compiled antenna as a load on its tip does, let it go and record it.
 
     Raises:
@@ -102,7 +101,7 @@ def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
     }
     chain = LinearChain.of(config.antenna)
     mode = chain.first_mode()
-    t, tip, engine = _let_go(config, chain, mode, watch)
+    t, tip, engine = _let_go(config, chain, mode)
     found = RingdownResult(
         engine=EngineSwing.of(engine, rejected=_rejected(t, tip, engine.cycle)),
         chain=Swing.of(mode),
@@ -123,9 +122,7 @@ def run(config: RingdownConfig, watch: Watch = unwatched) -> RingdownOutcome:
     return RingdownOutcome(t, tip, found)
 
 
-def _let_go(
-    config: RingdownConfig, chain: LinearChain, mode: Mode, watch: Watch
-) -> tuple[Floats, Floats, Mode]:
+def _let_go(config: RingdownConfig, chain: LinearChain, mode: Mode) -> tuple[Floats, Floats, Mode]:
     """Times [s], places of the tip, both shape (m,), and the first mode, all in the engine."""
     antenna, timestep = config.antenna, config.physics.timestep
     bench = Bench(compile_bench(config.physics, antenna), antenna)
@@ -135,7 +132,6 @@ def _let_go(
     angles, speeds = np.empty((2, ticks + 1, antenna.hinges + 1))
     tip = np.empty(ticks + 1)
     for tick in range(ticks + 1):
-        watch(bench)
         angles[tick], speeds[tick] = bench.chain()
         tip[tick] = bench.tip()[1]
         bench.step(1)
@@ -255,15 +251,6 @@ def _draw_cones(panel: Axes, cones: Sequence[Cone]) -> None:
     panel.set_title("A cone as a chain")
 
 
-_SPEED = 0.2
-"""Speed of the film over that of the antenna: the robot's swings 3 times in 1.2 s."""
-
-
-def _film(config: RingdownConfig, condition: str, trial: int, watch: Watch) -> str:
-    run(config, watch)
-    return f"let go, {1 / _SPEED:g} times slower"
-
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     RingdownConfig,
@@ -272,7 +259,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=RingdownResult,
     figures=figures,
-    films=bench_films(lambda config: ["antenna"], _film, None, _SPEED, ".1f"),
     captions={
         "ringdown": "The swing of the antenna after it is let go, animals beside it, and a "
         "cone as a chain.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from itertools import product
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from antennate.antenna.statics import Profile, with_profile
-from antennate.experiments.bench import bench_films
 from antennate.experiments.sweep.estimates import (
     CUES,
     Trial,
@@ -40,7 +38,6 @@ from antennate.experiments.sweep.result import (
     Swept,
 )
 from antennate.params.bench import SweepParams
-from antennate.sim.bench import Watch
 from antennate.studies.columns import columns, shown
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, gather
@@ -127,7 +124,6 @@ def map_cell(
     distance: float,
     centre: float,
     amplitude: float,
-    watch: Watch | None = None,
 ) -> tuple[SweepRow, Outlines | None]:
     """Sweep in one cell of the map and share out the time between the shapes."""
     sweep = SweepParams(centre=centre, amplitude=amplitude, frequency=config.sweep.frequency)
@@ -140,7 +136,6 @@ def map_cell(
         config.sweeps + 1,
         config.speed if motion == "moving" else 0.0,
         config.shape.gap,
-        watch,
     )
     shape: dict[str, Any] = {}
     if not trace.reason:
@@ -257,16 +252,6 @@ def sentence(result: SweepResult) -> str:
     )
 
 
-def _film(config: SweepConfig, profile: Profile, trial: int, watch: Watch) -> str:
-    """Sweep in the middle cell of the map, the base at rest, for a film; the title."""
-    axes = (config.distances, config.centres, config.amplitudes)
-    distance, centre, amplitude = (axis[len(axis) // 2] for axis in axes)
-    row, _ = map_cell(config, profile, "fixed", trial, distance, centre, amplitude, watch)
-    ends = [f"{math.degrees(centre + side * amplitude):.0f}" for side in (-1, 1)]
-    invalid = f": {row.status}" if row.reason else ""
-    return f"{profile}, {' to '.join(ends)} deg{invalid}"
-
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     SweepConfig,
@@ -275,7 +260,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=SweepResult,
     row=SweepRow,
-    films=bench_films(lambda config: config.profiles, _film, "wall"),
     files=lambda outcome: (
         {"points.csv": outlines_csv(outcome.outlines)} if outcome.outlines else {}
     ),

@@ -26,7 +26,7 @@ from antennate.params.bench import EstimateParams, ShapeParams, SweepParams
 from antennate.params.control import ConditioningParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
-from antennate.sim.bench import Bar, Bench, Watch, compile_bench
+from antennate.sim.bench import Bar, Bench, compile_bench
 from antennate.types import Bools, Floats
 
 
@@ -163,7 +163,6 @@ def record(
     sweeps: float,
     speed: float = 0.0,
     gap: float = 5e-4,
-    watch: Watch | None = None,
 ) -> Trace:
     """Sweep beside a wall.
 
@@ -175,7 +174,6 @@ def record(
         sweeps: How many sweeps.
         speed: Speed of the base along the heading [m/s].
         gap: Distance to the wall that counts as touching [m].
-        watch: Looks at the bench after each physics step.
     """
     bench, rate = Bench(compile_bench(physics, antenna, [wall.bar()]), antenna), antenna.sensor.rate
     bench.place(0.0, 0.0, 0.0)
@@ -187,7 +185,7 @@ def record(
         while bench.t < end:
             t = bench.t
             bench.command(way(t, speed), 0.0, speed_at(t, speed), 0.0, commanded(sweep, t))
-            bench.step(steps, watch)
+            bench.step(steps)
             joints, base = bench.joints(), bench.base_angle()
             tip = joints[-1] - joints[0]
             near = wall.distance - float((joints @ wall.normal).max()) - antenna.radius

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from antennate.antenna import sensor
-from antennate.antenna.statics import Chain, Profile, about, equilibrium, with_profile
+from antennate.antenna.statics import Chain, about, equilibrium, with_profile
 from antennate.control.conditioning import bending_level
-from antennate.errors import BadInputError
 from antennate.experiments.touch.measures import Pool, roc
 from antennate.experiments.touch.physics import TouchConfig, Traverse, run_traverse
 from antennate.experiments.touch.result import (
@@ -29,17 +28,12 @@ from antennate.experiments.touch.result import (
     Truth,
     WallMeasures,
 )
-from antennate.experiments.touch.sensing import Comparison, compare, readings
-from antennate.sim.bench import Bench
+from antennate.experiments.touch.sensing import Comparison, compare
 from antennate.studies.columns import column_of, shown
 from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers, gather
 from antennate.studies.tables import Table, few
 from antennate.studies.trials import OnStep, no_step
-from antennate.types import Floats
-
-if TYPE_CHECKING:
-    from antennate.telemetry.film import Film
 
 _FLEX = np.linspace(0.0, 2.0 * np.pi, 20001)
 _STRONGEST = 1.0
@@ -289,54 +283,6 @@ def sentence(result: TouchResult) -> str:
     return f"Contact is sensed with an F1 of {scores}, 1 being without error. {over}"
 
 
-def films(config: TouchConfig, trial: int) -> dict[str, Callable[[], Film]]:
-    """A film of each profile, at the wall and the speed of the example."""
-    return {profile: partial(record, config, profile, trial) for profile in config.profiles}
-
-
-def record(config: TouchConfig, profile: Profile, trial: int) -> Film:
-    """Run one traverse and record it; then the control reads it.
-
-    Raises:
-        BadInputError: The physics became invalid.
-    """
-    from antennate.telemetry import film  # slow to import
-
-    recorder, models, ticks = film.FilmRecorder(), [], 0
-    wall, speed = config.example()
-
-    def watch(bench: Bench) -> None:
-        nonlocal ticks
-        models[:] = [bench.model]
-        middle = bench.joints().mean(axis=0)
-        t = ticks / config.antenna.sensor.rate
-        recorder.take(t, bench.data.qpos, middle, tick=ticks)
-        ticks += 1
-
-    traverse = run_traverse(config, wall, speed, profile, trial, watch)
-    sensed = compare(config, [traverse])[0]
-    if sensed is None:
-        raise BadInputError(f"video: {profile}: the physics became invalid: {traverse.reason}")
-    at = recorder.values("tick")
-
-    def column(values: Floats) -> Floats:
-        return values[at][:, np.newaxis]
-
-    level = 1.0 / (1.0 + np.exp(-column(sensed.level)))
-    states = np.stack([sensed.alarm[at], sensed.truth[at]], axis=1).astype(np.int64)
-    return recorder.film(
-        f"{profile}, {wall}, trial {trial}",
-        models[0],
-        film.bench_shot(config.antenna),
-        [
-            film.counts_trace(column(readings(config, [traverse])[:, 0])),
-            film.level_trace(level, config.rule.threshold),
-            film.trace("force [N]", column(traverse.force)),
-        ],
-        film.contact_bands(states, ("sensed", "true")),
-    )
-
-
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TouchConfig,
@@ -345,7 +291,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=TouchResult,
     row=TouchRow,
-    films=films,
     parts="traverses",
     captions={
         "touch": "F1 by speed and by wall, and latencies by speed, a colour for each profile.",

@@ -17,7 +17,7 @@ from antennate.params.control import ConditioningParams, RuleParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, require_own_curve
 from antennate.sim import touch_wall
-from antennate.sim.bench import Bench, Watch, compile_bench, unwatched
+from antennate.sim.bench import Bench, compile_bench
 from antennate.sim.touch_wall import WALLS, Site, WallKind
 from antennate.types import Floats
 
@@ -232,7 +232,6 @@ def run_traverse(
     speed: float,
     profile: Profile,
     trial: int,
-    watch: Watch = unwatched,
 ) -> Traverse:
     """Move the antenna along the wall; trouble in the physics ends the traverse early."""
     one = plan(config, wall, speed, profile, trial)
@@ -246,7 +245,6 @@ def run_traverse(
         for tick in range(one.ticks):
             force = _advance(bench, one, (tick - 1) / one.antenna.sensor.rate) if tick else 0.0
             ticks.append((float(bench.carriage.position[0]), bench.flex(), force))
-            watch(bench)
             if trial == 0:
                 joints.append(bench.joints())
     except SimulationError as error:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from antennate import figures as style
 from antennate.antenna.statics import Profile, about
 from antennate.errors import SimulationError
-from antennate.experiments.bench import bench_films
 from antennate.experiments.wall.physics import (
     Measured,
     Traverse,
@@ -252,12 +251,6 @@ def _draw_boulders(panel: Axes, seen: Traverse) -> None:
         panel.add_patch(Circle((x, y), radius, color=style.MUTED, linewidth=0))
 
 
-def _film(config: WallConfig, profile: str, trial: int, watch: Watch) -> str:
-    """Run one trial for its film; the title."""
-    row, _ = run_trial(config, profile, trial, watch)
-    return f"{profile}, trial {trial}: {row.outcome}"
-
-
 EXPERIMENT = Experiment.of_trials(
     __name__,
     WallConfig,
@@ -274,7 +267,6 @@ EXPERIMENT = Experiment.of_trials(
     sentence,
     result=WallResult,
     figures=figures,
-    films=bench_films(lambda config: config.profiles, _film, "wall"),
     failed=lambda result: any(  # all trials of a profile are invalid
         0 < each.trials == each.invalid for each in result.profiles.values()
     ),
