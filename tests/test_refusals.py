@@ -280,6 +280,7 @@ twin --servos '' :: --servos: expected
 twin --tcp '' :: --tcp: expected
 twin --udp '' :: --udp: expected
 twin --orders '' :: --orders: expected
+twin --orders none/orders :: none/orders: No such file or directory
 twin --key k :: --key: expected
 twin --tcp=: :: expected [HOST:]PORT
 twin --tcp=0.0.0.0 :: expected [HOST:]PORT

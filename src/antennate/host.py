@@ -44,8 +44,6 @@ class HostClock:
 LEVEL = 20
 """Real-time level of the loop: above ordinary programs, below the threads of interrupts at 50
 (sched(7)). The twin's is one higher."""
-_NICEST = 19
-_LINUX = hasattr(os, "sched_setscheduler")
 
 
 class Priority(Enum):
@@ -63,14 +61,14 @@ def urgent(level: int = LEVEL) -> Iterator[Priority]:
     garbage collection (`gc.freeze`), which would delay single ticks. Yields the scheduling that was
     granted; the real-time level is 1 to 99.
     """
-    before = (os.sched_getscheduler(0), os.sched_getparam(0)) if _LINUX else None
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
     gc.collect()
     gc.freeze()
     try:
         yield claim(level)
     finally:
         gc.unfreeze()
-        if before is not None and os.sched_getscheduler(0) != before[0]:
+        if os.sched_getscheduler(0) != before[0]:
             _give_back(*before)
 
 
@@ -91,9 +89,6 @@ def give_way() -> None:
 
     Linux has the class SCHED_IDLE for that; each thread has its own (sched(7)).
     """
-    if not _LINUX:
-        os.nice(_NICEST)
-        return
     for thread in Path("/proc/self/task").iterdir():
         with contextlib.suppress(OSError):  # it has ended
             os.sched_setscheduler(int(thread.name), os.SCHED_IDLE, os.sched_param(0))
@@ -101,8 +96,6 @@ def give_way() -> None:
 
 def claim(level: int = LEVEL) -> Priority:
     """Ask for a real-time level for this thread, for good; the scheduling granted."""
-    if not _LINUX:
-        return Priority.ORDINARY
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(level))
     except OSError:
@@ -110,11 +103,7 @@ def claim(level: int = LEVEL) -> Priority:
     return Priority.REAL_TIME
 
 
-STOPS = tuple(
-    getattr(signal, name)
-    for name in ("SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP")
-    if hasattr(signal, name)
-)
+STOPS = signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP
 """Signals that ask a program to end; a terminal whose connection is lost sends SIGHUP."""
 
 

@@ -6,7 +6,6 @@ answered with one line on stderr. What a command needs is imported when it runs.
 
 from __future__ import annotations
 
-import errno
 import importlib
 import os
 import sys
@@ -207,10 +206,8 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         sys.stderr.write(f"{title}: error: {one_line(reason(error))}\n")
         return BAD_INPUT
     except OSError as error:
-        if error.errno != errno.ENAMETOOLONG:
-            raise
-        found = shortened(str(error.filename))
-        sys.stderr.write(f"{title}: error: expected a shorter name of a file, found {found}\n")
+        where = f"{shortened(str(error.filename))}: " if error.filename is not None else ""
+        sys.stderr.write(f"{title}: error: {one_line(where + reason(error))}\n")
         return BAD_INPUT
 
 

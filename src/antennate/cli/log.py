@@ -22,9 +22,9 @@ from antennate.cli.pages import MODULE, FoxgloveOptions
 from antennate.cli.results import ResultOptions, log_of, show_result
 from antennate.cli.terminal import progress, stop_signals
 from antennate.control.readings import condition
-from antennate.errors import AntennateError, ConfigError, OutputError, reason
+from antennate.errors import AntennateError, ConfigError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
-from antennate.messages import command_words, one_line, shortened, typed
+from antennate.messages import command_words, one_line, typed
 from antennate.params.base import Params, from_values
 from antennate.studies.formats import csv_lines
 from antennate.studies.parquet import require_parquet
@@ -138,18 +138,12 @@ def _target(path: Path, options: LogOptions) -> Path:
     target = options.out or path.with_name(stem + endings[0])
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
-    try:
-        if target.exists() and any(p.exists() and target.samefile(p) for p in parts(path)):
-            raise ConfigError(f"--out: expected another file than the log, found {target}")
-        if _would_continue(target, path):
-            raise ConfigError(
-                f"--out: expected a name that does not continue the log {path}, found {target}"
-            )
-    except OSError as error:
-        raise OutputError(
-            f"--out: expected a name that can be written, found {shortened(str(target))}: "
-            f"{reason(error)}"
-        ) from None
+    if target.exists() and any(p.exists() and target.samefile(p) for p in parts(path)):
+        raise ConfigError(f"--out: expected another file than the log, found {target}")
+    if _would_continue(target, path):
+        raise ConfigError(
+            f"--out: expected a name that does not continue the log {path}, found {target}"
+        )
     return target
 
 

@@ -20,7 +20,7 @@ from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
 from antennate.cli.terminal import StatusLine, stop_signals
-from antennate.errors import BadInputError, ConfigError, OutputError
+from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.config import RecordConfig, RobotFile
 from antennate.hardware.doctor.check import opener_of
 from antennate.hardware.esp32.board import BOARD_BAUD, Board
@@ -89,32 +89,19 @@ class Lines:
         self._count = 0
 
     def __enter__(self) -> Lines:
-        try:
-            self._file = self._path.open("x", encoding="utf-8", newline="\n")
-        except FileExistsError:
-            raise OutputError(
-                f"--out: expected no such file, found {self._path}; choose another name"
-            ) from None
-        except OSError as error:
-            raise self._refused(error) from None
+        self._file = self._path.open("x", encoding="utf-8", newline="\n")
         return self
 
     def write(self, line: str) -> None:
         """One line, at once."""
-        try:
-            self._file.write(line + "\n")
-            self._file.flush()
-            self._count += 1
-        except OSError as error:
-            raise self._refused(error) from None
+        self._file.write(line + "\n")
+        self._file.flush()
+        self._count += 1
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
         if self._count < 2:  # no reading came; an empty file would be in the way
             self._path.unlink()
-
-    def _refused(self, error: OSError) -> OutputError:
-        return OutputError(f"--out: expected to write {self._path}, found: {error.strerror}")
 
 
 class Status:

@@ -103,7 +103,7 @@ def _speed(terminal: int) -> int | None:
     try:
         answer = fcntl.ioctl(terminal, _GET, bytes(struct.calcsize(_LAYOUT)))
         baud = struct.unpack(_LAYOUT, answer)[-1]
-    except OSError:  # not Linux, or not this kind of it
+    except OSError:  # not this kind of Linux
         baud = _NAMED.get(termios.tcgetattr(terminal)[5], 0)
     return None if baud == 50 else baud
 

@@ -293,7 +293,7 @@ class _NewFile(io.BufferedIOBase):
                 os.close(folder)
         try:
             while not self._over.wait(period):
-                getattr(os, "fdatasync", os.fsync)(self._file)  # the bytes, if not its times
+                os.fdatasync(self._file)  # the bytes, if not its times
         except OSError as error:
             self._lost = reason(error)
 

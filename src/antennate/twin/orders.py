@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from antennate.dxl.servo import Servo
-from antennate.errors import BadInputError, reason
+from antennate.errors import BadInputError
 
 _CHUNK = 4096
 _WORDS = (
@@ -200,20 +200,17 @@ class Orders:
         say: Told each order that was carried out, and why one was not.
 
     Raises:
-        BadInputError: It cannot be read.
+        OSError: It cannot be read.
     """
 
     def __init__(self, path: str, say: Callable[[str], None]) -> None:
         self._say = say
         self._rest = b""
         self._mine = path != "-"
-        try:
-            fifo = self._mine and Path(path).is_fifo()
-            # A pipe that is open for writing here too has no end when a writer goes away.
-            way = os.O_RDWR if fifo else os.O_RDONLY
-            self._file: int | None = os.open(path, way | os.O_NONBLOCK) if self._mine else 0
-        except OSError as error:
-            raise BadInputError(f"--orders: cannot read {path}: {reason(error)}") from None
+        fifo = self._mine and Path(path).is_fifo()
+        # A pipe that is open for writing here too has no end when a writer goes away.
+        way = os.O_RDWR if fifo else os.O_RDONLY
+        self._file: int | None = os.open(path, way | os.O_NONBLOCK) if self._mine else 0
 
     @property
     def files(self) -> list[int]:

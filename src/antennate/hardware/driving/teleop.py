@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from antennate.control.controllers import RuleController
-from antennate.errors import BadInputError, reason
+from antennate.errors import BadInputError
 from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams
 from antennate.robots.spec import RobotSpec
@@ -54,7 +54,8 @@ class Gamepad:
         silence: Time without an event after which nothing counts as held [s].
 
     Raises:
-        BadInputError: It cannot be opened, or is no joystick.
+        OSError: It cannot be opened.
+        BadInputError: It is no joystick.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float], silence: float) -> None:
@@ -62,10 +63,7 @@ class Gamepad:
         self._held: set[int] = set()
         self._rest, self._clock, self._silence = b"", clock, silence
         self._newest = clock()
-        try:
-            self._handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-        except OSError as error:
-            raise BadInputError(f"--gamepad: cannot open {path}: {reason(error)}") from None
+        self._handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         if not self._greeted():
             os.close(self._handle)
             raise BadInputError(
