@@ -26,7 +26,8 @@ from measuring import in_turn, ratios, spread, wall_seconds
 
 from antennate.control.gait import Gait
 from antennate.experiments.tunnel import experiment as experiment
-from antennate.experiments.tunnel.batch import Bodies, cpu_bodies, run_trials
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus, Bodies, cpu_bodies
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.sim.scenes.registry import make_scene
 from antennate.sim.scenes.scene import Scene
@@ -102,7 +103,7 @@ def on_threads(config: TunnelConfig, trials: int, pool: Executor) -> list[TrialR
         made = [cpu_bodies(config)(len(range(batch)[i : i + size])) for i in range(0, batch, size)]
         return made[0][0], cast(Bodies, Halves([part for _, part in made], size, pool))
 
-    return rows_of(config, range(trials), bodies=bodies)
+    return rows_of(config, range(trials), apparatus=Apparatus(bodies=bodies))
 
 
 def shared(config: TunnelConfig, trials: int, pool: Executor) -> list[TrialResult]:

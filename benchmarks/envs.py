@@ -27,7 +27,8 @@ from trial import prepare
 
 import antennate.envs
 from antennate.envs import episodes
-from antennate.experiments.tunnel import batch as experiment
+from antennate.experiments.tunnel import lockstep
+from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TunnelConfig
 
 SECONDS = 4.0
@@ -47,8 +48,8 @@ def ticks(batch: int, repetitions: int) -> dict[str, Any]:
 
     def trials(name: str) -> float:
         starts = prepare(config, batch)
-        with mock.patch.object(experiment, "draw_trial", lambda _, __, i, *___: starts[i]):
-            run = lambda: experiment.run_trials(config, name, range(batch), lambda _: None, batch)  # noqa: E731
+        with mock.patch.object(lockstep, "draw_trial", lambda _, __, i, *___: starts[i]):
+            run = lambda: run_trials(config, name, range(batch), lambda _: None, batch)  # noqa: E731
             seconds = cpu_seconds(run)
         ends[name] = np.array([start.world.head for start in starts])
         return count / seconds

@@ -23,7 +23,6 @@ from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
-from antennate.sim.judge import LOOK_EVERY, time_limit_of
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, scene_of
 from antennate.types import AntennaFrame, Controller, JointCommand
@@ -60,8 +59,7 @@ class Trial:
         self._config, self._body, self._joints = config, body, Joints(config.robot)
         self._control = make_controller(name, config.control, config.robot)
         self._control.reset(np.array([0]), start.phase)
-        limit = time_limit_of(start.scene, config.time_limit)
-        self._monitor = TrialMonitor(config.seed, number, name, start.scene, [], limit)
+        self._monitor = TrialMonitor(start.episode(config.time_limit), name)
         kinds = [config.robot.servos.of(kind) for kind in config.robot.servo_names]
         self._stall = np.array([kind.stall_torque for kind in kinds])
         self.following = Following(self._joints, FollowingParams())
@@ -82,11 +80,8 @@ class Trial:
             self.following.drive(world.t, at, int(pwm[at]), int(positions[at]))
             self.saturated += abs(int(pwm[at])) >= FULL_DRIVE - 1
         self._goals = self._joints.ticks(command).astype(float)
-        if self._body.failures:
-            self.status = "invalid"
-        elif self.ticks % LOOK_EVERY == 0 or world.t >= self._monitor.time_limit:
-            maneuver = int(self._control.maneuver[0])
-            self.status = self._monitor.look(world, world.t, maneuver) or ""
+        maneuver = int(self._control.maneuver[0])
+        self.status = self._monitor.tick(world, maneuver, self._body.failures.get(0)) or ""
         return not self.status
 
 

@@ -22,6 +22,7 @@ from typing import Any
 
 from antennate.errors import AntennateError
 from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.experiments.tunnel.warp import room_for
 from antennate.sim.scenes.registry import make_scene
@@ -55,7 +56,7 @@ def measured(
         range(batch),
         lambda found: rows.append(found[0]),
         batch,
-        bodies=lambda _: (scene, robot),
+        apparatus=Apparatus(bodies=lambda _: (scene, robot)),
     )
     ticks = len(robot.times) - WARM_UP - 1
     whole = robot.times[-1] - robot.times[WARM_UP]

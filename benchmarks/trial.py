@@ -26,7 +26,9 @@ import numpy as np
 from measuring import cpu_seconds, in_turn, ratios, spread
 
 from antennate.control.registry import make_controller
-from antennate.experiments.tunnel import batch as experiment
+from antennate.experiments.tunnel import lockstep
+from antennate.experiments.tunnel.batch import BATCH, run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.places import Gears
 from antennate.sim.scenes.tunnel import TunnelScene
@@ -35,7 +37,7 @@ from antennate.sim.world import PREFIX, World
 from antennate.types import AntennaFrame, Controller, Floats, JointCommand
 
 CONTROLLER = "closed"
-LOCKSTEP = experiment.BATCH
+LOCKSTEP = BATCH
 """Trials the program steps at once."""
 HUMANOID_STEPS = 10_000
 HUMANOID_STEP = 0.005
@@ -58,8 +60,8 @@ def prepare(config: TunnelConfig, trials: int) -> list[Trial]:
 
 def run_whole(config: TunnelConfig, starts: list[Trial], batch: int, **more: Any) -> None:
     """Run prepared trials as `antennate tunnel` does."""
-    with mock.patch.object(experiment, "draw_trial", lambda _, __, trial, *___: starts[trial]):
-        experiment.run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch, **more)
+    with mock.patch.object(lockstep, "draw_trial", lambda _, __, trial, *___: starts[trial]):
+        run_trials(config, CONTROLLER, range(len(starts)), lambda _: None, batch, **more)
 
 
 @contextmanager
@@ -262,7 +264,7 @@ def frames_of(config: TunnelConfig, trials: int) -> list[AntennaFrame]:
         kept.append(Noting(make_controller(name, *arguments)))
         return kept[-1]
 
-    run_whole(config, prepare(config, trials), trials, make=make)
+    run_whole(config, prepare(config, trials), trials, apparatus=Apparatus(make))
     return [frame for frame in kept[0].frames if np.isfinite(frame.t).all()]
 
 

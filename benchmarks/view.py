@@ -29,6 +29,7 @@ from unittest import mock
 import pace
 
 from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.world import World
 from antennate.telemetry.simulated import Decisions, SimulatedLog
@@ -58,9 +59,8 @@ def trial(config: TunnelConfig, number: int, logs: Path | None, page: ViewProces
         return view.tick(world.model, world.data, frame, control)
 
     kept: list[Any] = []
-    run_trials(
-        config, CONTROLLER, [number], kept.append, logs=logs, watch=watch, make=view.controller
-    )
+    seen = Apparatus(view.controller, watch=watch)
+    run_trials(config, CONTROLLER, [number], kept.append, logs=logs, apparatus=seen)
 
 
 class InTurn:

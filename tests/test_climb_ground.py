@@ -67,7 +67,7 @@ def placed(word: str, x: float, z: float) -> tuple[Any, Any, Criterion]:
     head = scene.edges[-1].x + x + (robot.links - 1) * robot.link_pitch
     legs, higher = np.zeros((robot.links, 2)), z - scene.ground
     world.place(head, 0.0, 0.0, np.zeros(robot.yaw_count), legs, higher)
-    return world, scene, Criterion(by_ground[word], scene, robot.link_pitch, 60.0)
+    return world, scene, Criterion(by_ground[word], start.episode(60.0), robot.link_pitch)
 
 
 @pytest.mark.parametrize(

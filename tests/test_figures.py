@@ -29,7 +29,8 @@ from antennate.experiments.taper import experiment as taper
 from antennate.experiments.taper.experiment import TaperConfig
 from antennate.experiments.taper.experiment import run as run_taper
 from antennate.experiments.tunnel import figure as tunnel
-from antennate.experiments.tunnel.batch import SHOWN_TRIALS, run_trials
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import SHOWN_TRIALS
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.experiments.wall import experiment as wall
 from antennate.experiments.wall.physics import Traverse

@@ -17,7 +17,8 @@ from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.judge import Judge
+from antennate.sim.episode import Episode
+from antennate.sim.judge import LOOK_EVERY, Judge
 from antennate.sim.places import HEIGHT_LIMIT
 from antennate.sim.scenes.ground import Edge, Ground, GroundScene
 from antennate.sim.scenes.registry import make_scene
@@ -202,14 +203,19 @@ def on_its_back(world: World, share: float = 1.0) -> Any:
     return world
 
 
+def looked(monitor: TrialMonitor, world: Any) -> Any:
+    """How a trial has ended for a robot that stands so until it is looked at."""
+    return [monitor.tick(world, 0) for _ in range(LOOK_EVERY)][-1]
+
+
 def watched(name: str) -> tuple[World, TrialMonitor]:
     """A robot at the start of a scene, and who says how its trial ends: not yet."""
     scene = make_scene(name).draw(ROBOT, np.random.default_rng(0))
     world = make_world(PhysicsParams(), ROBOT, scene)
     place_at_start(world, scene, GaitParams())
     mujoco.mj_kinematics(world.model, world.data)
-    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
-    assert monitor.look(world, 0.1, 0) is None
+    monitor = TrialMonitor(Episode(scene, 10.0), "open")
+    assert looked(monitor, world) is None
     return world, monitor
 
 
@@ -227,7 +233,7 @@ def test_robots_on_their_backs_have_overturned_where_the_ground_is_not_flat(
     name: str, share: float, outcome: str | None
 ) -> None:
     world, monitor = watched(name)
-    assert monitor.look(on_its_back(world, share), 0.2, 0) == outcome
+    assert looked(monitor, on_its_back(world, share)) == outcome
 
 
 @pytest.mark.parametrize(
@@ -246,7 +252,7 @@ def test_a_robot_with_one_link_far_below_the_ground_where_it_began_has_fallen(
     """The criterion, on its tail that is lowered by hand; flat floors have nothing below them."""
     world, monitor = watched(name)
     world.data.xpos[world.places.links[-1], 2] -= lower
-    assert monitor.look(world, 0.2, 0) == outcome
+    assert looked(monitor, world) == outcome
 
 
 def test_who_walks_into_a_wide_gap_falls_and_that_is_a_failure_of_the_table() -> None:
@@ -267,7 +273,7 @@ def test_who_walks_into_a_wide_gap_falls_and_that_is_a_failure_of_the_table() ->
 
 def test_who_is_out_has_succeeded_on_its_back_too() -> None:
     scene = Ground([Edge(0.4, 0.1)], 0.72)
-    monitor = TrialMonitor(0, 0, "open", scene, [], 10.0)
-    world: Any = SimpleNamespace(overturned=True, obstacle_force=lambda: 0.0)
-    world.head = np.array([1.13, 0.0, 0.1])
-    assert monitor.look(world, 0.1, 0) == "success"
+    monitor = TrialMonitor(Episode(scene, 10.0), "open")
+    world: Any = SimpleNamespace(t=0.1, overturned=True, obstacle_force=lambda: 0.0)
+    world.head, world.bends = np.array([1.13, 0.0, 0.1]), lambda: np.zeros(0)
+    assert looked(monitor, world) == "success"

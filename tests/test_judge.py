@@ -155,6 +155,8 @@ def test_an_exit_that_is_no_line_is_said(line: Any) -> None:
 class Robot:
     """What a judge looks at: a robot that lies with its head and its lowest link so."""
 
+    t = 0.0
+
     def __init__(self, head: float, overturned: bool = False, lowest: float = 0.0) -> None:
         self.head, self.overturned, self.lowest = np.array([head, 0.0]), overturned, lowest
 
@@ -194,5 +196,6 @@ def test_how_an_episode_with_a_limit_of_5_s_ends(
     if not flat:
         scene.ground = 0.0  # type: ignore[attr-defined]
     judge = Judge(scene, 5.0, on_its_back=anywhere)
-    assert judge.watch(Robot(IN), 0.0) is None
-    assert judge.watch(robot, t) == outcome
+    assert judge.watch(Robot(IN)) is None
+    robot.t = t
+    assert judge.watch(robot) == outcome

@@ -15,6 +15,7 @@ from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, LogError, SceneError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.experiment import EXPERIMENT, check
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
@@ -248,7 +249,7 @@ def test_a_controller_of_ones_own_gets_what_it_asks_for() -> None:
         return made[-1]
 
     config = TunnelConfig(**{**SHORT, "time_limit": 0.2})
-    run_trials(config, "open", [0, 1], lambda row: None, make=make)
+    run_trials(config, "open", [0, 1], lambda row: None, apparatus=Apparatus(make))
     assert made[0].got
     for known in made[0].got:
         assert known.side is not None

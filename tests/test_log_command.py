@@ -27,6 +27,7 @@ from worlds import recorded, session
 from antennate import simulate
 from antennate.cli import main
 from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
@@ -498,7 +499,9 @@ def test_forces_and_coordinates_in_a_log_are_those_of_their_tick(tmp_path: Path)
         seen[float(frame.t[0])] = world.obstacle_force(), world.data.qpos.tolist()
         return []
 
-    run_trials(config, "open", [0], lambda found: None, logs=tmp_path, watch=watch)
+    run_trials(
+        config, "open", [0], lambda found: None, logs=tmp_path, apparatus=Apparatus(watch=watch)
+    )
     looks = pushed = 0
     with LogReader(tmp_path / "open-0.mcap") as log:
         for records, tick in log.groups():

@@ -10,6 +10,8 @@ import pytest
 
 from antennate.experiments.tunnel.physics import TrialMonitor
 from antennate.robots.spec import RobotSpec
+from antennate.sim.episode import Episode
+from antennate.sim.judge import LOOK_EVERY
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import Route
 
@@ -17,17 +19,18 @@ from antennate.sim.scenes.scene import Route
 def walked(heads: list[tuple[float, float]], bends: np.ndarray) -> Any:
     """The row of a robot whose head was seen at these places of a bent corridor of 1 + 1 m."""
     scene = Route(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]))
-    monitor = TrialMonitor(0, 0, "open", scene, [], 100.0)
+    monitor = TrialMonitor(Episode(scene, 100.0), "open")
     world: Any = SimpleNamespace(
         t=1.0, robot=RobotSpec(), obstacle_force=lambda: 0.0, overturned=False
     )
-    for angles in bends:
+    still = np.tile(bends[-1], (len(heads) * LOOK_EVERY - len(bends), 1))
+    for tick, angles in enumerate([*bends, *still]):
         world.bends = lambda angles=angles: angles
-        monitor.bend(world)
-    for x, y in heads:
-        world.head = np.array([x, y, 0.03])
-        monitor.look(world, 0.1, 0)
-    return monitor.result(world, "timeout", "", np.ones(5, int))
+        world.head = np.array([*heads[tick // LOOK_EVERY], 0.03])
+        assert monitor.tick(world, 0) is None
+    world.t = 100.0
+    assert monitor.tick(world, 0) == "timeout"
+    return monitor.result(world)
 
 
 def test_who_stands_still_off_the_middle_is_not_farther_off() -> None:

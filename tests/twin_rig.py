@@ -29,7 +29,6 @@ from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
 from antennate.port import Port
-from antennate.sim.judge import LOOK_EVERY, time_limit_of
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, scene_of
 from antennate.twin.config import TwinConfig, watched
@@ -89,8 +88,7 @@ class Watch:
         self.body.load(0, start.world, start.chance)
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
-        self._limit = time_limit_of(start.scene, config.time_limit)
-        self._monitor = TrialMonitor(config.seed, trial, name, start.scene, [], self._limit)
+        self._monitor = TrialMonitor(start.episode(config.time_limit), name)
         self.maneuvers: list[int] = []
         self.counts: list[tuple[float, float]] = []
         self.status = ""
@@ -101,11 +99,8 @@ class Watch:
         self.maneuvers.append(maneuver)
         left, right = frame.counts[0].tolist()
         self.counts.append((left, right))
-        world = self.body.world(0)
-        if self.body.failures:
-            self.status = "invalid"
-        elif len(self.maneuvers) % LOOK_EVERY == 0 or world.t >= self._limit:
-            self.status = self._monitor.look(world, world.t, maneuver) or ""
+        failure = self.body.failures.get(0)
+        self.status = self._monitor.tick(self.body.world(0), maneuver, failure) or ""
         return not self.status
 
     def decisions(self) -> Decisions:

@@ -24,7 +24,8 @@ from scipy.stats import t as student
 
 from antennate.control.knowledge import KNOWABLE, Knowing, Knowledge
 from antennate.control.registry import make_controller
-from antennate.experiments.tunnel.batch import cpu_bodies, run_trials
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus, cpu_bodies
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
 from antennate.sim.knowledge import SIDE_AHEAD, angle_ahead
@@ -150,8 +151,7 @@ def run_task(folder: Path, scene: str, condition: str, first: int) -> str:
     numbers = list(range(first, first + AT_ONCE))
     run_trials(
         *(config, name, numbers, lambda found: rows.append(asdict(found[0]))),
-        make=make,
-        bodies=bodies,
+        apparatus=Apparatus(make, bodies),
     )
     samples = np.array(made[0].samples, np.float32)
     samples[:, 0] += first

@@ -18,7 +18,7 @@ from antennate.params.gaits import GaitParams
 from antennate.params.scene import GRAVITY, PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
-from antennate.sim.judge import Judge
+from antennate.sim.episode import Episode
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.trial import MEMBERS, make_world, place_at_start, require_room
 from antennate.sim.world import World, compile_world
@@ -417,9 +417,9 @@ def _check_exit(drawn: SceneInstance) -> None:
 
 def _ended(drawn: SceneInstance, *heads: Floats) -> str | None:
     """How a trial ends whose head is seen at these places, one after the other."""
-    judge = Judge(drawn)
     try:
-        return [judge.look(head.copy()) for head in heads][-1]
+        episode = Episode(drawn)
+        return [episode.judge.look(head.copy()) for head in heads][-1]
     except AntennateError as error:
         raise AssertionError(f"expected to be told how a trial ends, found: {error}") from error
 

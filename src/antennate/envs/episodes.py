@@ -20,8 +20,8 @@ from antennate.envs.config import EnvConfig, Randomisation, varied
 from antennate.envs.reward import terms_of
 from antennate.envs.truth import OUTCOMES, Truth, replace_rows
 from antennate.errors import SceneError
-from antennate.sim.judge import LOOK_EVERY, Judge, Outcome, progress_of, time_limit_of
-from antennate.sim.scenes.scene import Scene, SceneInstance
+from antennate.sim.episode import Episode
+from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import Trial, draw_trial, require_room, scene_of
 from antennate.sim.world import World
@@ -29,26 +29,6 @@ from antennate.types import AntennaFrame, Bools, Floats, Ints
 
 _MOST_SKIPPED = 100
 """Episodes in a row without room for the robot, after which a scene is given up."""
-
-
-@dataclass(slots=True)
-class Episode:
-    """One episode as it runs.
-
-    Attributes:
-        seed, number: What it follows from.
-        scene: Its scene.
-        judge: Says when the head is out, or has left.
-        progress: Progress at the last decision [m].
-        decisions: Decisions so far.
-    """
-
-    seed: int
-    number: int
-    scene: SceneInstance
-    judge: Judge
-    progress: float = 0.0
-    decisions: int = 0
 
 
 @dataclass(slots=True)
@@ -105,10 +85,7 @@ class Episodes:
         self._straight = float(sensor.counts(robot.antenna.sensor, np.zeros(1))[0])
         self._affine = config.randomise.sensor_gain != (1.0, 1.0)
         self._affine |= config.randomise.sensor_offset != (0.0, 0.0)
-        self._count: Ints = np.zeros(batch, np.int64)
-        self._limits: Floats = np.full(batch, np.inf)
-        self._t: Floats = np.full(batch, np.nan)
-        self._ticks = 0
+        self._ticks, self._most = 0, config.max_episode_steps
         self.size = self._observer.size
 
     @property
@@ -138,7 +115,7 @@ class Episodes:
         """
         self._load(rows)
         some = rows if (~rows & self.running).any() else None
-        self._observer.feel(self._given(self._body.read(some), some), some)
+        self._observer.feel(self._given(self._body.read(some)), some)
         return self._observer.look(self._actor, rows), self._begun(rows)
 
     def step(self, answers: Floats, fresh: Bools, again: bool) -> Decision:
@@ -154,15 +131,12 @@ class Episodes:
         last = np.zeros((self._batch, self.size), np.float32)
         truth = Truth.empty(self._batch)
         self._actor.decide(answers, running)
-        for episode in self._episodes.values():
-            episode.decisions += 1
         for tick in range(1, self.config.interface.ticks + 1):
             whole = tick == self.config.interface.ticks
             command = self._actor.step(self._observer.unknown)
             self._body.write(command)
             self._observer.told(command)
             self._ticks += 1
-            self._count += 1
             over = self._judge(truth, whole)
             if over.any():
                 last[over] = self._observer.look(self._actor, over)[over]
@@ -179,9 +153,8 @@ class Episodes:
         start = replace_rows(truth, self._begun(begun), begun) if begun.any() else truth
         return Decision(observation, truth, ended, begun, last, start)
 
-    def _given(self, frame: AntennaFrame, rows: Bools | None = None) -> AntennaFrame:
+    def _given(self, frame: AntennaFrame) -> AntennaFrame:
         """What the policy is given of a frame."""
-        self._t = frame.t if rows is None else np.where(rows, frame.t, self._t)
         if self._affine:
             change = self._gains * (frame.counts - self._straight) + self._offsets
             counts = np.clip(np.rint(self._straight + change), 0.0, sensor.FULL_SCALE)
@@ -192,7 +165,6 @@ class Episodes:
         """Put the next episode into some rows."""
         for row in np.flatnonzero(rows).tolist():
             one, phase = np.array([row]), self._draw(row)
-            self._count[row] = 0
             self._actor.reset(one, phase)
             self._observer.reset(one)
             self._readings.reset(one)
@@ -206,15 +178,14 @@ class Episodes:
             try:
                 trial, gains, offsets = draw_episode(self.config, self._scene, seed, number)
                 require_room(trial.world)
-                limit = time_limit_of(trial.scene, self.config.time_limit)
-                progress = progress_of(trial.scene, trial.world.head[:2])
+                episode = trial.episode(self.config.time_limit, on_its_back=True)
+                episode.progress_of(trial.world.head[:2])
             except SceneError as error:
                 trouble = error
                 continue
             self._body.load(row, trial.world, trial.chance)
-            self._gains[row], self._offsets[row], self._limits[row] = gains, offsets, limit
-            judge = Judge(trial.scene, limit, on_its_back=True)
-            self._episodes[row] = Episode(seed, number, trial.scene, judge, progress)
+            self._gains[row], self._offsets[row] = gains, offsets
+            self._episodes[row] = episode
             return trial.phase
         raise SceneError(
             f"expected an episode that can begin, found {_MOST_SKIPPED} that cannot: {trouble}"
@@ -222,41 +193,28 @@ class Episodes:
 
     def _judge(self, truth: Truth, whole: bool) -> Bools:
         """End the episodes that are over at this tick; their rows, shape (B,)."""
-        over = np.zeros(self._batch, bool)
-        for row, error in [*self._body.failures.items()]:
-            if row in self._episodes:
-                self._end(row, truth, "invalid", str(error))
-                over[row] = True
-        most = self.config.max_episode_steps
-        late = self._t >= self._limits
-        due = (self._count % LOOK_EVERY == 0) | late | (whole and most is not None)
-        for row in np.flatnonzero(due).tolist():
-            if (episode := self._episodes.get(row)) is None:
-                continue
-            looks = late[row] or not self._count[row] % LOOK_EVERY
-            outcome, reason = self._look(row, episode) if looks else (None, "")
-            if outcome is None and whole and episode.decisions == most:
-                outcome = "timeout"
-            if outcome is not None:
-                self._end(row, truth, outcome, reason)
-                over[row] = True
+        over, failures = np.zeros(self._batch, bool), self._body.failures
+        for row, episode in self._episodes.items():
+            episode.tick(self._body.world(row), failures.get(row))
+            if whole and episode.outcome is None and self._decisions(episode) == self._most:
+                episode.outcome = "timeout"
+            over[row] = episode.outcome is not None
+        for row in np.flatnonzero(over).tolist():
+            self._end(row, truth)
         return over
 
-    def _look(self, row: int, episode: Episode) -> tuple[Outcome | None, str]:
-        """How the episode of a row has ended, None if it goes on, and why it is invalid."""
-        try:
-            return episode.judge.watch(self._body.world(row), float(self._t[row])), ""
-        except SceneError as error:
-            return "invalid", str(error)
+    def _decisions(self, episode: Episode) -> int:
+        """Decisions of an episode so far, that which goes on among them."""
+        return math.ceil(episode.ticks / self.config.interface.ticks)
 
-    def _end(self, row: int, truth: Truth, outcome: Outcome, reason: str) -> None:
+    def _end(self, row: int, truth: Truth) -> None:
         """Note how the episode of a row ended, and empty the row."""
-        truth.outcome[row] = OUTCOMES.index(outcome)
-        if reason:
-            truth.reason[row] = reason
+        episode = self._episodes[row]
+        truth.outcome[row] = OUTCOMES.index(episode.outcome)
+        if episode.reason:
+            truth.reason[row] = episode.reason
         self._note(truth, [row])
         del self._episodes[row]
-        self._limits[row] = np.inf
         self._body.unload(row)
 
     def _note(self, truth: Truth, rows: Iterable[int], begins: bool = False) -> None:
@@ -270,21 +228,21 @@ class Episodes:
             truth.force[row] = world.obstacle_force()
             truth.maneuver[row] = self._actor.maneuver[row]
             if truth.outcome[row] != OUTCOMES.index("invalid"):
-                before, episode.progress = episode.progress, progress_of(scene, head)
+                before, progress = episode.progress, episode.progress_of(head)
                 if not begins:
                     out = truth.outcome[row] == OUTCOMES.index("success")
-                    gain = episode.progress - before
+                    gain = progress - before
                     failed = not out and truth.outcome[row] >= 0
-                    remaining = self._remaining(row, episode) if failed else 0
+                    remaining = self._remaining(episode, world.t) if failed else 0
                     truth.terms[row] = terms_of(scene, gain, head, out, remaining)
             truth.progress[row] = episode.progress
 
-    def _remaining(self, row: int, episode: Episode) -> int:
-        """Whole decisions that remain until the limit of an episode."""
+    def _remaining(self, episode: Episode, t: float) -> int:
+        """Whole decisions that remain at time t [s] until the limit of an episode."""
         seconds = self.config.interface.ticks * self.config.control.period
-        remaining = math.floor((self._limits[row] - self._t[row]) / seconds + 1e-6)
-        if (most := self.config.max_episode_steps) is not None:
-            remaining = min(remaining, most - episode.decisions)
+        remaining = math.floor((episode.limit - t) / seconds + 1e-6)
+        if self._most is not None:
+            remaining = min(remaining, self._most - self._decisions(episode))
         return max(0, remaining)
 
     def _begun(self, rows: Bools) -> Truth:

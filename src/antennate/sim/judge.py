@@ -1,10 +1,6 @@
 """How an episode ends: at the exit, outside, on its back, in a fall, or out of time.
 
-An episode is one robot in one drawn scene with one controller, from a seed and a number, until its
-judge says how it ended. In `tunnel`, `climb` and `compete` it is a trial, a row of the table; other
-experiments have trials of another kind, as a push or a passage. Who lets time pass asks the judge,
-and stops: `experiments/tunnel/batch.py` for many trials at once, `studies/simulate.py`,
-`envs/episodes.py`, `experiments/climb/physics.py`, and the twin.
+An `Episode` (`sim/episode.py`) asks its judge; whoever lets time pass asks the episode.
 """
 
 from __future__ import annotations
@@ -34,6 +30,11 @@ depth of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
 
 class Walker(Protocol):
     """A robot in its scene, on the CPU or in a batch on a device."""
+
+    @property
+    def t(self) -> float:
+        """Time since its start [s]."""
+        ...
 
     @property
     def head(self) -> Floats:
@@ -73,14 +74,14 @@ class Judge:
         self._head: Floats = np.array(scene.start[:2], float)
         self._crossings = 0
 
-    def watch(self, world: Walker, t: float) -> Outcome | None:
-        """How the episode has ended with the robot so at time t [s]; None if it goes on.
+    def watch(self, world: Walker) -> Outcome | None:
+        """How the episode has ended with the robot as it is now; None if it goes on.
 
         Raises:
             SceneError: The scene raises an exception, or does not say True or False.
         """
         seen = self.look(world.head[:2]) or self._mishap(world)
-        return in_time(seen, t, self.limit)
+        return in_time(seen, world.t, self.limit)
 
     def look(self, head: Floats) -> Literal["success", "left"] | None:
         """How the episode has ended with the head at this position, shape (2,); None if it goes on.

@@ -25,6 +25,7 @@ from antennate.params.scene import (
 )
 from antennate.robots.antenna import require_own_curve
 from antennate.robots.spec import RobotSpec
+from antennate.sim.episode import Episode
 from antennate.sim.scenes.ground import READS
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
@@ -119,12 +120,27 @@ class Trial:
         chance: What chance does to it.
         phase: Gait phase [rad].
         scene: The scene that was drawn.
+        seed, number: What it follows from.
     """
 
     world: World
     chance: Disturbance
     phase: float
     scene: SceneInstance
+    seed: int
+    number: int
+
+    def episode(self, limit: float | None = None, on_its_back: bool = False) -> Episode:
+        """The episode that begins so.
+
+        Args:
+            limit: Time after which it has failed [s]; None for that of the scene.
+            on_its_back: Whether a robot on its back ends it in any scene.
+
+        Raises:
+            SceneError: The time limit of the scene is no time.
+        """
+        return Episode(self.scene, limit, on_its_back, self.seed, self.number)
 
 
 def draw_trial(
@@ -152,7 +168,7 @@ def draw_trial(
     lateral, heading = lateral * variation.start_lateral, heading * variation.start_heading
     place_at_start(world, drawn, gait, phase, lateral, heading)
     chance = Disturbance(for_chance, variation, robot, period)
-    return Trial(world, chance, phase, drawn)
+    return Trial(world, chance, phase, drawn, config.seed, trial)
 
 
 def draw_scene(config: TrialConfig, scene: Scene, trial: int) -> SceneInstance:

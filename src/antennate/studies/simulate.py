@@ -16,7 +16,7 @@ from antennate.errors import ConfigError, ControllerError
 from antennate.params.base import from_values
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.judge import LOOK_EVERY, Judge, time_limit_of
+from antennate.sim.episode import Episode
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import (
     Trial,
@@ -86,8 +86,7 @@ def simulate(
     robot = SimRobot(1, config.robot, control.period, config.physics.timestep)
     robot.load(0, start.world, start.chance)
     controlling.reset(np.array([0]), start.phase)
-    limit = time_limit_of(start.scene, time_limit)
-    walk = _Walk(config.robot, robot, controlling, start, limit)
+    walk = _Walk(config.robot, robot, controlling, start, start.episode(time_limit))
     name = controller
     if not isinstance(name, str):  # without a name in a registry
         name = str(getattr(controller, "__name__", type(controller).__name__))
@@ -113,7 +112,7 @@ def simulate(
             "trial": trial,
             "period_s": control.period,
             "threshold": control.rule.threshold,
-            "outcome": walk.outcome,
+            "outcome": walk.episode.outcome,
         }
     )
 
@@ -126,14 +125,14 @@ class _Walk:
         robot: The robot, with the trial in its only row.
         controller: What moves it.
         start: The trial.
-        time_limit: Time after which it ends [s].
+        episode: Its episode.
 
     Attributes:
+        episode: As given.
         checked: The controller with its answers checked.
         recorder: What was read, decided and commanded.
         decisions: The same for a log.
         log: Takes them, None if none is kept.
-        outcome: How it has ended, `timeout` so far.
     """
 
     def __init__(
@@ -142,29 +141,22 @@ class _Walk:
         robot: SimRobot,
         controller: Controller,
         start: Trial,
-        time_limit: float,
+        episode: Episode,
     ) -> None:
-        self._robot, self._start = robot, start
+        self._robot, self._start, self.episode = robot, start, episode
         self.checked = CheckedController(controller, spec, 1)
         self.recorder = TimeSeriesRecorder(self.checked, lambda: start.world.head[:2])
         self.decisions = Decisions(spec, self.checked)
         self.log: SimulatedLog | None = None
-        self.outcome = "timeout"
-        self._ticks, self._judge = 0, Judge(start.scene, time_limit)
 
     def go_on(self, frame: AntennaFrame, command: JointCommand) -> bool:
         """Keep a tick; whether there is a next one."""
         if self.checked.faults:
-            raise ControllerError(f"tick {self._ticks + 1}: {self.checked.faults[0]}")
+            raise ControllerError(f"tick {self.episode.ticks + 1}: {self.checked.faults[0]}")
         self.recorder.take(frame, command)
         if self.log is not None:
             self.log.take(self.decisions.take(frame, command))
-        self._ticks += 1
-        if self._robot.failures:
-            self.outcome = "invalid"
-            return False
-        world, ended = self._start.world, None
-        if world.t >= self._judge.limit or self._ticks % LOOK_EVERY == 0:
-            ended = self._judge.watch(world, world.t)
-        self.outcome = ended or "timeout"
+        ended = self.episode.tick(self._start.world, self._robot.failures.get(0))
+        if self.episode.error is not None:
+            raise self.episode.error
         return ended is None

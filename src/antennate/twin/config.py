@@ -10,7 +10,7 @@ from antennate.params.base import Params, number, paths_of
 from antennate.params.gaits import GaitParams, LiftParams
 from antennate.params.hardware import BatteryParams
 from antennate.robots.spec import RobotSpec, require_antennae
-from antennate.sim.judge import LOOK_EVERY, Judge, progress_of
+from antennate.sim.episode import Episode
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import TrialConfig, draw_trial, require_room, scene_of
@@ -80,7 +80,6 @@ class Passage:
         scene: Where the robot walks.
 
     Attributes:
-        progress: How far the head has come [m].
         passed: Time of walking at which the head passed the exit [s], inf before.
         on_pass: Called when it does.
         on_tick: Called with the world after every tick.
@@ -94,9 +93,13 @@ class Passage:
 
     def reset(self) -> None:
         """The robot stands at the start again."""
-        self._ticks, self._judge = 0, Judge(self._scene)
-        self.progress = 0.0
+        self._episode = Episode(self._scene, math.inf)
         self.passed = math.inf
+
+    @property
+    def progress(self) -> float:
+        """How far the head has come [m]."""
+        return self._episode.progress
 
     def watch(self, world: World) -> None:
         """Look at the world after a tick.
@@ -105,12 +108,14 @@ class Passage:
             SceneError: The scene does not answer as its protocol says.
         """
         self.on_tick(world)
-        self._ticks += 1
-        if self._ticks % LOOK_EVERY:
-            return
+        self._episode.tick(world, look=self._look)
+        if self._episode.error is not None:
+            raise self._episode.error
+
+    def _look(self, world: World) -> None:
         head = world.head[:2]
-        self.progress = progress_of(self._scene, head)
-        if self.passed == math.inf and self._judge.look(head) == "success":
+        self._episode.progress_of(head)
+        if self.passed == math.inf and self._episode.judge.look(head) == "success":
             self.passed = world.t
             self.on_pass()
 

@@ -8,8 +8,8 @@ from antennate.control.climbing.rule import Ground as Felt
 from antennate.experiments.climb.config import CLIFF, LEVEL, Cell
 from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.sensing import Verdict
-from antennate.sim.judge import Judge, has_fallen, in_time
-from antennate.sim.scenes.scene import SceneInstance
+from antennate.sim.episode import Episode
+from antennate.sim.judge import has_fallen, in_time
 from antennate.sim.world import World
 from antennate.types import Floats
 
@@ -43,15 +43,13 @@ class Criterion:
 
     Args:
         cell: Its cell.
-        scene: Its scene.
+        episode: Its episode; at its time limit a flat floor is walked.
         pitch: Distance between two links [m].
-        time_limit: Time after which it has failed, or a flat floor is walked [s].
     """
 
-    def __init__(self, cell: Cell, scene: SceneInstance, pitch: float, time_limit: float) -> None:
-        self._cell, self._pitch, self._time_limit = cell, pitch, time_limit
-        self._scene: Any = scene
-        self._judge = Judge(scene)
+    def __init__(self, cell: Cell, episode: Episode, pitch: float) -> None:
+        self._cell, self._episode, self._pitch = cell, episode, pitch
+        self._scene: Any = episode.scene
 
     def look(self, world: World, links: Floats, verdict: Verdict) -> str | None:
         """The outcome, None if the trial goes on.
@@ -74,7 +72,7 @@ class Criterion:
         else:
             late = "felt" if self._cell.ground in LEVEL else late
             ended = self._felt(world.t, links, verdict)
-        return in_time(ended, world.t, self._time_limit, late)
+        return in_time(ended, world.t, self._episode.limit, late)
 
     def _over(self, links: Floats) -> str | None:
         scene = self._scene
@@ -86,7 +84,7 @@ class Criterion:
         if self._cell.scene == FLAT:
             return None
         if self._cell.scene == "step_tunnel":
-            return self._judge.look(world.head[:2])
+            return self._episode.judge.look(world.head[:2])
         if has_left(links):
             return "left"
         if has_fallen(links, self._scene.ground):

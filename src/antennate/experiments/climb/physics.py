@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from antennate.control.registry import ControllerMaker, make_controller
 from antennate.experiments.climb.config import (
     Cell,
     ClimbConfig,
@@ -23,10 +22,11 @@ from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.load import PitchLoad
 from antennate.experiments.climb.rows import ClimbRow, Place
 from antennate.experiments.climb.sensing import Touch, Verdict
-from antennate.experiments.tunnel.batch import BATCH, Watch, run_trials
-from antennate.sim.scenes.scene import SceneInstance
+from antennate.experiments.tunnel.batch import PLAIN, run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
+from antennate.sim.episode import Episode
 from antennate.sim.world import World
-from antennate.types import Controller, Floats, Ints
+from antennate.types import Controller, Floats
 
 DRAWN = 1
 """Trials of each cell whose course is kept for the figure."""
@@ -62,10 +62,11 @@ class ClimbMonitor:
         config: The run.
         cell: Its cell.
         row: Row of the batch.
-        trial: Its number.
-        scene: Its scene.
-        time_limit: Time after which it has failed [s].
+        episode: Its episode.
         controller: controller() gives the one that walks all rows.
+
+    Attributes:
+        episode: As given.
     """
 
     def __init__(
@@ -73,17 +74,15 @@ class ClimbMonitor:
         config: ClimbConfig,
         cell: Cell,
         row: int,
-        trial: int,
-        scene: SceneInstance,
-        time_limit: float,
+        episode: Episode,
         controller: Callable[[], Any],
     ) -> None:
-        self.trial, self.scene, self.time_limit = trial, scene, time_limit
+        self.episode, scene = episode, episode.scene
         self._config, self._cell, self._row, self._controller = config, cell, row, controller
         edges = getattr(scene, "edges", ())
         self._edge = edges[0] if edges else None
         self._pitch = config.robot.link_pitch
-        self._criterion = Criterion(cell, scene, self._pitch, time_limit)
+        self._criterion = Criterion(cell, episode, self._pitch)
         self._verdict = Verdict()
         self._touch: Touch | None = None
         self._load: PitchLoad | None = None
@@ -95,8 +94,14 @@ class ClimbMonitor:
         self._last = (-math.inf, np.zeros(2))
         self._course: list[tuple[float, Floats, float]] = []
 
-    def bend(self, world: World) -> None:
-        """Look at the world after every tick."""
+    def tick(self, world: World, maneuver: int, failure: object = None) -> str | None:
+        """Let a control tick pass; the outcome once there is one."""
+        if failure is None:
+            self._follow(world)
+        return self.episode.tick(world, failure, self._look)
+
+    def _follow(self, world: World) -> None:
+        """Follow the climb and what is felt, tick by tick."""
         control = self._controller()
         body, rule = getattr(control, "body", None), getattr(control, "rule", None)
         head = world.link_places()[:, 0]
@@ -141,23 +146,25 @@ class ClimbMonitor:
         plans = plans[np.isfinite(plans)]
         return float(plans[abs(plans - past).argmin()]) if len(plans) else math.nan
 
-    def look(self, world: World, t: float, maneuver: int) -> str | None:
-        """Look every LOOK_EVERY ticks and at the time limit; the outcome once there is one."""
-        links = world.link_places()
+    def _look(self, world: World) -> str | None:
+        """Keep the way and the course; the outcome once there is one."""
+        links, t = world.link_places(), world.t
         middle = links[:, :2].mean(axis=0)
         if t - self._last[0] >= _STRIDE:
             if self._last[0] >= 0.0:
                 self._way += float(np.hypot(*(middle - self._last[1])))
                 self._walked += t - self._last[0]
             self._last = (t, middle)
-        if self.trial < DRAWN and (not self._course or t - self._course[-1][0] > _EVERY - 1e-6):
+        if self.episode.number < DRAWN and (
+            not self._course or t - self._course[-1][0] > _EVERY - 1e-6
+        ):
             edge = math.nan if self._edge is None else self._edge.x
             plan = self._plan(links[0, 0] - edge, getattr(self._controller(), "body", None))
             self._course.append((t, links, plan))
         return self._criterion.look(world, links, self._verdict)
 
-    def result(self, world: World, outcome: str, reason: str, ticks: Ints) -> ClimbRow:
-        """The row of a trial that ended so."""
+    def result(self, world: World) -> ClimbRow:
+        """The row of the trial, which has ended."""
         felt = self._verdict
         links = world.link_places()
         took = None if self._began is None else max(world.t - self._began[0], 1e-9)
@@ -165,9 +172,9 @@ class ClimbMonitor:
         feels = self._cell.condition == "climb"
         height = felt.height if felt.felt_at is not None and math.isfinite(felt.height) else None
         return ClimbRow(
-            **vars(_place(self._config, self._cell, self.trial)),
-            outcome=outcome,
-            time_s=round(min(self.time_limit, world.t), 6),
+            **vars(_place(self._config, self._cell, self.episode.number)),
+            outcome=self.episode.outcome,
+            time_s=round(min(self.episode.limit, world.t), 6),
             climb_time_s=_rounded(took),
             speed_m_s=_rounded(self._speed(links, took)),
             **({} if self._load is None else self._load.columns()),
@@ -182,7 +189,7 @@ class ClimbMonitor:
             plan_error_m=" ".join(
                 f"{link}:{error:.4f}" for link, error in self._errors.items() if error is not None
             ),
-            reason=reason,
+            reason=self.episode.reason,
         )
 
     def _speed(self, links: Floats, took: float | None) -> float | None:
@@ -195,10 +202,10 @@ class ClimbMonitor:
 
     def path(self, world: World) -> ClimbPath | None:
         """The course of the first trials of a cell that is climbed."""
-        if self.trial >= DRAWN or self._cell.part != "climbing" or not self._course:
+        if self.episode.number >= DRAWN or self._cell.part != "climbing" or not self._course:
             return None
         t, links, plan = zip(*self._course, strict=True)
-        scene: Any = self.scene
+        scene: Any = self.episode.scene
         return ClimbPath(
             np.array(t), np.array(links), np.array(plan), scene.edges[0].x, scene.edges[0].rise
         )
@@ -233,19 +240,18 @@ def carry_out(
     name: str,
     trials: Sequence[int],
     emit: Callable[[tuple[ClimbRow, ClimbPath | None]], None],
-    watch: Watch | None = None,
-    make: ControllerMaker = make_controller,
+    apparatus: Apparatus = PLAIN,
 ) -> None:
     """Run trials of one cell in lockstep, and emit each as it ends."""
     cell = cells(config)[name]
     made: list[Controller] = []
 
     def keep(kind: Any, control: Any = None, robot: Any = None, batch: int = 1) -> Controller:
-        made.append(make(kind, control, robot, batch))
+        made.append(apparatus.controller(kind, control, robot, batch))
         return made[-1]
 
-    def monitor(row: int, trial: int, scene: SceneInstance, limit: float) -> ClimbMonitor:
-        return ClimbMonitor(config, cell, row, trial, scene, limit, lambda: made[-1])
+    def monitor(row: int, episode: Episode) -> ClimbMonitor:
+        return ClimbMonitor(config, cell, row, episode, lambda: made[-1])
 
     def take(item: tuple[Any, Any]) -> None:
         row, path = item
@@ -254,13 +260,5 @@ def carry_out(
         emit((row, path))
 
     simulated = config_of(config, cell)
-    run_trials(
-        simulated,
-        simulated.controllers[0],
-        trials,
-        take,
-        BATCH,
-        watch=watch,
-        make=keep,
-        monitor=monitor,
-    )
+    with_cell = replace(apparatus, controller=keep, monitor=monitor)
+    run_trials(simulated, simulated.controllers[0], trials, take, apparatus=with_cell)

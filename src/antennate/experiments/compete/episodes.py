@@ -22,6 +22,7 @@ from antennate.control.registry import make_controller
 from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TrialResult
 from antennate.sim.judge import Outcome, time_limit_of
 from antennate.sim.scenes.scene import TIME_LIMIT
@@ -106,7 +107,7 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
 
     name = condition(first.controller, config.readings[0])
     try:
-        run_trials(config, name, [*places], take, make=make)
+        run_trials(config, name, [*places], take, apparatus=Apparatus(make))
     finally:
         for last in made:
             last.close()

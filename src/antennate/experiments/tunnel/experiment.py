@@ -11,7 +11,8 @@ from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of, short_names
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.batch import BATCH, Emit, lost_row, run_trials, watched
+from antennate.experiments.tunnel.batch import BATCH, run_trials, watched
+from antennate.experiments.tunnel.lockstep import Apparatus, Emit, lost_row
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import TunnelResult, summarise
 from antennate.experiments.tunnel.tables import none_valid, sentence, tables
@@ -114,7 +115,8 @@ def record(
         )
         return ()
 
-    run_trials(config, controller, [trial], lambda result: rows.append(result[0]), watch=watch)
+    seen = Apparatus(watch=watch)
+    run_trials(config, controller, [trial], lambda result: rows.append(result[0]), apparatus=seen)
     title = f"{label}, trial {trial}: {rows[0].outcome} ({speed:g}×)"
     return recorder.decided(title, config.control.rule.threshold, ending(rows[0], config))
 

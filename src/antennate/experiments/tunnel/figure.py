@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 from antennate import figures as style
 from antennate.control.readings import short_names
 from antennate.control.registry import looks
-from antennate.experiments.tunnel.batch import SHOWN_TRIALS
+from antennate.experiments.tunnel.lockstep import SHOWN_TRIALS
 from antennate.experiments.tunnel.physics import TrialPath, TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import ControllerSummary, TunnelResult
 from antennate.studies.columns import Ends

@@ -37,14 +37,15 @@ from antennate.control.registry import (
 from antennate.errors import SceneError
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
-from antennate.sim.judge import Judge, Outcome, progress_of, require_times
+from antennate.sim.episode import Episode
+from antennate.sim.judge import Outcome, require_times
 from antennate.sim.scenes import geometry
-from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
+from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import TrialConfig, require_own_curves
 from antennate.sim.world import World
 from antennate.studies.columns import column, tabular, tabular_row
 from antennate.studies.pooling import largest, mean, smallest, total
-from antennate.types import Floats, Ints, Maneuver
+from antennate.types import Floats, Maneuver
 
 if TYPE_CHECKING:
     from antennate.antenna.springs import SpringLoad
@@ -232,20 +233,17 @@ class TrialPath:
 
 @dataclass
 class TrialMonitor:
-    """Watches one trial, a look every LOOK_EVERY ticks and one at the time limit.
+    """Watches one trial: bends of the antennae in every tick, the rest where the episode looks.
 
     Attributes:
-        seed, trial: What decides all chance.
+        episode: Its episode.
+        controller: Name of the controller, with its readings if they are not its own.
         before: Obstacles that can move, at the start, as in `TrialPath`.
-        time_limit: Time after which it has failed [s].
     """
 
-    seed: int
-    trial: int
+    episode: Episode
     controller: str
-    scene: SceneInstance
-    before: list[Floats]
-    time_limit: float
+    before: list[Floats] = field(default_factory=list[Floats])
     _best: float = 0.0
     _best_at: float = 0.0
     _stuck: int = 0
@@ -253,31 +251,34 @@ class TrialMonitor:
     _is_stuck: bool = False
     _forces: list[float] = field(default_factory=list)
     _samples: list[tuple[float, float, float, int]] = field(default_factory=list)
-    _judge: Judge = field(init=False)
     _bends: array[float] = field(default_factory=lambda: array("d"))
     _offsets: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
+    _maneuver: int = 0
+    _ticks: list[int] = field(default_factory=lambda: [0] * len(Maneuver))
 
-    def __post_init__(self) -> None:
-        self._judge = Judge(self.scene, self.time_limit)
+    def tick(self, world: Watched, maneuver: int, failure: object = None) -> Outcome | None:
+        """Let a control tick pass; the outcome once there is one.
 
-    def bend(self, world: Watched) -> None:
-        """Note how the antennae are bent."""
-        self._bends.frombytes(world.bends().tobytes())
-
-    def look(self, world: Watched, t: float, maneuver: int) -> Outcome | None:
-        """Look at the world at time t [s]; the outcome once there is one.
-
-        Raises:
-            SceneError: The scene does not answer as its protocol says.
+        Args:
+            world: The robot.
+            maneuver: What it does.
+            failure: What went wrong with it, None if nothing did.
         """
-        head = world.head[:2]
+        if failure is None:
+            self._maneuver = maneuver
+            self._ticks[maneuver] += 1
+            self._bends.frombytes(world.bends().tobytes())
+        return self.episode.tick(world, failure, self._look)
+
+    def _look(self, world: Watched) -> Outcome | None:
+        head, t = world.head[:2], world.t
         x, y = head.tolist()
-        self._samples.append((t, x, y, maneuver))
+        self._samples.append((t, x, y, self._maneuver))
         self._forces.append(world.obstacle_force())
-        progress = progress_of(self.scene, head)
+        progress = self.episode.progress_of(head)
         self._note_progress(progress, t)
         self._note_offset(progress, head)
-        return self._judge.watch(world, t)
+        return self.episode.judge.watch(world)
 
     def _note_progress(self, progress: float, t: float) -> None:
         if progress > self._best + STUCK_GAIN:
@@ -290,10 +291,11 @@ class TrialMonitor:
 
     def _note_offset(self, progress: float, head: Floats) -> None:
         """Note how far the head is from the centre line, if there is one."""
-        line = getattr(self.scene, "route", None)
+        scene = self.episode.scene
+        line = getattr(scene, "route", None)
         if line is None or np.shape(line)[1:] != (2,):
             return
-        if 0.0 <= progress < self.scene.length:
+        if 0.0 <= progress < scene.length:
             offset = geometry.distance(np.asarray(line, float), head)
             self._offsets.setdefault(int(progress / _STRETCH), []).append(offset)
 
@@ -309,36 +311,37 @@ class TrialMonitor:
         held = np.clip(angles, -antenna.range, antenna.range)
         return largest_load(held, antenna.spring_stiffness())
 
-    def result(self, world: Watched, outcome: Outcome, reason: str, ticks: Ints) -> TrialResult:
-        """The row of a trial that ended so, with `ticks` in each maneuver, shape (5,)."""
+    def result(self, world: Watched) -> TrialResult:
+        """The row of the trial, which has ended."""
+        episode, ticks = self.episode, np.array(self._ticks)
         share = ticks / max(1, ticks.sum())
         forces = np.array(self._forces) if self._forces else np.zeros(1)
         offsets = [float(np.mean(piece)) for piece in self._offsets.values()]
         load = self._load(world)
         try:
-            progress = progress_of(self.scene, world.head[:2])
+            progress = episode.progress_of(world.head[:2])
         except SceneError:  # as after a simulation that became invalid
             progress = self._best
         return TrialResult(
-            seed=self.seed,
-            trial=self.trial,
+            seed=episode.seed,
+            trial=episode.number,
             controller=self.controller,
-            outcome=outcome,
-            time_s=round(world.t, 6) if outcome == "success" else self.time_limit,
-            progress_m=round(float(np.clip(progress, 0.0, self.scene.length)), 6),
+            outcome=episode.outcome,
+            time_s=round(world.t, 6) if episode.outcome == "success" else episode.limit,
+            progress_m=round(float(np.clip(progress, 0.0, episode.scene.length)), 6),
             stuck=self._stuck,
             recovered=self._recovered,
             **{f"share_{m.name.lower()}": round(float(share[m]), 6) for m in Maneuver},
             force_mean_n=round(float(forces.mean()), 6),
             force_max_n=round(float(forces.max()), 6),
-            limit_s=self.time_limit,
+            limit_s=episode.limit,
             offset_m=round(float(np.mean(offsets)), 6) if offsets else None,
             spring_low_n_m=round(load.low, 9),
             spring_high_n_m=round(load.high, 9),
             spring_cycles=load.cycles,
             overturned=world.overturned,
             void_decisions=0,  # known where the controller is
-            reason=reason,
+            reason=episode.reason,
         )
 
     def path(self, world: Watched) -> TrialPath:
@@ -352,7 +355,7 @@ class TrialMonitor:
             fixed=fixed,
             before=self.before,
             after=after,
-            exit=self.scene.exit,
+            exit=self.episode.scene.exit,
             links=world.links().copy(),
             parts=world.parts(),
         )

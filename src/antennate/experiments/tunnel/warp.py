@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antennate.experiments.tunnel.batch import Emit, run_trials
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus, Emit
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.trial import draw_scene, scene_of
@@ -56,7 +57,7 @@ def run_trials_on_warp(
     def make(rows: int) -> tuple[Scene, WarpRobot]:
         return scene, WarpRobot(rows, config.robot, period, timestep, sizes, device)
 
-    run_trials(config, controller, trials, emit, batch, bodies=make)
+    run_trials(config, controller, trials, emit, batch, apparatus=Apparatus(bodies=make))
 
 
 def room_for(config: TunnelConfig, controller: str, trials: Sequence[int], scene: Scene) -> Limits:
@@ -68,5 +69,5 @@ def room_for(config: TunnelConfig, controller: str, trials: Sequence[int], scene
         made.append(CountingRobot(rows, config.robot, period, timestep))
         return scene, made[-1]
 
-    run_trials(config, controller, trials, lambda _: None, bodies=make)
+    run_trials(config, controller, trials, lambda _: None, apparatus=Apparatus(bodies=make))
     return Limits(*(max(sizes) for sizes in zip(*(robot.room for robot in made), strict=True)))
