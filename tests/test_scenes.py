@@ -62,6 +62,10 @@ class Broken(Route):
         super().__init__(np.array([[0.0, 0.0], [1.0, 0.0]]))
 
 
+class Timeless(Broken):
+    time_limit = 0.0
+
+
 class Blocked(Broken):
     def build(self, spec):
         super().build(spec)
@@ -154,6 +158,7 @@ def test_a_sound_one_passes():
         (Drawing(lambda rng: Endless()), "to have left"),
         (Drawing(lambda rng: GoneAtOnce()), "a start inside"),
         (Drawing(lambda rng: Short()), "a length above 0"),
+        (Drawing(lambda rng: Timeless()), "time_limit to be a time above 0 s"),
         (Drawing(shifted), "random is False"),
         (Drawing(lambda rng: Broken(), random=True), "random is True"),
         (Drawing(lambda rng: Placed(np.random.default_rng().uniform(0.5, 0.9)), True), "again"),

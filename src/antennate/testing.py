@@ -325,7 +325,8 @@ def check_scene(scene: Scene, robot: RobotSpec | None = None) -> None:
     The same seed gives the same instance, other seeds give others if the scene says that it is
     random. An instance compiles; the robot has room at its start and stands there. Progress is 0 at
     the start, grows ahead of it and is the length at the exit; the head succeeds by crossing the
-    exit and not before it, and has left far outside and not at the start.
+    exit and not before it, and has left far outside and not at the start. A time limit of its own
+    is a time.
 
     Args:
         scene: The scene.

@@ -3,8 +3,8 @@
 It follows from a seed and a number, and a controller moves the robot. In `tunnel`, `climb` and
 `compete` it is a trial, a row of the table; other experiments have trials of another kind, as a
 push or a passage. `Trial.episode` makes it. Who lets time pass tells it of every control tick, and
-stops when it has ended: `experiments/tunnel/batch.py` for many trials at once, climbs among them,
-`envs/episodes.py`, `studies/simulate.py`, and the twin, whose robot walks on.
+stops when it has ended: `experiments/tunnel/lockstep.py` for many trials at once, climbs among
+them, `envs/episodes.py` and `studies/simulate.py`; the robot of the twin walks on.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Episode:
     """One robot in one drawn scene, until it has ended.
 
     The robot is looked at in every LOOK_EVERY-th tick, and from the time limit on in each. A scene
-    with `ground` ends it for a robot on its back. Elsewhere tables let such a robot lie until the
-    time limit, while environments and climbs end its episode: `on_its_back`.
+    with `ground` ends it for a robot on its back. Elsewhere trials of tables let such a robot lie
+    until the time limit, and environments end its episode: `on_its_back`.
 
     Args:
         scene: The scene as it was drawn.
