@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from antennate.experiments.compete.config import DEVELOPMENT, SCENES_OF_BOARD
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.studies.formats import to_csv
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -31,7 +31,7 @@ def page(tmp_path: Path) -> Path:
     (tmp_path / "images").mkdir()
     ended: Any = {"closed": ("success", 20.0), "open": ("timeout", 100.0)}
     rows = [
-        Episode(
+        EpisodeRow(
             controller=name,
             scene=SCENES_OF_BOARD[0],
             seed=5,

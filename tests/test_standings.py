@@ -16,7 +16,7 @@ from scipy.stats import binomtest, wilcoxon
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.comparison import compared
 from antennate.experiments.compete.config import CompeteConfig
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.compete.experiment import summarise
 from antennate.experiments.compete.figure import drawn
 from antennate.experiments.compete.page import apart, markdown, ordered, readme, sentence, tables
@@ -35,10 +35,10 @@ from antennate.studies.statistics import (
 LIMIT = 100.0
 
 
-def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episode]:
+def rows_of(name: str, times: list[float | None], given: str = "") -> list[EpisodeRow]:
     """Rows of one controller in draws of their own, in two scenes by turns; None is a failure."""
     return [
-        Episode(
+        EpisodeRow(
             controller=name,
             scene=("uturn", "corner")[k % 2],
             seed=1,
@@ -53,7 +53,7 @@ def rows_of(name: str, times: list[float | None], given: str = "") -> list[Episo
     ]
 
 
-def judged(*groups: list[Episode]) -> CompeteResult:
+def judged(*groups: list[EpisodeRow]) -> CompeteResult:
     return summarise(CompeteConfig(tie=0.01), [row for group in groups for row in group])
 
 

@@ -14,7 +14,7 @@ from antennate.control.registry import CONTROLLERS
 from antennate.csv_files import MISSING, csv_rows, wrong_count
 from antennate.errors import ConfigError
 from antennate.experiments.compete.config import LARGEST_TABLE, require_unreserved
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.compete.scenes import tunnel_config
 from antennate.files import read_limited
 from antennate.messages import nearest, shown
@@ -24,12 +24,12 @@ from antennate.sim.judge import require_times
 
 CLOSE = 5e-7
 """Times [s] and ways [m] that differ by less are the same: tables have six decimals."""
-_ROW = TypeAdapter(Episode)
+_ROW = TypeAdapter(EpisodeRow)
 _WORDS = ("given", "reason")
 """Columns that are mostly empty, for which some programs write NA."""
 
 
-def read_rows(path: Path) -> list[Episode]:
+def read_rows(path: Path) -> list[EpisodeRow]:
     """The rows of such a table.
 
     Raises:
@@ -43,7 +43,7 @@ def read_rows(path: Path) -> list[Episode]:
     lines = csv_rows(path, data, ["controller"], ConfigError)
     _, names = next(lines)
     _require_columns(path, names)
-    rows, places = list[Episode](), dict[tuple[str, str, int, int], int]()
+    rows, places = list[EpisodeRow](), dict[tuple[str, str, int, int], int]()
     scenes = set[str]()
     for number, cells in lines:
         if why := wrong_count(names, cells, ""):
@@ -67,8 +67,8 @@ def _require_columns(path: Path, names: Sequence[str]) -> None:
     Raises:
         ConfigError: A column is missing, or is none of `antennate compete`.
     """
-    known = [field.name for field in fields(Episode)]
-    needed = [field.name for field in fields(Episode) if field.default is NO_DEFAULT]
+    known = [field.name for field in fields(EpisodeRow)]
+    needed = [field.name for field in fields(EpisodeRow) if field.default is NO_DEFAULT]
     for place, name in enumerate(names):
         if name in names[:place]:
             raise ConfigError(f"{path}: expected each column once, found {name!r} twice")
@@ -85,7 +85,7 @@ def _require_columns(path: Path, names: Sequence[str]) -> None:
             )
 
 
-def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Episode:
+def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> EpisodeRow:
     """The row of a line. Its scene is looked up unless it is among `scenes`, and put there."""
     if lacking := [name for name in ("controller", "scene", "outcome") if not line[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
@@ -98,13 +98,13 @@ def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Epi
             tunnel_config(row.scene, row.controller, row.seed)
             scenes.add(row.scene)
     except ValidationError as error:
-        raise ConfigError(f"{path}: line {number}: {describe(error, Episode)}") from None
+        raise ConfigError(f"{path}: line {number}: {describe(error, EpisodeRow)}") from None
     except (ValueError, ConfigError) as error:
         raise ConfigError(f"{path}: line {number}: {error}") from None
     return row
 
 
-def _require_sound(row: Episode, limited: bool) -> None:
+def _require_sound(row: EpisodeRow, limited: bool) -> None:
     """Check that there may be such a controller, and such an episode whatever it is compared with.
 
     Args:

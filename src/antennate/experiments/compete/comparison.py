@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.compete.checking import CLOSE
-from antennate.experiments.compete.episodes import Episode, restricted
+from antennate.experiments.compete.episodes import EpisodeRow, restricted
 from antennate.sim.judge import Outcome
 from antennate.studies.columns import tabular
 from antennate.studies.statistics import sign_flips, signed_rank
@@ -107,7 +107,7 @@ class Check:
     """Rows that differ, as the table says and as they ended here."""
 
 
-def compared(theirs: Sequence[Episode], ours: Sequence[Episode]) -> Check:
+def compared(theirs: Sequence[EpisodeRow], ours: Sequence[EpisodeRow]) -> Check:
     """Which rows of a table differ from those that were run here.
 
     Rows that were not run are left out, as after an interruption.
@@ -165,20 +165,20 @@ def refusal(check: Check) -> str:
     return ""
 
 
-def _alike(row: Episode, again: Episode) -> bool:
+def _alike(row: EpisodeRow, again: EpisodeRow) -> bool:
     numbers = [(getattr(row, n), getattr(again, n)) for n in ("time_s", "progress_m", "limit_s")]
     exact = all(getattr(row, n) == getattr(again, n) for n in ("outcome", "overturned", "given"))
     return exact and all(abs(one - other) <= CLOSE for one, other in numbers)
 
 
-def _in_one_place(row: Episode, again: Episode) -> bool:
+def _in_one_place(row: EpisodeRow, again: EpisodeRow) -> bool:
     """Whether both are of one version, engine and processor."""
     alike = (row.version, row.engine) == (again.version, again.engine)
     named = again.processor.startswith(f"{row.processor} (")  # by former tables, without numbers
     return alike and (named or row.processor == again.processor)
 
 
-def _must_repeat(row: Episode, again: Episode) -> bool:
+def _must_repeat(row: EpisodeRow, again: EpisodeRow) -> bool:
     """Whether rows that differ are of one place, or differ in a rule."""
     if _in_one_place(row, again):
         return True
@@ -186,7 +186,7 @@ def _must_repeat(row: Episode, again: Episode) -> bool:
     return row.given != again.given or (ran and abs(row.limit_s - again.limit_s) > CLOSE)
 
 
-def _by_draw(pairs: Sequence[tuple[Episode, Episode]]) -> tuple[Ints, Floats]:
+def _by_draw(pairs: Sequence[tuple[EpisodeRow, EpisodeRow]]) -> tuple[Ints, Floats]:
     """How successes and restricted times of each draw differ, shapes (n,): table less here.
 
     On another processor a draw ends as if it were walked again, so either end is as likely in the
@@ -219,7 +219,7 @@ def _far_p(far: Floats) -> float:
     return min(1.0, 2.0 * float(bdtrc(most - 1, len(far), 0.25))) if most else 1.0
 
 
-def _differing(row: Episode, again: Episode) -> Differing:
+def _differing(row: EpisodeRow, again: EpisodeRow) -> Differing:
     return Differing(
         controller=row.controller,
         scene=row.scene,

@@ -34,7 +34,7 @@ from antennate.types import Controller
 
 
 @tabular
-class Episode:
+class EpisodeRow:
     """One episode, a row of trials.csv."""
 
     controller: str
@@ -113,7 +113,7 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
             last.close()
 
 
-def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
+def _row_of(draw: Draw, row: TrialResult, given: str) -> EpisodeRow:
     return _ended(
         draw,
         outcome=row.outcome,
@@ -127,15 +127,15 @@ def _row_of(draw: Draw, row: TrialResult, given: str) -> Episode:
     )
 
 
-def lost(draw: Draw, reason: str) -> Episode:
+def lost(draw: Draw, reason: str) -> EpisodeRow:
     """The row of an episode whose process died, failed, or did not end."""
     config = tunnel_config(draw.scene, draw.controller, draw.seed)
     limit = time_limit_of(draw_scene(config, scene_of(config), draw.trial), config.time_limit)
     return _ended(draw, outcome="invalid", time_s=limit, limit_s=limit, reason=reason)
 
 
-def _ended(draw: Draw, **ended: Any) -> Episode:
-    return Episode(
+def _ended(draw: Draw, **ended: Any) -> EpisodeRow:
+    return EpisodeRow(
         controller=draw.controller,
         scene=draw.scene,
         seed=draw.seed,
@@ -147,11 +147,11 @@ def _ended(draw: Draw, **ended: Any) -> Episode:
     )
 
 
-def restricted(rows: Iterable[Episode]) -> list[float]:
+def restricted(rows: Iterable[EpisodeRow]) -> list[float]:
     """Time of each row as a share of its limit; 1 of a failure."""
     return [row.time_s / row.limit_s if row.outcome == "success" else 1.0 for row in rows]
 
 
-def all_drawn(rows: Sequence[Episode]) -> bool:
+def all_drawn(rows: Sequence[EpisodeRow]) -> bool:
     """Whether the seed of each row was drawn when its run began; False without rows."""
     return bool(rows) and all(row.drawn for row in rows)

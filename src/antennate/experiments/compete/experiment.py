@@ -18,7 +18,7 @@ from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.comparison import compared, refusal
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
-from antennate.experiments.compete.episodes import Draw, Episode, lost, run_episodes
+from antennate.experiments.compete.episodes import Draw, EpisodeRow, lost, run_episodes
 from antennate.experiments.compete.page import readme, sentence, tables
 from antennate.experiments.compete.result import CompeteResult, none_valid
 from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
@@ -162,7 +162,7 @@ def run(
     workers = replace(workers_from(workers), engine=None, apart=True, _staying=None)
     planned = draws(config)
 
-    def given_up(place: int, failure: Failure) -> Episode:
+    def given_up(place: int, failure: Failure) -> EpisodeRow:
         return lost(planned[place], failure.reason)
 
     rows = gather(
@@ -177,7 +177,7 @@ def run(
     return Done(rows, summarise(config, rows))
 
 
-def summarise(config: CompeteConfig, rows: Sequence[Episode]) -> CompeteResult:
+def summarise(config: CompeteConfig, rows: Sequence[EpisodeRow]) -> CompeteResult:
     """The result of the rows of a run."""
     check = compared(read_rows(Path(config.check)), rows) if config.check else None
     return CompeteResult(
@@ -207,7 +207,7 @@ def undivided(config: CompeteConfig) -> str:
 EXPERIMENT = Experiment.of_folder(
     *(__name__, CompeteConfig, run, tables, sentence),
     result=CompeteResult,
-    row=Episode,
+    row=EpisodeRow,
     settled=settled,
     check=check,
     names=lambda config: ["README.md"],

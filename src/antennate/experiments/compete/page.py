@@ -10,7 +10,7 @@ from antennate.control.readings import short_names
 from antennate.control.registry import about
 from antennate.experiments.compete.comparison import ENOUGH, Check, Differing, refusal
 from antennate.experiments.compete.config import DEVELOPMENT
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.compete.result import CompeteResult, Pair, Standing, none_valid
 from antennate.experiments.compete.scenes import label
 from antennate.experiments.compete.standings import ALPHA
@@ -218,7 +218,7 @@ def markdown(result: Standing) -> str:
     return "\n".join(lines)
 
 
-def readme(result: CompeteResult, rows: Sequence[Episode]) -> str:
+def readme(result: CompeteResult, rows: Sequence[EpisodeRow]) -> str:
     """What stands in the run directory for who finds it."""
     reasons = [
         f"- `{row.controller}` in `{row.scene}`, trial {row.trial}: {row.reason}"

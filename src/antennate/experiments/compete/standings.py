@@ -22,7 +22,7 @@ from itertools import combinations
 import numpy as np
 
 from antennate.experiments.compete.comparison import Check
-from antennate.experiments.compete.episodes import Episode, all_drawn, restricted
+from antennate.experiments.compete.episodes import EpisodeRow, all_drawn, restricted
 from antennate.experiments.compete.result import Cell, Controller, Pair, Ranked, Standing
 from antennate.studies import statistics
 from antennate.studies.columns import Frame
@@ -32,7 +32,7 @@ from antennate.types import Floats, Ints
 ALPHA = 0.05
 _DRAW = ["scene", "seed", "trial"]
 """Columns that tell a draw of a scene."""
-Rows = Sequence[Episode]
+Rows = Sequence[EpisodeRow]
 
 
 def standing(rows: Rows, tie: float, check: Check | None = None) -> Standing:
@@ -43,7 +43,7 @@ def standing(rows: Rows, tie: float, check: Check | None = None) -> Standing:
         tie: Largest difference of success shares that is none.
         check: How they repeat a table, if they are of one.
     """
-    table = frame(rows, Episode).rename(columns={"outcome": "end"})  # so INVALID is not left out
+    table = frame(rows, EpisodeRow).rename(columns={"outcome": "end"})  # so INVALID is not left out
     by_name = by(table.assign(share=np.array(restricted(rows))), "controller")
     given = {name: next(filter(None, own["given"]), "") for name, own in by_name.items()}
     ranked = [name for name, words in given.items() if not words]
@@ -180,7 +180,7 @@ def profiles(rows: Rows) -> tuple[Floats, dict[str, Floats]]:
         Factors from 1 on, shape (n,), and of each controller the share of draws that it crosses
         within that factor of the fastest, shape (n,).
     """
-    ranked = frame([row for row in rows if not row.given], Episode)
+    ranked = frame([row for row in rows if not row.given], EpisodeRow)
     won = ranked["outcome"] == "success"
     draws = [ranked[each] for each in _DRAW]
     best = ranked["time_s"].where(won, np.inf).groupby(draws).transform("min")
