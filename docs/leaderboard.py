@@ -17,7 +17,7 @@ from generated import finish
 from antennate.errors import ConfigError
 from antennate.experiments.compete.checking import read_rows
 from antennate.experiments.compete.config import CompeteConfig
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.compete.page import apart, markdown, sentence
 from antennate.experiments.compete.result import Standing
 from antennate.experiments.compete.standings import standing
@@ -30,7 +30,7 @@ WHOLE = 100
 """Draws of each scene that a board needs; with fewer it is preliminary."""
 
 
-def board(rows: Sequence[Episode], result: Standing) -> str:
+def board(rows: Sequence[EpisodeRow], result: Standing) -> str:
     """What stands between the marks."""
     counts = [cell.episodes for cells in result.scenes.values() for cell in cells.values()]
     kinds = {
