@@ -31,7 +31,7 @@ from antennate.experiments.compete.config import (
     hidden_seed,
     settled,
 )
-from antennate.experiments.compete.episodes import Draw, Episode, run_episodes
+from antennate.experiments.compete.episodes import Draw, EpisodeRow, run_episodes
 from antennate.experiments.compete.experiment import run
 from antennate.experiments.compete.page import sentence
 from antennate.experiments.compete.scenes import label, tunnel_config
@@ -145,9 +145,11 @@ def entries(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     return lambda name: f"entries.py:{name}"
 
 
-def episodes(name: str, count: int = 1, scene: str = SHORT, limit: float = 0.05) -> list[Episode]:
+def episodes(
+    name: str, count: int = 1, scene: str = SHORT, limit: float = 0.05
+) -> list[EpisodeRow]:
     """Rows of some draws of one controller, run in this process."""
-    rows: dict[int, Episode] = {}
+    rows: dict[int, EpisodeRow] = {}
     draws = [(Draw(name, scene, DEVELOPMENT.start, trial, limit),) for trial in range(count)]
     run_episodes(draws, rows.__setitem__)
     return [rows[place] for place in range(count)]
@@ -784,7 +786,7 @@ def test_only_a_hidden_run_draws_a_seed_and_takes_no_other(tmp_path: Path) -> No
 @pytest.mark.ci
 def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> None:
     keys = [(5, 0), (6, 1), (5, 1), (6, 0)]
-    rows: list[Episode] = []
+    rows: list[EpisodeRow] = []
     for seed, trial in keys:
         run_episodes([(Draw("open", SHORT, seed, trial, 0.05),)], lambda i, row: rows.append(row))
     assert len({row.progress_m for row in rows}) == len(keys)
@@ -938,7 +940,7 @@ def test_a_table_with_a_byte_order_mark_is_read_and_a_folder_is_none(tmp_path: P
         read_rows(tmp_path)
 
 
-HERE = Episode(
+HERE = EpisodeRow(
     controller="open",
     scene="flat",
     seed=1,

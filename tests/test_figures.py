@@ -21,7 +21,7 @@ from PIL import Image
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN, USUAL, looks
 from antennate.experiments.compete import figure as compete
-from antennate.experiments.compete.episodes import Episode
+from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.gait.physics import Pace
 from antennate.experiments.gait.result import CostOfPhase, GaitResult, PhasePoint, WaveOff
@@ -224,7 +224,7 @@ def test_names_are_written_as_they_are():
     """Matplotlib reads a formula between dollar signs, and leaves `_name` out of a legend."""
     names = ["_mine.onnx", "a$x$.onnx", "$\\frac{$.onnx"]
     ended = {"scene": "flat", "seed": 1, "trial": 0, "outcome": "success", "time_s": 2.0}
-    rows = [Episode(controller=name, **ended) for name in names]
+    rows = [EpisodeRow(controller=name, **ended) for name in names]
     figure = compete.profile(rows, names)
     style.render(figure)
     (legend,) = figure.legends
