@@ -35,9 +35,6 @@ def real(
         unit: Its unit, empty if it has none.
         above: What it has to exceed.
         error: What is raised.
-
-    Raises:
-        BadInputError: Of the given type: it is something else.
     """
     try:
         number = (
@@ -52,11 +49,7 @@ def real(
 
 
 def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int:
-    """A whole number from `least` to `most`.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """A whole number from `least` to `most`."""
     number = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if number is None or number < least or (most is not None and number > most):
         bounds = f"of at least {least}" if most is None else f"of {least} to {most}"
@@ -81,9 +74,6 @@ def array(
         unit: Its unit, empty if it has none.
         finite: Whether NaN and infinities are refused.
         error: What is raised.
-
-    Raises:
-        BadInputError: Of the given type: it is something else, or masked.
     """
     wanted = f"{'finite ' if finite else ''}numbers{_in(unit)}"
     if len(shape) == 1 and isinstance(shape[0], int):
@@ -117,11 +107,7 @@ def whole_array(
     shape: tuple[int | str, ...],
     error: type[BadInputError] = ConfigError,
 ) -> Ints:
-    """The same, of whole numbers that have room in 64 bits.
-
-    Raises:
-        BadInputError: Of the given type: it is something else.
-    """
+    """The same, of whole numbers that have room in 64 bits."""
     numbers = array(name, value, shape, error=error)
     odd = (numbers != np.rint(numbers)) | (numbers < -(2.0**63)) | (numbers >= 2.0**63)
     if odd.any():
@@ -130,11 +116,7 @@ def whole_array(
 
 
 def path(name: str, value: Any) -> Path:
-    """The path of a file or a folder.
-
-    Raises:
-        ConfigError: It is none.
-    """
+    """The path of a file or a folder."""
     try:
         place = Path(value)
     except TypeError:
@@ -145,22 +127,14 @@ def path(name: str, value: Any) -> Path:
 
 
 def text(name: str, value: Any) -> str:
-    """Text of one printable character or more.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """Text of one printable character or more."""
     if not (isinstance(value, str) and value and value.isprintable()):
         raise _refusal(name, "text of printable characters", value)
     return value
 
 
 def instance(name: str, value: Any, kind: type[T]) -> T:
-    """An object of a class.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """An object of a class."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise _refusal(name, f"{article} {kind.__name__}", value)
@@ -168,22 +142,14 @@ def instance(name: str, value: Any, kind: type[T]) -> T:
 
 
 def mapping(name: str, value: Any) -> Mapping[Any, Any]:
-    """A dictionary or the like.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """A dictionary or the like."""
     if not isinstance(value, Mapping):
         raise _refusal(name, "a dictionary", value)
     return value
 
 
 def function(name: str, value: Any) -> None:
-    """Check that something can be called.
-
-    Raises:
-        ConfigError: It cannot.
-    """
+    """Check that something can be called."""
     if not callable(value):
         raise _refusal(name, "a function", value)
 

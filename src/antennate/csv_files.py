@@ -52,9 +52,6 @@ def csv_rows(
         error: What is raised.
         cure: What is said if a column is missing.
         ended: Whether the last row must end with a line break, or else was cut off.
-
-    Raises:
-        BadInputError: Of the given type: it is no CSV, or lacks a column.
     """
     if not data:
         names = f" with {', '.join(needed)}" if needed else ""
@@ -147,11 +144,7 @@ def wrong_count(header: Sequence[str], cells: Sequence[str], surplus: str) -> st
 
 
 def number_of(cell: str) -> float:
-    """The number of a cell, NaN if it holds none.
-
-    Raises:
-        ValueError: It has a comma as decimal mark, or marks between thousands.
-    """
+    """The number of a cell, NaN if it holds none."""
     try:
         return float(cell)
     except ValueError:

@@ -187,11 +187,7 @@ def _of(row: Any, name: str) -> Any:
 
 @styled
 def render(figure: Figure) -> dict[str, bytes]:
-    """The figure as svg and png: the same bytes for the same data.
-
-    Raises:
-        ConfigError: It is none of matplotlib.
-    """
+    """The figure as svg and png: the same bytes for the same data."""
     from matplotlib.figure import Figure
 
     checks.instance("figure", figure, Figure)

@@ -31,11 +31,7 @@ _UNITS = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3), ("bytes", 1.0))
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """Open a regular file to read; a pipe, whose writer may never come, is refused at once.
-
-    Raises:
-        OSError: It cannot be opened, or is a pipe, a device or a folder.
-    """
+    """Open a regular file to read; a pipe, whose writer may never come, is refused at once."""
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -45,11 +41,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Tell of what the system refuses while a file or folder is written.
-
-    Raises:
-        OutputError: It refuses something.
-    """
+    """Tell of what the system refuses while a file or folder is written."""
     try:
         yield
     except OSError as error:
@@ -63,9 +55,6 @@ def require_room(path: Path, least: float, error: type[BadInputError] = OutputEr
         path: The file.
         least: What it needs [byte].
         error: What is raised.
-
-    Raises:
-        BadInputError: Of the given type: there is less, or no folder for it.
     """
     try:
         free = shutil.disk_usage(path.parent).free
@@ -82,11 +71,7 @@ def in_units(size: float) -> str:
 
 
 def read_limited(path: Path, largest: int, error: type[BadInputError] = BadInputError) -> bytes:
-    """The content of a file of at most `largest` bytes.
-
-    Raises:
-        BadInputError: Of the given type: the file cannot be read, or is larger.
-    """
+    """The content of a file of at most `largest` bytes."""
     try:
         with open_regular(path) as file:
             data = _first(file, largest + 1)
@@ -108,11 +93,7 @@ def _first(file: BinaryIO, most: int) -> bytes:
 
 
 def decoded(path: Path, data: bytes, error: type[BadInputError] = BadInputError) -> str:
-    """The text of a file, with or without a byte order mark.
-
-    Raises:
-        BadInputError: Of the given type: it is not UTF-8.
-    """
+    """The text of a file, with or without a byte order mark."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as cause:
@@ -122,11 +103,7 @@ def decoded(path: Path, data: bytes, error: type[BadInputError] = BadInputError)
 
 
 def read_toml(path: Path, largest: int) -> dict[str, Any]:
-    """The tables of a TOML file of at most `largest` bytes.
-
-    Raises:
-        ConfigError: The file cannot be read, is larger, or is no TOML.
-    """
+    """The tables of a TOML file of at most `largest` bytes."""
     text = decoded(path, read_limited(path, largest, ConfigError), ConfigError)
     for number, line in enumerate(text.splitlines(), 1):
         if max(part.count(".") for part in _BETWEEN.split(_QUOTED.sub("", line))) > _MOST_DOTS:
@@ -144,22 +121,14 @@ def read_toml(path: Path, largest: int) -> dict[str, Any]:
 
 
 def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
-    """Write a file so that a crash at any moment leaves either all of it or nothing.
-
-    Raises:
-        OutputError: It exists and may not be replaced, or it cannot be written.
-    """
+    """Write a file so that a crash at any moment leaves either all of it or nothing."""
     with writing_whole(path, overwrite) as file:
         file.write(data)
 
 
 @contextlib.contextmanager
 def writing_whole(path: Path, overwrite: bool = False) -> Iterator[BinaryIO]:
-    """The same, piece by piece: the file is there once the block has ended without an error.
-
-    Raises:
-        OutputError: It exists and may not be replaced, or it cannot be written.
-    """
+    """The same, piece by piece: the file is there once the block has ended without an error."""
     with replacing(path, overwrite) as fresh, fresh.open("xb") as file:
         lock(file)
         yield file
@@ -172,10 +141,6 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
     """The name of a file to be made beside another, which it becomes at the end of the block.
 
     No file has that name before. After an error nothing of it is left.
-
-    Raises:
-        OutputError: The other one exists and may not be replaced, or is a folder, a pipe or a
-            device, or it cannot be written.
     """
     try:
         place = _place(path) if overwrite else path

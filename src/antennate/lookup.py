@@ -33,9 +33,6 @@ def require_package(module: str, name: str, what: str = "", package: str = "") -
         name: The extra.
         what: What needs it, the extra if not given; for the message.
         package: Its name, that of the module if not given.
-
-    Raises:
-        MissingPackageError: It is not installed.
     """
     if importlib.util.find_spec(module) is None:
         raise MissingPackageError(
@@ -199,9 +196,6 @@ def _require_own_modules(path: Path) -> None:
 
     Python knows a module by its name alone, and gives to all the first that it finds. Modules of
     the standard library are left out: they always come first.
-
-    Raises:
-        LookupError: It, or a module beside it, imports such a module.
     """
     files, seen = [path], set(sys.stdlib_module_names)
     while files:

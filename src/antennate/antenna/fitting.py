@@ -47,11 +47,7 @@ _FARTHEST = 10.0
 
 
 def check(samples: Samples) -> None:
-    """Refuse what cannot be calibrated.
-
-    Raises:
-        CalibrationError: Names the row and the cure.
-    """
+    """Refuse what cannot be calibrated."""
     counts, level = samples.counts, samples.level
     if len(counts) < FEWEST:
         raise CalibrationError(
@@ -131,9 +127,6 @@ def fit(
         noise_counts: Noise of the readings as they came [counts], None if it is not known.
         kind: Which curve.
         way: -1 where the antenna is released, shape (n,); 0 if that is not known.
-
-    Raises:
-        CalibrationError: The data cannot be calibrated, or the curve does not fit them.
     """
     check(samples)
     sign = polarity(samples)

@@ -152,9 +152,6 @@ def endurance(params: SpringParams, low: float, high: float) -> Endurance:
         params: Kind of wire, and its diameters.
         low: Smallest torque of a cycle [N·m], negative where the spring is bent the other way.
         high: Largest torque of a cycle [N·m], at least the size of `low`.
-
-    Raises:
-        ConfigError: `low` is larger than `high` in size, or one is no finite number.
     """
     low, high = checks.real("low", low, "N·m"), checks.real("high", high, "N·m")
     if abs(low) > high:

@@ -217,11 +217,7 @@ def tip_compliance(chain: Chain) -> float:
 
 
 def with_profile(antenna: AntennaSpec, profile: str) -> AntennaSpec:
-    """The antenna with the springs of a named profile.
-
-    Raises:
-        ValueError: There is no such profile.
-    """
+    """The antenna with the springs of a named profile."""
     if profile not in PROFILES:
         raise ValueError(f"expected a profile of {', '.join(PROFILES)}, found {profile}")
     coils = antenna.active_coils

@@ -112,11 +112,7 @@ def commands() -> dict[str, str]:
 
 
 def carry_out(name: str, argv: Sequence[str]) -> int:
-    """Run a command on its words and return its exit code.
-
-    Raises:
-        AntennateError: Something given cannot be used, or the run failed.
-    """
+    """Run a command on its words and return its exit code."""
     if name in _OWN:
         module, _, function = _FUNCTIONS.get(name, f"{name}:command").partition(":")
         return getattr(importlib.import_module(f"antennate.cli.{module}"), function)(list(argv))
@@ -127,11 +123,7 @@ def carry_out(name: str, argv: Sequence[str]) -> int:
 
 
 def described(name: str) -> Command:
-    """What the help of a command is made from, which is asked for in place of a run.
-
-    Raises:
-        AntennateError: It cannot be loaded.
-    """
+    """What the help of a command is made from, which is asked for in place of a run."""
     from antennate.cli.arguments import OptionsRequest
 
     try:

@@ -70,10 +70,6 @@ def parse(
         read: Reads a file that holds more than this configuration.
         without: Fields of the other options that this command has not.
         file_of: Which file is read, by the other options.
-
-    Raises:
-        ConfigError: A flag, the file or a value cannot be used.
-        HelpRequest: Help was asked for.
     """
     parameters = list(options_of(model()))
     others = [option for option in options_of(options()) if option.path[0] not in without]
@@ -210,11 +206,7 @@ def as_typed(value: Any) -> str:
 
 
 def require_text(flag: str, text: str) -> None:
-    """Refuse words of the shell that no file of text can keep.
-
-    Raises:
-        ConfigError: They are not in UTF-8.
-    """
+    """Refuse words of the shell that no file of text can keep."""
     if text != text.encode(errors="replace").decode():
         raise ConfigError(f"{flag}: expected text in UTF-8, found {shown(text)}")
 
@@ -224,10 +216,6 @@ def read_words(argv: Sequence[str], options: Sequence[Option]) -> dict[tuple[str
 
     A list takes all words up to the next flag, and those of a flag given again besides. Of other
     flags given twice the last one counts.
-
-    Raises:
-        ConfigError: A flag is unknown, has too few or too many values, or is also given without
-            its name.
     """
     by_flag = {flag: option for option in options for flag in option.flags}
     values: dict[tuple[str, ...], Any] = {}

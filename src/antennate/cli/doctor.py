@@ -48,11 +48,7 @@ class DoctorOptions(ResultOptions, PortOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Examine, put right what was asked for, and tell.
-
-    Raises:
-        AntennateError: Something given cannot be used, or a change did not succeed.
-    """
+    """Examine, put right what was asked for, and tell."""
     config, options = parse_robot("doctor", DESCRIPTION, DoctorConfig, argv, DoctorOptions)
     if not (options.esp32 or options.bus):
         raise ConfigError(

@@ -84,11 +84,7 @@ class DriveOptions(ResultOptions, PortOptions, PageOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Drive until the duration is over or it is stopped.
-
-    Raises:
-        AntennateError: A port, a servo or the board is not what is needed; nothing moved then.
-    """
+    """Drive until the duration is over or it is stopped."""
     config, options = parse_robot("drive", DESCRIPTION, DriveConfig, argv, DriveOptions)
     require_antennae(config.robot, "drive")
     return _walk(VIEW, config, options, argv)
@@ -279,12 +275,7 @@ class TeleopOptions(DriveOptions):
 
 
 def teleop(argv: Sequence[str]) -> int:
-    """Walk by keys until q, the duration is over or it is stopped.
-
-    Raises:
-        AntennateError: A port, a servo or the board is not what is needed, or no key can come;
-            nothing moved then.
-    """
+    """Walk by keys until q, the duration is over or it is stopped."""
     config, options = parse_robot("teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions)
     if config.hold_to_run:
         raise ConfigError(

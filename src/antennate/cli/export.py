@@ -32,9 +32,6 @@ def exported(
         scene: Scene of MJCF, empty for a flat floor.
         seed: Seed of that scene.
         gait: Gait of the walk beside MJCF, empty for the default one.
-
-    Raises:
-        AntennateError: The scene or the gait cannot be used.
     """
     from antennate.sim.export.folder import export_mjcf, export_urdf  # slow to import
     from antennate.sim.scenes.registry import check_name

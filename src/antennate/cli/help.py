@@ -220,9 +220,6 @@ def script(words: Sequence[str], commands: Mapping[str, str], pages: Iterable[Co
         words: Name of the shell.
         commands: What each command does, by name.
         pages: What the help of each is made from.
-
-    Raises:
-        BadInputError: The shell is not one of `SHELLS`.
     """
     if len(words) != 1 or words[0] not in SHELLS:
         shell = one_line(" ".join(words)) or "none"

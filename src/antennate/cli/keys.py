@@ -32,9 +32,6 @@ def typed_keys() -> Iterator[ReadKeys]:
 
     A terminal gives each key at once and shows none meanwhile; it is as before afterwards. The end
     of the input is `END`, from then on.
-
-    Raises:
-        BadInputError: There is no standard input.
     """
     try:
         handle = sys.stdin.fileno()
@@ -71,9 +68,6 @@ def pressed_keys(flag: str) -> Iterator[Callable[[], bool]]:
 
     Args:
         flag: What needs the keys, for the error.
-
-    Raises:
-        ConfigError: Standard input is no terminal, or another program has it.
     """
     stdin = sys.stdin
     if stdin is None or not stdin.isatty():
@@ -146,11 +140,7 @@ class TerminalPerson:
             self._status.show(text)
 
     def ask(self, text: str) -> str:
-        """Ask and wait: the answer in lower case, empty for Enter alone.
-
-        Raises:
-            BadInputError: No answer can come.
-        """
+        """Ask and wait: the answer in lower case, empty for Enter alone."""
         if sys.stdin is not None and sys.stdin.isatty():
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
             self._pending = b""
@@ -160,11 +150,7 @@ class TerminalPerson:
         return answer
 
     def answer(self) -> str | None:
-        """An answer that has come since `ask` or `say`, without waiting; None so far.
-
-        Raises:
-            BadInputError: No answer can come.
-        """
+        """An answer that has come since `ask` or `say`, without waiting; None so far."""
         return self._line(0.0)
 
     def close(self) -> None:

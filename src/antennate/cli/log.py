@@ -89,11 +89,7 @@ class LogOptions(ResultOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Look at one log.
-
-    Raises:
-        AntennateError: The log cannot be read, or the file not written.
-    """
+    """Look at one log."""
     if argv and Path(argv[0]).exists():
         argv = ["info", *argv]
     _, options = parse("log", DESCRIPTION, Params, argv, LogOptions)
@@ -323,11 +319,7 @@ class ShownOptions(FoxgloveOptions):
 
 
 def view(argv: Sequence[str]) -> int:
-    """Show one log on a page until Ctrl-C.
-
-    Raises:
-        AntennateError: There is no such log, or the page cannot be served, or not any more.
-    """
+    """Show one log on a page until Ctrl-C."""
     _, options = parse("view", VIEW_DESCRIPTION, Params, argv, ShownOptions)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")

@@ -113,11 +113,7 @@ class Option:
         return [*map(str, self.choices)] or [*self.examples]
 
     def value(self, word: str) -> Any:
-        """The value of a word; what fits no type stays text and is refused by the model.
-
-        Raises:
-            ConfigError: It is empty and a path is wanted.
-        """
+        """The value of a word; what fits no type stays text and is refused by the model."""
         if not word and Path in self.kinds:
             raise ConfigError(f"{self.flag}: expected a path, found nothing")
         for choice in self.choices:
@@ -132,11 +128,7 @@ class Option:
         return word
 
     def require_others(self, options: Any) -> None:
-        """Refuse it where it changes nothing, as without one of the flags that it needs.
-
-        Raises:
-            ConfigError: None of them is there.
-        """
+        """Refuse it where it changes nothing, as without one of the flags that it needs."""
         others = []
         for need in self.needs:
             flag, _, begin = need.partition(" ")

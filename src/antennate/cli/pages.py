@@ -88,9 +88,6 @@ def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:
     Args:
         options: What is wanted.
         idle: Whether it gives way to everything else, as beside a loop in real time.
-
-    Raises:
-        AntennateError: It cannot be served.
     """
     foxglove = options.port_for_foxglove
     if not options.view and foxglove is None:
@@ -103,11 +100,7 @@ def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:
 
 @contextlib.contextmanager
 def view_of(options: ViewOptions) -> Iterator[SimulationView | None]:
-    """The view of a simulation, None if none is wanted.
-
-    Raises:
-        AntennateError: As `page_of`.
-    """
+    """The view of a simulation, None if none is wanted."""
     process = page_of(options)
     if process is None:
         yield None

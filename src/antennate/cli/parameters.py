@@ -142,11 +142,7 @@ class _Options:
 
 
 def command(argv: Sequence[str]) -> int:
-    """Print the page.
-
-    Raises:
-        ConfigError: A word was given.
-    """
+    """Print the page."""
     parse("parameters", DESCRIPTION, Params, argv, _Options)
     write_result(page())
     return OK

@@ -49,11 +49,7 @@ class RecordOptions(RobotOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Record until all marks or pushes are done, or the time is over.
-
-    Raises:
-        AntennateError: Something given cannot be used, or the board is silent.
-    """
+    """Record until all marks or pushes are done, or the time is over."""
     params, options = parse_robot(
         "record", DESCRIPTION, RecordConfig, argv, RecordOptions, take=RobotFile.for_record
     )

@@ -62,11 +62,7 @@ class ReplayOptions(ViewOptions, ResultOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Replay one log.
-
-    Raises:
-        AntennateError: The log, the controller or the folder cannot be used.
-    """
+    """Replay one log."""
     config, options = parse("replay", DESCRIPTION, ReplayConfig, argv, ReplayOptions)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")

@@ -75,10 +75,6 @@ def folder_for(
         retry: Run its trials again that failed.
         command: Name of the command, if it is not that of the view.
         tasks: As for `RunDirectory.create`.
-
-    Raises:
-        BadInputError: The run that is to go on is another one, or no file can keep the words.
-        OutputError: It cannot be written, or it holds another run.
     """
     for flag, words in flags_and_words(argv):
         for word in words:
@@ -96,11 +92,7 @@ def folder_for(
 
 
 def log_of(path: Path) -> Path:
-    """The log that is meant by its name, or by the folder of a run that has one.
-
-    Raises:
-        BadInputError: There is none, or more than one.
-    """
+    """The log that is meant by its name, or by the folder of a run that has one."""
     if not path.is_dir():
         return path
     files = sorted((path / LOGS).glob("*.mcap"))
@@ -246,11 +238,7 @@ class ReportOptions:
 
 
 def command(argv: Sequence[str]) -> int:
-    """Write the page of a run, or of two.
-
-    Raises:
-        AntennateError: A folder is no run, the runs cannot be compared, or nothing can be written.
-    """
+    """Write the page of a run, or of two."""
     _, options = parse("report", DESCRIPTION, Params, argv, ReportOptions)
     if options.compare and options.run is not None:
         raise ConfigError(f"--compare: expected no other run beside it, found {options.run}")

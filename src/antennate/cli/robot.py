@@ -75,11 +75,7 @@ Chosen = TypeVar("Chosen", bound=RobotFileOptions)
 
 
 def usual_file(options: RobotFileOptions) -> Path | None:
-    """The file to read: the one of --config, else robot.toml of this folder, which is said.
-
-    Raises:
-        ConfigError: One is named, and none is to be read.
-    """
+    """The file to read: the one of --config, else robot.toml of this folder, which is said."""
     if options.config is not None and options.no_config:
         raise ConfigError("--no-config: expected no --config beside it, found both")
     if options.config is not None or options.no_config or not USUAL.exists():
@@ -111,10 +107,6 @@ def parse_robot(
         without: Fields of the other options that this command has not.
         named: What the file of --config holds, if it is no robot's file.
         take: What it takes of a robot's file, if not all that both have.
-
-    Raises:
-        ConfigError: A flag, the file or a value cannot be used.
-        HelpRequest: Help was asked for.
     """
     robot = RobotFile()
 
@@ -146,10 +138,6 @@ def parse_writer(
 
     Without --config it is robot.toml in this folder, which need not exist; with `may_make` that of
     --config need not either.
-
-    Raises:
-        ConfigError: A flag, the file or a value cannot be used.
-        HelpRequest: Help was asked for.
     """
 
     def file_of(chosen: Chosen) -> Path | None:
@@ -166,12 +154,7 @@ def parse_writer(
 
 
 def key_of(options: RobotOptions) -> bytes | None:
-    """The key for a board behind udp://, None if there is no such board.
-
-    Raises:
-        ConfigError: --insecure-udp beside a key, or either without such a board.
-        BadInputError: There is no key, or it cannot be used.
-    """
+    """The key for a board behind udp://, None if there is no such board."""
     if not is_udp(options.esp32):
         for flag, given in (("--key", options.key), ("--insecure-udp", options.insecure_udp)):
             if given:
@@ -197,11 +180,7 @@ def at_hand(options: RobotFileOptions) -> str:
 
 
 def require_two_ports(options: PortOptions) -> None:
-    """Refuse one port for both, and a servo bus on a network that loses packets.
-
-    Raises:
-        ConfigError: They are the same, or the bus is behind udp://.
-    """
+    """Refuse one port for both, and a servo bus on a network that loses packets."""
     bus = options.bus
     if bus and options.esp32 and same(options.esp32, bus):
         raise ConfigError(f"--esp32 and --bus: expected two ports, found {bus} twice")
@@ -209,11 +188,7 @@ def require_two_ports(options: PortOptions) -> None:
 
 
 def require_bus(bus: str) -> None:
-    """Refuse a bus that is not named, or on a network that loses packets.
-
-    Raises:
-        ConfigError: It is.
-    """
+    """Refuse a bus that is not named, or on a network that loses packets."""
     if not bus:
         raise ConfigError(f"--bus: expected a serial port, found none; `{typed('setup')}` finds it")
     _refuse_udp(bus)
@@ -271,11 +246,7 @@ class Options(ResultOptions, RobotFileOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Describe the robot, and write the diagram and the bill, or export it.
-
-    Raises:
-        AntennateError: The robot or the folder cannot be used.
-    """
+    """Describe the robot, and write the diagram and the bill, or export it."""
     config, options = parse_robot("robot", DESCRIPTION, DescribedRobot, argv, Options)
     robot = config.robot
     files, result = None, {}

@@ -70,11 +70,7 @@ class SetupOptions(BusOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Set up what is not, and show what is done.
-
-    Raises:
-        AntennateError: Something given cannot be used, or no answer can come.
-    """
+    """Set up what is not, and show what is done."""
     config, options, path = parse_writer(
         "setup", DESCRIPTION, SetupConfig, argv, SetupOptions, may_make=True
     )
@@ -194,12 +190,7 @@ class ZeroOptions(BusOptions):
 
 
 def zero(argv: Sequence[str]) -> int:
-    """Measure zeros and directions, show them, write them.
-
-    Raises:
-        AntennateError: Something given cannot be used, the servos are not fit, or no answer can
-            come; nothing was written then.
-    """
+    """Measure zeros and directions, show them, write them."""
     config, options, path = parse_writer("zero", ZERO_DESCRIPTION, ZeroConfig, argv, ZeroOptions)
     require_bus(options.bus)
     person = TerminalPerson()
@@ -264,11 +255,7 @@ class JogOptions(BusOptions):
 
 
 def jog(argv: Sequence[str]) -> int:
-    """Move joints until q or the end of the input.
-
-    Raises:
-        AntennateError: Something given cannot be used, or a servo is not fit; no torque is on then.
-    """
+    """Move joints until q or the end of the input."""
     config, options = parse_robot("jog", JOG_DESCRIPTION, JogConfig, argv, JogOptions)
     names = config.robot.joint_names
     if options.joint:

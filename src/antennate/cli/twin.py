@@ -134,11 +134,7 @@ class Places(RobotFileOptions, RecordOptions, PageOptions):
 
 @stop_signals(last=True)
 def command(argv: Sequence[str]) -> int:
-    """Serve until the duration is over, Ctrl-C or SIGTERM.
-
-    Raises:
-        AntennateError: Something given cannot be used.
-    """
+    """Serve until the duration is over, Ctrl-C or SIGTERM."""
 
     def take(file: RobotFile) -> TwinConfig:
         return TwinConfig(robot=file.robot)

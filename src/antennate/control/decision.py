@@ -27,9 +27,6 @@ def decision_of(controller: Controller) -> Decision:
     """The decision of a controller of one robot after its step.
 
     Whether the number is a valid `Maneuver` is checked by the supervisor.
-
-    Raises:
-        ControllerError: `maneuver` or `contact` is not of the form that `Controller` asks for.
     """
     (maneuver,) = _integers(controller, "maneuver", (1,))
     left, right = _integers(controller, "contact", (1, 2))

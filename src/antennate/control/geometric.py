@@ -66,9 +66,6 @@ class TwoGaits:
         bent: Largest flex of each row, 0 to 1, shape (B,), of which `soften` gives way.
         speed: Forward speed by the model [m/s].
         turning: Rate of a turn by the model [rad/s].
-
-    Raises:
-        ConfigError: The robot's legs lift.
     """
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:

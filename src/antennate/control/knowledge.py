@@ -109,9 +109,6 @@ def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, .
         controller: The controller.
         name: Its name, for messages.
         knows: What is offered.
-
-    Raises:
-        ConfigError: It cannot use all of it.
     """
     offered = tuple(knows)
     usable = tuple(controller.knows) if isinstance(controller, Knowing) else ()
@@ -124,11 +121,7 @@ def given_to(controller: Any, name: str, knows: Iterable[Kind]) -> tuple[Kind, .
 
 
 def require_own_senses(controller: Any, name: str, where: str) -> None:
-    """Refuse a controller that needs what only a simulation knows.
-
-    Raises:
-        ConfigError: It does.
-    """
+    """Refuse a controller that needs what only a simulation knows."""
     if needs := needs_of(controller):
         raise ConfigError(
             f"controller: expected one that lives on its readings for {where}, found {name!r}, "

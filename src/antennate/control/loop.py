@@ -137,30 +137,18 @@ class CheckedController:
         return getattr(self._controller, "phase", None)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """Start some rows anew.
-
-        Raises:
-            ControllerError: The controller raised an exception.
-        """
+        """Start some rows anew."""
         with _errors_of("reset"):
             self._controller.reset(copy(rows), copy(phase))
 
     def know(self, knowledge: Knowledge) -> None:
-        """Give it what a simulation knows, if it can use any.
-
-        Raises:
-            ControllerError: The controller raised an exception.
-        """
+        """Give it what a simulation knows, if it can use any."""
         if isinstance(self._controller, Knowing):
             with _errors_of("know"):
                 self._controller.know(knowledge)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One control period of all rows.
-
-        Raises:
-            ControllerError: The step raised an exception, or its answer has another form.
-        """
+        """One control period of all rows."""
         self.faults = {}
         try:
             command = self._controller.step(frame.copy())
@@ -314,11 +302,7 @@ class Retunable(Wrapped):
         super().__init__(make(control))
 
     def retune(self, control: ControlParams) -> None:
-        """Go on with other numbers.
-
-        Raises:
-            ConfigError: There is no such controller with these.
-        """
+        """Go on with other numbers."""
         phase: Any = getattr(self._made, "phase", None)
         self._made = self._make(control)
         self.control = control

@@ -43,11 +43,7 @@ ABOUT: Mapping[str, str] = {
 
 
 def check_readings(text: str) -> str:
-    """The readings of a name, a delay written in one way.
-
-    Raises:
-        ConfigError: There are none of that name, or the delay is no time above 0.
-    """
+    """The readings of a name, a delay written in one way."""
     kind, mark, rest = text.partition(":")
     if kind == DELAYED:
         return f"{DELAYED}:{_delay(text, rest):g}"
@@ -73,11 +69,7 @@ def _delay(text: str, seconds: str) -> float:
 
 
 def require_whole_delay(name: str, period: float) -> None:
-    """Check that a delay, if these readings have one, is of whole control periods [s].
-
-    Raises:
-        ConfigError: It is not.
-    """
+    """Check that a delay, if these readings have one, is of whole control periods [s]."""
     kind, _, seconds = name.partition(":")
     if kind == DELAYED:
         ticks = _delay(name, seconds) / period

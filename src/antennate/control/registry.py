@@ -57,11 +57,7 @@ _FOR_ROBOTS: Registry[ControllerFactory] = Registry(
 
 
 def check_for_robots(name: str) -> str:
-    """Return the name of a controller if a robot may have it; no code of the user runs.
-
-    Raises:
-        ConfigError: There is none of that name, or it needs what only a simulation knows.
-    """
+    """Return the name of a controller if a robot may have it; no code of the user runs."""
     if name in PRIVILEGED:
         raise ConfigError(
             f"expected a controller that lives on its readings, found {name!r}, which needs what "

@@ -27,10 +27,6 @@ class AntennaEnv(NotCopied, Env[Any, Any]):
         scene: Name of the scene.
         render_mode: None; there are no pictures.
         values: As of `EnvConfig`, and `action` for `interface.action`.
-
-    Raises:
-        ConfigError: A value cannot be used.
-        SceneError: The scene cannot be used.
     """
 
     def __init__(self, scene: str = "tunnel", render_mode: None = None, **values: Any) -> None:
@@ -46,11 +42,7 @@ class AntennaEnv(NotCopied, Env[Any, Any]):
 
     @property
     def world(self) -> World:
-        """The world of the running episode: what only the simulation knows, and its engine.
-
-        Raises:
-            ResetNeeded: There is no episode.
-        """
+        """The world of the running episode: what only the simulation knows, and its engine."""
         if not self._episodes.running.all():
             raise ResetNeeded("expected a reset before the world of an episode")
         return self._episodes.world(0)
@@ -58,11 +50,7 @@ class AntennaEnv(NotCopied, Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode.
-
-        Raises:
-            ConfigError: The seed, an option or the episode cannot be used.
-        """
+        """Begin an episode."""
         chosen = known_options(options, ("episode_number",))
         super().reset(seed=None if seed is None else whole("seed", seed))
         if seed is None and not self._seeded:
@@ -76,12 +64,7 @@ class AntennaEnv(NotCopied, Env[Any, Any]):
         return observation[0], _info(truth)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Walk one decision.
-
-        Raises:
-            ConfigError: The action has another shape, or there is no such maneuver.
-            ResetNeeded: There is no episode.
-        """
+        """Walk one decision."""
         if not self._episodes.running.all():
             raise ResetNeeded("expected a reset before a step")
         answers = answers_of(self.config, action, None)

@@ -34,9 +34,6 @@ def answers_of(config: EnvConfig, given: Any, batch: int | None) -> Floats:
     """The answers that actions stand for, shape (B, k): of a batch, or of one robot if it is None.
 
     NaN is HOLD.
-
-    Raises:
-        ConfigError: The actions have another shape, or there is no such maneuver.
     """
     try:
         given = np.asarray(given)

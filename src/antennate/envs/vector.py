@@ -55,11 +55,7 @@ def _no_copy(env: object) -> CopyError:
 
 
 def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
-    """The configuration of keyword arguments; `action` alone stands for `interface.action`.
-
-    Raises:
-        ConfigError: There is no such scene, or a value is unknown or out of bounds.
-    """
+    """The configuration of keyword arguments; `action` alone stands for `interface.action`."""
     values = dict(values)
     if "seed" in values:
         raise ConfigError("expected the seed in reset(seed=...), found it as an argument")
@@ -79,11 +75,7 @@ def config_of(scene: str, values: Mapping[str, Any]) -> EnvConfig:
 
 
 def require_no_pictures(render_mode: object) -> None:
-    """Refuse a render mode.
-
-    Raises:
-        RenderModeError: One is given.
-    """
+    """Refuse a render mode."""
     if render_mode is not None:
         raise RenderModeError(
             f"render_mode: expected None, as environments draw nothing, found {render_mode!r}; "
@@ -104,10 +96,6 @@ class AntennaVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         autoreset_mode: When a row begins its next episode: as of Gymnasium, a member or its name.
         render_mode: None; there are no pictures.
         values: As of `EnvConfig`, and `action` for `interface.action`.
-
-    Raises:
-        ConfigError: A value cannot be used.
-        SceneError: The scene cannot be used.
     """
 
     def __init__(
@@ -144,11 +132,7 @@ class AntennaVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes in all rows, or in those of `options["reset_mask"]`, shape (B,).
-
-        Raises:
-            ConfigError: A seed, an option, a mask or an episode cannot be used.
-        """
+        """Begin episodes in all rows, or in those of `options["reset_mask"]`, shape (B,)."""
         chosen = known_options(options, ("reset_mask", "episode_number"))
         rows = _mask(chosen.get("reset_mask"), self.num_envs)
         self._seed(seed, chosen.get("episode_number"), rows)
@@ -158,12 +142,7 @@ class AntennaVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         return self._observation.copy(), _infos(truth, rows, np.zeros(self.num_envs, bool))
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Walk one decision of all rows.
-
-        Raises:
-            ConfigError: The actions have another shape, or there is no such maneuver.
-            ResetNeeded: A row has no episode, and none begins by itself.
-        """
+        """Walk one decision of all rows."""
         fresh = self._over
         if not self._seeded or (fresh.any() and self.autoreset_mode is AutoresetMode.DISABLED):
             raise ResetNeeded(f"expected a reset of rows {np.flatnonzero(fresh)} before a step")
@@ -216,11 +195,7 @@ class AntennaVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
 
 
 def _each(name: str, values: Any, count: int) -> list[Any]:
-    """A value for each row.
-
-    Raises:
-        ConfigError: There is another number of them, or it is no list.
-    """
+    """A value for each row."""
     if not _is_list(values):
         raise ConfigError(
             f"{name}: expected a whole number, or {count} of them, found {shown(values)}"
@@ -236,11 +211,7 @@ def _is_list(values: Any) -> bool:
 
 
 def known_options(options: Mapping[str, Any] | None, names: Sequence[str]) -> Mapping[str, Any]:
-    """The options of a reset.
-
-    Raises:
-        ConfigError: They are not given by name, or one is not of these names.
-    """
+    """The options of a reset."""
     if not isinstance(options, Mapping | None):
         raise ConfigError(f"options: expected values by name, found {shown(options)}")
     for name in options or {}:
@@ -253,11 +224,7 @@ def known_options(options: Mapping[str, Any] | None, names: Sequence[str]) -> Ma
 
 
 def whole(name: str, value: Any) -> int:
-    """A seed or the number of an episode.
-
-    Raises:
-        ConfigError: It is no whole number of 0 to `LARGEST_SEED`.
-    """
+    """A seed or the number of an episode."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_whole or not 0 <= value <= LARGEST_SEED:
         raise ConfigError(
@@ -267,11 +234,7 @@ def whole(name: str, value: Any) -> int:
 
 
 def _mode(name: AutoresetMode | str) -> AutoresetMode:
-    """The autoreset mode of a member, its name or its value.
-
-    Raises:
-        ConfigError: There is none.
-    """
+    """The autoreset mode of a member, its name or its value."""
     if isinstance(name, AutoresetMode):
         return name
     for mode in AutoresetMode:
@@ -285,11 +248,7 @@ def _mode(name: AutoresetMode | str) -> AutoresetMode:
 
 
 def _mask(mask: Any, batch: int) -> Bools:
-    """Rows to begin: all without a mask.
-
-    Raises:
-        ConfigError: The mask is no array of `batch` booleans with one True at least.
-    """
+    """Rows to begin: all without a mask."""
     if mask is None:
         return np.ones(batch, bool)
     mask = np.asarray(mask)

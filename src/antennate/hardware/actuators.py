@@ -125,11 +125,7 @@ class Actuators(Protocol):
         ...
 
     def check(self, command: JointCommand) -> JointCommand:
-        """A copy of a command of one robot, which may have been anything.
-
-        Raises:
-            CommandError: It cannot be sent: a wrong shape, not finite, or beyond a limit.
-        """
+        """A copy of a command of one robot, which may have been anything."""
         ...
 
     def enable(self, command: JointCommand) -> None:

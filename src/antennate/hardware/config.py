@@ -67,13 +67,7 @@ class RobotConfig(Params):
         return self.reach, self.reach if self.reach_right is None else self.reach_right
 
     def calibrated(self) -> Self:
-        """The same with the curve and the flex sensor of the calibration file in place of its name.
-
-        Raises:
-            CalibrationError: The file cannot be used, or is of another flex sensor.
-            ConfigError: There is another curve, or another theta, beside it, or the name of a flex
-                sensor without its file.
-        """
+        """The configuration with curve and flex sensor of the calibration file in place of its name."""
         self._require_files()
         if self.calibration is None and self.calibration_right is None:
             return self

@@ -168,12 +168,7 @@ class Joints:
         self.turning: Ints = np.flatnonzero(np.isinf(self._limit))
 
     def ticks(self, command: JointCommand) -> Ints:
-        """Goal positions [ticks] of a command of one robot, shape (n,).
-
-        Raises:
-            CommandError: It is not of one robot, not finite, or beyond a limit or what servos
-                count. It is refused as a whole.
-        """
+        """Goal positions [ticks] of a command of one robot, shape (n,)."""
         parts = (_part(command, name, shape) for name, shape in self._shapes.items())
         angles = np.concatenate([part.ravel() for part in parts])
         with np.errstate(over="ignore"):  # infinite then, and refused

@@ -123,21 +123,13 @@ def paths_of(model: type[Params], path: str = "") -> tuple[str, ...]:
 
 
 def require_default(config: Params, why: str, *paths: str) -> None:
-    """Check that dotted parameters which nothing reads have their defaults.
-
-    Raises:
-        ValueError: One has not.
-    """
+    """Check that dotted parameters which nothing reads have their defaults."""
     for path, *_ in changes(config, paths):
         raise ValueError(f"{path}: expected the default, as {why}, found another")
 
 
 def require_different(name: str, values: Sequence[Any]) -> None:
-    """Check that no value stands twice in a list.
-
-    Raises:
-        ValueError: One does.
-    """
+    """Check that no value stands twice in a list."""
     if len(set(values)) < len(values):
         raise ValueError(f"{name} must differ, found {', '.join(map(str, values))}")
 
@@ -150,9 +142,6 @@ def require_whole_steps(name: str, rate: float, timestep: float, share: int = 1)
         rate: Periods a second [Hz].
         timestep: Physics step [s].
         share: Into how many equal parts of whole steps a period is split.
-
-    Raises:
-        ValueError: It has not.
     """
     steps = 1.0 / (rate * share * timestep)
     if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
@@ -273,9 +262,6 @@ def read_file(path: Path, model: type[Config]) -> Config:
     Args:
         path: The file.
         model: What it holds.
-
-    Raises:
-        ConfigError: The file cannot be read, is no TOML, or holds what the model refuses.
     """
     table = with_bases(read_toml(path, LARGEST_FILE), model, path.parent)
     try:
@@ -329,11 +315,7 @@ def put_over(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any
 
 
 def from_values(model: type[Config], values: Mapping[str, Any]) -> Config:
-    """A configuration from values given in Python.
-
-    Raises:
-        ConfigError: A value is unknown, of the wrong type or out of bounds.
-    """
+    """A configuration from values given in Python."""
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:

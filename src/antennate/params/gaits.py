@@ -127,9 +127,6 @@ class GaitParams(Params):
         Args:
             text: The name, or the path of the file.
             folder: Where a path that is not absolute starts.
-
-        Raises:
-            ConfigError: There is no such gait, or its file cannot be used.
         """
         if (table := GAITS.get(str(text))) is not None:
             return cls.model_validate(table)

@@ -129,9 +129,6 @@ def require_own_curve(sensor: SensorParams, name: str, curve: CurveParams | None
         sensor: The flex sensor.
         name: The parameter that is the curve.
         curve: The curve from its counts to the level.
-
-    Raises:
-        ValueError: Its level would fall as the antenna bends.
     """
     if curve is not None and curve.polarity != sensor.polarity:
         way = "rise" if sensor.polarity > 0 else "fall"

@@ -51,9 +51,6 @@ class JointParams(Params):
         Args:
             name: What the group is called.
             count: Number of its joints.
-
-        Raises:
-            ValueError: There is such a list.
         """
         for what in ("ids", "directions", "zeros"):
             if (found := len(getattr(self, what))) not in (0, count):

@@ -172,11 +172,7 @@ def wave_of(gait: GaitParams, offset: float = 0.0) -> Wave:
 
 
 def require_wave(robot: RobotSpec, gait: GaitParams) -> None:
-    """Check that the yaw joints can make the body wave of a gait.
-
-    Raises:
-        ConfigError: They cannot: it is beyond their limit, or the wave is faster than they are.
-    """
+    """Check that the yaw joints can make the body wave of a gait."""
     if gait.amplitude > robot.yaw_limit + 1e-9:
         raise ConfigError(
             f"gait.amplitude: expected at most {robot.yaw_limit:.4g} rad, the limit of the yaw "
@@ -255,9 +251,6 @@ def twist_map(
         amplitudes: Amplitudes of the table, from 0 to the limit of the yaw joints.
         offsets: Offsets of the table, from 0 to 0.35 rad or that limit.
         phases: Steps of a cycle.
-
-    Raises:
-        ConfigError: The legs lift.
     """
     if robot.legs.kind != "rolling":
         raise ConfigError("twist map: expected a robot with rolling legs, found lifting ones")

@@ -376,11 +376,7 @@ class RobotSpec(Params):
 
 
 def require_antennae(robot: RobotSpec, what: str) -> None:
-    """Check that a robot has antennae.
-
-    Raises:
-        ConfigError: It has none, so that `what` cannot be done.
-    """
+    """Check that a robot has antennae."""
     if not robot.antenna_count:
         raise ConfigError(
             f"expected a robot with antennae for {what}, found one without (antennae.kind)"

@@ -209,12 +209,7 @@ class Bench:
         self.data.ctrl[self._base_servo] = base
 
     def step(self, count: int = 1) -> None:
-        """Advance by `count` physics steps.
-
-        Raises:
-            SimulationError: A command is not finite, the engine warned, time stood still, or the
-                state left all bounds.
-        """
+        """Advance by `count` physics steps."""
         with self._checked(count):
             mujoco.mj_step(self.model, self.data, count)
 
@@ -223,9 +218,6 @@ class Bench:
 
         A contact that lasts is not on in every step; its mean converges, its share of steps does
         not.
-
-        Raises:
-            SimulationError: As for `step`.
         """
         total = np.zeros(2)
         with self._checked(count):

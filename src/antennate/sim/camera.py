@@ -56,10 +56,6 @@ class Camera:
         shot: From where it looks.
         size: Width and height [pixels].
         sides: Colours of the left and the right antenna.
-
-    Raises:
-        MissingPackageError: PyOpenGL is not installed.
-        BadInputError: Nothing here can draw.
     """
 
     def __init__(

@@ -114,13 +114,7 @@ def keep_wish() -> None:
 
 @functools.cache
 def backend() -> str:
-    """The first way to draw that works, or the one that MUJOCO_GL names.
-
-    Raises:
-        MissingPackageError: PyOpenGL is not installed.
-        BadInputError: None works; the text names the packages of the system to install. Or
-            MUJOCO_GL names something else.
-    """
+    """The first way to draw that works, or the one that MUJOCO_GL names."""
     if find_spec("OpenGL") is None:
         raise MissingPackageError(
             f"video: expected the package PyOpenGL, found none; install it with {extra('video')}"

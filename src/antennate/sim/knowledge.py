@@ -40,11 +40,7 @@ ON_ROUTE: tuple[Kind, ...] = ("side", "facing", "map")
 
 
 def require_route(name: str, scene: SceneInstance, kinds: Sequence[Kind]) -> None:
-    """Check that a scene has the route from which these kinds follow.
-
-    Raises:
-        SceneError: It has none, or one that is no line.
-    """
+    """Check that a scene has the route from which these kinds follow."""
     lacking = [kind for kind in kinds if kind in ON_ROUTE]
     if lacking and _route_of(scene) is None:
         raise SceneError(

@@ -52,9 +52,6 @@ def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, 
 
     Returns:
         Unit quaternion, real part first.
-
-    Raises:
-        ConfigError: The side is unknown.
     """
     c, s = math.cos(angle / 2), math.sin(angle / 2)
     if side not in ("left", "right"):

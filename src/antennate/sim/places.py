@@ -102,11 +102,7 @@ class Gears:
         self.damping: Floats = model.dof_damping[self.dof]
 
     def step(self, data: mujoco.MjData, count: int) -> None:
-        """Advance by `count` physics steps, each with friction from the torques of the one before.
-
-        Raises:
-            mujoco.FatalError: The engine failed.
-        """
+        """Advance by `count` physics steps, each with friction from the torques before it."""
         if not len(self.dof):
             mujoco.mj_step(self._model, data, count)
             return

@@ -188,11 +188,7 @@ class Shapes(NamedTuple):
 
     @classmethod
     def unpack(cls, content: bytes) -> Shapes:
-        """Back from `pack`.
-
-        Raises:
-            BadInputError: It is something else.
-        """
+        """Back from `pack`."""
         try:
             with np.load(io.BytesIO(content[:_LARGEST]), allow_pickle=False) as file:
                 return cls(*(file[name] for name in cls._fields))
@@ -215,9 +211,6 @@ def picture(content: bytes, shapes: Shapes) -> tuple[float, Poses, Arrows] | Non
     """Time [s] of a snapshot, where the shapes are, and normal forces of obstacles on the robot.
 
     None if it is of another model, whose shapes have not come.
-
-    Raises:
-        BadInputError: It is something else.
     """
     try:
         t, geoms, count, rows = _SNAPSHOT.unpack_from(content)

@@ -115,9 +115,6 @@ class SimRobot:
         robot: The robot of every row.
         period: Control period [s]; a whole number of physics steps.
         timestep: Physics step [s].
-
-    Raises:
-        ConfigError: The period is not a whole number of physics steps.
     """
 
     def __init__(self, batch: int, robot: RobotSpec, period: float, timestep: float) -> None:

@@ -48,11 +48,7 @@ class Site:
 
 
 def outline(walls: TouchWallsParams, kind: WallKind, site: Site) -> list[Floats]:
-    """Surface lines of a wall, each of shape (n, 2) [m]; for boulders, their centres.
-
-    Raises:
-        SceneError: The wall does not fit into its length.
-    """
+    """Surface lines of a wall, each of shape (n, 2) [m]; for boulders, their centres."""
     if kind == "boulders":
         return [_boulders(walls, site)]
     if kind == "flat":
@@ -69,11 +65,7 @@ def outline(walls: TouchWallsParams, kind: WallKind, site: Site) -> list[Floats]
 
 
 def build(walls: TouchWallsParams, kind: WallKind, site: Site, x: float) -> list[Ball | Bar]:
-    """The obstacles of a wall that begins at x [m].
-
-    Raises:
-        SceneError: The wall does not fit into its length.
-    """
+    """The obstacles of a wall that begins at x [m]."""
     lines = outline(walls, kind, site)
     if kind == "boulders":
         radius = walls.boulders.radius

@@ -91,11 +91,7 @@ def add_robot(spec: mujoco.MjSpec, robot: RobotSpec, physics: PhysicsParams) -> 
 def compile_world(
     physics: PhysicsParams, robot: RobotSpec, scene: SceneInstance | None = None
 ) -> mujoco.MjModel:
-    """The world of `world_spec`, compiled.
-
-    Raises:
-        SceneError: The engine cannot compile it.
-    """
+    """The world of `world_spec`, compiled."""
     spec = world_spec(physics, robot, scene)
     try:
         return spec.compile()
@@ -214,11 +210,7 @@ class World:
         mujoco.mj_forward(self.model, self.data)
 
     def command(self, drive: Floats) -> None:
-        """Set the targets of all joints that servos move, in the robot's order [rad], shape (n,).
-
-        Raises:
-            SimulationError: A target is not finite; nothing is set then.
-        """
+        """Set the targets of all servo joints, in the robot's order [rad], shape (n,)."""
         if not np.isfinite(drive).all():
             bad = int(np.flatnonzero(~np.isfinite(drive))[0])
             raise SimulationError(
@@ -283,20 +275,12 @@ class World:
         return np.stack(parts, axis=1), angles
 
     def step(self, count: int) -> None:
-        """Advance by `count` physics steps.
-
-        Raises:
-            SimulationError: The engine warned, time stood still, or the state left all bounds.
-        """
+        """Advance by `count` physics steps."""
         self.advance(count)
         self.check()
 
     def advance(self, count: int) -> None:
-        """Advance by `count` physics steps as `step` does, but leave the look at them to `check`.
-
-        Raises:
-            SimulationError: The engine failed.
-        """
+        """Advance by `count` physics steps as `step` does; `check` looks at them later."""
         self._before = self.data.time
         self._steps += count
         try:
@@ -305,11 +289,7 @@ class World:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error
 
     def check(self) -> None:
-        """Look at the state after `advance`.
-
-        Raises:
-            SimulationError: The engine warned, time stood still, or the state left all bounds.
-        """
+        """Look at the state after `advance`."""
         data = self.data
         warned = [n for n, count in zip(_WARNINGS, data.warning.number, strict=True) if count]
         troubles = (

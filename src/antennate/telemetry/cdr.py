@@ -63,11 +63,7 @@ class MessageType:
         self._first = struct.Struct(layout)
 
     def encode(self, *values: Any) -> bytes:
-        """The bytes of a message with these values, one for each field.
-
-        Raises:
-            LogError: A number does not fit its field.
-        """
+        """The bytes of a message with these values, one for each field."""
         flat: list[Any] = []
         for field, value in zip(self.fields[: self._leading], values, strict=False):
             flat += value if field.number else (value,)
@@ -82,11 +78,7 @@ class MessageType:
         return _HEADER + body
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """The values by name; several are a tuple.
-
-        Raises:
-            LogError: The bytes are no message of this type.
-        """
+        """The values by name; several are a tuple."""
         body = data[len(_HEADER) :]
         values: dict[str, Any] = {}
         try:

@@ -90,10 +90,6 @@ def walk(file: BinaryIO, wanted: Container[int] | None = None) -> Iterator[Chunk
     Args:
         file: The file.
         wanted: Where chunks begin that are read, None for all; of others only the CRC is checked.
-
-    Raises:
-        OSError: The file cannot be read.
-        LogError: Its chunks are compressed by lz4.
     """
     size, foreign = file.seek(0, io.SEEK_END), _writer(file) not in (None, LIBRARY)
     at, closed, unpacked, counts = len(MAGIC), False, 0, Counter[int]()
@@ -217,13 +213,7 @@ def _chunk(at: int, content: bytes, wanted: bool, foreign: bool) -> Chunk | Faul
 
 
 def summary(file: BinaryIO) -> Iterator[McapRecord]:
-    """The records at the end of a closed file; none where they have no CRC.
-
-    Raises:
-        OSError: The file cannot be read.
-        ValueError: The file was not closed, or its end is damaged. A hostile one may make it raise
-            any of `UNSOUND` later.
-    """
+    """The records at the end of a closed file; none where they have no CRC."""
     foot = file.seek(0, io.SEEK_END) - _FOOT.size - len(MAGIC)
     if foot < 0:
         raise ValueError("not closed")
@@ -245,11 +235,7 @@ def summary(file: BinaryIO) -> Iterator[McapRecord]:
 
 
 def is_own(file: BinaryIO) -> bool:
-    """Whether a file says that antennate wrote it.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
+    """Whether a file says that antennate wrote it."""
     return _writer(file) == LIBRARY
 
 

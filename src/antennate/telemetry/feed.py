@@ -242,9 +242,6 @@ def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterat
     Args:
         stream: What the sending end writes to; without a buffer if `idle` is given.
         idle: Called now and then while nothing comes.
-
-    Raises:
-        LogError: The stream ended in the middle: the sender was killed.
     """
     while True:
         while idle is not None and not select.select((stream,), (), (), _IDLE)[0]:

@@ -123,11 +123,7 @@ def _drawable(values: Floats | Sequence[float] | Sequence[tuple[float, ...]]) ->
 
 
 def drawn(path: Path) -> tuple[LogReader, Figure]:
-    """A log as it was read, and its figure.
-
-    Raises:
-        LogError: It cannot be read, or has no ticks.
-    """
+    """A log as it was read, and its figure."""
     with LogReader(path) as log:
         log.survey()
         log.require_ticks()

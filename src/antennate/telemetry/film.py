@@ -144,11 +144,7 @@ class FilmRecorder:
         bands: Sequence[Band],
         ending: str = "",
     ) -> Film:
-        """The film of what was kept; the camera follows gently.
-
-        Raises:
-            BadInputError: Nothing was kept.
-        """
+        """The film of what was kept; the camera follows gently."""
         if not self._kept:
             raise _nothing(title)
         targets = _smooth(np.array([where for *_, where in self._kept]), RATE)
@@ -181,11 +177,7 @@ class WalkRecorder(FilmRecorder):
         return self.film(title, self._model, self._shot, [counts, *traces], bands, ending)
 
     def decided(self, title: str, threshold: float | None, ending: str = "") -> Film:
-        """The film of a walk with `level`, `contact` and `maneuver`, -1 where it is not known.
-
-        Raises:
-            BadInputError: Nothing was kept.
-        """
+        """The film of a walk with `level`, `contact` and `maneuver`, -1 where it is not known."""
         if not len(self):
             raise _nothing(title)
         maneuver = self.values("maneuver")
@@ -243,12 +235,7 @@ def maneuver_band(maneuver: Ints) -> Band:
 
 
 def require_video() -> None:
-    """Find out whether films can be made here, before anything is run.
-
-    Raises:
-        MissingPackageError: PyAV or PyOpenGL is not installed.
-        BadInputError: PyAV cannot encode H.264, or nothing here can draw.
-    """
+    """Find out whether films can be made here, before anything is run."""
     _encoder()
     engine_setup.backend()
 
@@ -270,11 +257,7 @@ def _encoder() -> str:
 
 
 def pictures(film: Film, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Picture]:
-    """Every picture of a film with its strip, shape (height + STRIP, width, 3), then its ending.
-
-    Raises:
-        AntennateError: Nothing here can draw.
-    """
+    """Every picture of a film with its strip, shape (height + STRIP, width, 3), then its ending."""
     strip = Strip(film.title, film.t, film.traces, film.bands, width, STRIP)
     sides = (rgba(SERIES[0]), rgba(SERIES[1]))
     last: tuple[Picture, Picture] | None = None
@@ -294,9 +277,6 @@ def encoded(film: Film, on_step: Callable[[int, int], None] = lambda done, total
     Args:
         film: What to draw.
         on_step: Called with how many of how many pictures are drawn.
-
-    Raises:
-        AntennateError: As `require_video`, or the encoder failed.
     """
     name, av = _encoder(), importlib.import_module("av")
     file = io.BytesIO()

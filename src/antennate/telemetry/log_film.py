@@ -25,9 +25,6 @@ def film_of(log: LogReader, arena: World | None, title: str) -> Film:
         log: The log; it is read.
         arena: The world in which it was simulated, None for a bare floor.
         title: What is shown, in a few words.
-
-    Raises:
-        LogError: It has no ticks.
     """
     robot, threshold = log.header.robot, log.header.params.rule.threshold
     recorder, scene, placed = WalkRecorder(robot), LogScene(log.header, None), False

@@ -69,9 +69,6 @@ class LogReader:
         damage: The first of them.
         guarded: Whether all that was read so far has a CRC, as antennate writes it.
         end: Ticks that were written, if the log was closed and its end is read; else None.
-
-    Raises:
-        LogError: The file cannot be read, or has no header; says what can be read of it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -108,21 +105,13 @@ class LogReader:
         return max(after, self.last - self.ticks)
 
     def __iter__(self) -> Iterator[Tick]:
-        """The ticks, in order.
-
-        Raises:
-            LogError: As of `groups`.
-        """
+        """The ticks, in order."""
         for _, tick in self.groups():
             if tick is not None:
                 yield tick
 
     def require_ticks(self) -> None:
-        """Require that some have been read.
-
-        Raises:
-            LogError: There are none.
-        """
+        """Require that some have been read."""
         if not self.ticks:
             why = f": {self.damage[0].reason} at byte {self.damage[0].offset}" if self.bad else ""
             raise LogError(f"{self.path}: expected a log with ticks, found none{why}")
@@ -131,10 +120,6 @@ class LogReader:
         """All messages as they are: those of one tick, with it, then those of none.
 
         The messages of one time are a tick; another one begins where a topic of ticks comes again.
-
-        Raises:
-            LogError: The disk fails, or another program wrote the messages in another order or
-                compressed them by lz4.
         """
         group, begin, size, last = list[Record](), 0, 0, 0
         for chunk in self._chunks:
@@ -165,9 +150,6 @@ class LogReader:
 
         Of a log of antennate, closed, in one file, little but events is decoded: its summary tells
         the rest, and the CRC of each chunk is checked. All others are read as by `groups`.
-
-        Raises:
-            LogError: As of `groups`.
         """
         try:
             survey = by_summary(self._file, self._channels) if len(self.parts) == 1 else None
@@ -337,10 +319,6 @@ def recover(path: Path, target: Path, overwrite: bool = False) -> LogReader:
 
     Returns:
         The reader, at the end: how many ticks there are, and what is damaged or missing.
-
-    Raises:
-        LogError: There is no log, nothing of it is intact, or the disk is full.
-        OutputError: The target exists or cannot be written. Nothing is left after an error.
     """
     with LogReader(path) as log, replacing(target, overwrite) as fresh:
         room = 1.5 * sum(part.stat().st_size for part in log.parts)

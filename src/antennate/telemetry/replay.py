@@ -108,11 +108,7 @@ class ReplayRobot:
             self.tick, self._next = self._next, next(self._ticks, None)
 
     def read(self) -> AntennaFrame:
-        """The frame of the present tick.
-
-        Raises:
-            LogError: The log is over.
-        """
+        """The frame of the present tick."""
         if self.tick is None:
             raise LogError("expected a tick to replay, found the end of the log")
         positions = self._measured(self.tick) - self._bias if self._simulated else self._before
@@ -286,11 +282,6 @@ def changed_readings(
         name: The readings, as `ReplayConfig` has them.
         donor: The ticks of the log that `yoked` gives, None without one.
         lent: The header of that log.
-
-    Raises:
-        LogError: The log holds changed readings itself, or the other one does, is of the same
-            trial or drive, or holds no ticks.
-        ConfigError: There are no such readings.
     """
     if lent is not None:
         if lent.readings != OWN:
@@ -313,13 +304,7 @@ def _when(header: Header) -> tuple[object, ...]:
 
 
 def recorded_controller(header: Header, name: str | None = None) -> Controller:
-    """The controller of a log as it began, or one of another name with the same numbers.
-
-    Raises:
-        LogError: It is code outside this package, and only the log names it; or it decided upon
-            what a simulation knew.
-        ConfigError: There is none of that name.
-    """
+    """The controller of a log as it began, or one of another name with the same numbers."""
     wanted = header.controller if name is None else name
     if name is None and wanted not in {*BUILT_IN, *PRIVILEGED}:
         more = "closed, for example" if wanted == TWIN else "with its name if it may run"

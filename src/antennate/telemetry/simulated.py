@@ -49,9 +49,6 @@ class TickLog:
 
     Attributes:
         path: The file.
-
-    Raises:
-        LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
     def __init__(
@@ -67,11 +64,7 @@ class TickLog:
         self._writing: Future[None] | None = None
 
     def add(self, tick: Any) -> None:
-        """Keep one tick.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Keep one tick."""
         now = time.monotonic()
         if not self._held:
             self._since = now
@@ -80,41 +73,25 @@ class TickLog:
             self._begin()
 
     def write(self, ticks: Sequence[Any]) -> None:
-        """Write ticks at once, in this thread, after those that were added.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Write ticks at once, in this thread, after those that were added."""
         self.flush()
         if ticks:
             self._write(ticks)
 
     def settle(self) -> None:
-        """Write what has waited long enough; to be called where no tick may follow for a while.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Write what has waited long enough; to be called where no tick may follow for a while."""
         if time.monotonic() - self._since >= _PATIENCE:
             self.flush()
         self._wait()
         self._out.settle()
 
     def event(self, text: str, t: float = 0.0) -> None:
-        """Keep what happened after the last tick, at a time of the loop [s].
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Keep what happened after the last tick, at a time of the loop [s]."""
         self.flush()
         self._out.event(text, t=t)
 
     def close(self) -> None:
-        """End it.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """End it."""
         try:
             self.flush()
         except KeyboardInterrupt:
@@ -130,11 +107,7 @@ class TickLog:
         self.close()
 
     def flush(self) -> None:
-        """Encode what is held and hand it to the operating system.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Encode what is held and hand it to the operating system."""
         self._begin()
         self._wait()
 
@@ -260,9 +233,6 @@ class SimulatedLog(TickLog):
         world: The robot in its scene.
         decisions: What is decided for it.
         row: Its row there.
-
-    Raises:
-        LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
     def __init__(
@@ -274,11 +244,7 @@ class SimulatedLog(TickLog):
         self._ticks = 0
 
     def take(self, decided: bytes) -> None:
-        """Keep one tick, of which `Decisions` says this.
-
-        Raises:
-            LogError: The disk is full or gone.
-        """
+        """Keep one tick, of which `Decisions` says this."""
         self.add(self.tick(decided))
 
     def tick(self, decided: bytes) -> TakenTick:

@@ -63,9 +63,6 @@ def by_summary(file: BinaryIO, topics: Mapping[int, Topic]) -> Survey | None:
     Args:
         file: The log.
         topics: Its topics by their channel.
-
-    Raises:
-        OSError: It cannot be read.
     """
     from antennate.telemetry.chunks import UNSOUND, Fault, is_own, walk  # slow to import
 

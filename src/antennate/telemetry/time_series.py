@@ -161,11 +161,7 @@ class TimeSeriesRecorder:
         self._ticks["head"].append(np.array(self._head()))
 
     def series(self, meta: Mapping[str, str | int | float | None]) -> TimeSeries:
-        """What was collected.
-
-        Raises:
-            BadInputError: Nothing was.
-        """
+        """What was collected."""
         if not self._ticks["t"]:
             raise BadInputError("time series: expected at least one tick, found none")
         arrays: dict[str, Any] = {name: np.array(values) for name, values in self._ticks.items()}

@@ -25,11 +25,7 @@ class Topic(NamedTuple):
     meaning: str
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """The values of a message by name.
-
-        Raises:
-            LogError: The bytes are no message of its type; says which topic and type.
-        """
+        """The values of a message by name."""
         try:
             return self.type.decode(data)
         except LogError as error:
@@ -260,9 +256,6 @@ def by_channel(channels: Mapping[int, Channel], schemas: Mapping[int, Schema]) -
     Args:
         channels: The channels by their number.
         schemas: The definitions of messages by their number.
-
-    Raises:
-        LogError: A topic has messages of another definition.
     """
     known = {topic.name: topic for topic in TOPICS}
     named: dict[int, Topic] = {}

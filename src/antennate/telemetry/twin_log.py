@@ -145,9 +145,6 @@ class TwinLog(LogQueue):
         config: What is served.
         start: Time of its beginning [ns], a Unix time.
         on_failure: As for `LogQueue`.
-
-    Raises:
-        LogError: The file exists or cannot be written, or the disk is nearly full.
     """
 
     def __init__(

@@ -165,9 +165,6 @@ class TouchStimulus:
     Args:
         orders: As above.
         antenna: The antenna, for its springs and its flex sensor.
-
-    Raises:
-        BadInputError: An order has another form.
     """
 
     def __init__(self, orders: Sequence[str], antenna: AntennaSpec) -> None:
@@ -181,11 +178,7 @@ class TouchStimulus:
         self._begun = math.inf
 
     def order(self, text: str) -> None:
-        """Take an order, to be carried out at once.
-
-        Raises:
-            BadInputError: It has another form.
-        """
+        """Take an order, to be carried out at once."""
         side, flex, length, _ = _read_touch(text, self._antenna, timed=False)
         self._fresh.append((side, flex, length))
 
@@ -256,9 +249,6 @@ class UdpEndpoint:
         key: The board's.
         now: Monotonic time [s].
         size: Of the frames of its samples [byte].
-
-    Raises:
-        BadInputError: The port cannot be had.
     """
 
     def __init__(

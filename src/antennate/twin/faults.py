@@ -95,11 +95,7 @@ class Demand:
 
 
 def read(text: str) -> Demand:
-    """One demand from its text.
-
-    Raises:
-        BadInputError: It has another form, is not known, or lacks a size or has one out of range.
-    """
+    """One demand from its text."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise BadInputError(
@@ -151,9 +147,6 @@ class Faults:
 
     Attributes:
         on_begin: Told each of them as it happens, and the time [s].
-
-    Raises:
-        BadInputError: One is for something that is not there.
     """
 
     def __init__(
@@ -171,11 +164,7 @@ class Faults:
             self._require(demand)
 
     def order(self, text: str) -> None:
-        """Let a fault begin with the next tick.
-
-        Raises:
-            BadInputError: It has another form, or is for something that is not there.
-        """
+        """Let a fault begin with the next tick."""
         demand = read(text)
         self._require(demand)
         self._waiting.insert(0, demand)

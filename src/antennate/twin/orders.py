@@ -44,9 +44,6 @@ class Pushes:
         orders: Joint, angle and time of each.
         names: Names of the joints, in the order of the servos.
         ticks: Where the shaft of the servo at a place is at an angle [rad].
-
-    Raises:
-        BadInputError: An order has another form, or names a joint that is not there.
     """
 
     def __init__(
@@ -61,20 +58,12 @@ class Pushes:
         self._begin = math.inf
 
     def now(self, text: str, t: float, servos: Sequence[Servo]) -> None:
-        """Begin a turn at time t [s].
-
-        Raises:
-            BadInputError: The order has another form or names no joint.
-        """
+        """Begin a turn at time t [s]."""
         places, angle, _ = self._read(text, "push")
         self._start(places, angle, t, servos)
 
     def places(self, name: str, what: str) -> list[int]:
-        """Places of servos in their list, by the name of a joint, a number from 1 on or `all`.
-
-        Raises:
-            BadInputError: There is none.
-        """
+        """Places of servos in their list, by the name of a joint, a number from 1 on or `all`."""
         if name == ALL:
             return list(range(len(self._names)))
         if name in self._names:
@@ -144,11 +133,7 @@ class Plugging:
         self._pushes = pushes
 
     def begin(self, plugged: Sequence[str]) -> None:
-        """Leave only some servos on the bus; all if none is named.
-
-        Raises:
-            BadInputError: A name is not known.
-        """
+        """Leave only some servos on the bus; all if none is named."""
         if not plugged:
             return
         chosen = {
@@ -162,11 +147,7 @@ class Plugging:
                 servo.plug(0.0, into=False)
 
     def order(self, text: str, t: float) -> None:
-        """Do what an order says at time t [s].
-
-        Raises:
-            BadInputError: It is none, or names a servo that is not there.
-        """
+        """Do what an order says at time t [s]."""
         word, _, rest = text.strip().partition(" ")
         rest = rest.strip()
         if word == "push":
@@ -198,9 +179,6 @@ class Orders:
     Args:
         path: Where they come from; `-` is standard input.
         say: Told each order that was carried out, and why one was not.
-
-    Raises:
-        OSError: It cannot be read.
     """
 
     def __init__(self, path: str, say: Callable[[str], None]) -> None:

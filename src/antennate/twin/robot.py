@@ -240,11 +240,7 @@ class TwinRobot:
             self._booted = self._ticks + BOOT_TICKS
 
     def order_touch(self, text: str) -> None:
-        """Touch an antenna at once; a robot that has walked and has no torque is put back first.
-
-        Raises:
-            BadInputError: The order has another form.
-        """
+        """Touch an antenna at once; a robot that has walked and has no torque is put back first."""
         self.touch.order(text)
         self._touched = True
 

@@ -136,11 +136,7 @@ class ServoEntry(Params):
     """Its name for orders."""
 
     def make(self) -> Servo:
-        """The servo.
-
-        Raises:
-            ConfigError: There is no such model, or it has no such speed.
-        """
+        """The servo."""
         own = self.model.endswith(".toml")
         model = servo_model(self.model) if own else _known(self.model, MODELS, "model")
         most = model["baud_rate"].high or 0
@@ -166,11 +162,7 @@ def _known(value: Any, known: Mapping[Any, Any], what: str) -> Any:
 
 
 def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
-    """Servos from `ID:MODEL[@BAUD][xCOUNT]` each, or from one TOML file.
-
-    Raises:
-        ConfigError: It is neither.
-    """
+    """Servos from `ID:MODEL[@BAUD][xCOUNT]` each, or from one TOML file."""
     if len(words) == 1 and words[0].endswith(".toml") and not _FORM.fullmatch(words[0]):
         file = Path(words[0])
         return tuple(
@@ -210,9 +202,6 @@ class ServoBox:
         bus: Their wire.
         plugging: Plugs servos in and turns shafts, by orders.
         t: Time up to which everything has happened [s].
-
-    Raises:
-        AntennateError: Something given cannot be used.
     """
 
     def __init__(

@@ -232,11 +232,7 @@ class Body:
 
 
 def require_pitch(robot: RobotSpec) -> None:
-    """Check that a robot can leave the plane.
-
-    Raises:
-        ConfigError: It cannot raise its antennae or its links.
-    """
+    """Check that a robot can leave the plane."""
     if not robot.pitch_count or not robot.elevation_count:
         lacking = "pitch joints" if not robot.pitch_count else "antennae that rise"
         raise ConfigError(

@@ -49,9 +49,6 @@ class ClimbingController(RuleController):
         control: All numbers of the control.
         robot: The robot.
         batch: Number of robots B.
-
-    Raises:
-        ConfigError: The robot cannot raise its antennae or its links.
     """
 
     def __init__(

@@ -128,11 +128,7 @@ def contract_of(
 
 
 def read_contract(text: str, where: str) -> Contract:
-    """The contract of a JSON text.
-
-    Raises:
-        ConfigError: It is none, or of another version.
-    """
+    """The contract of a JSON text."""
     try:
         version = json.loads(text).get("version")
     except (ValueError, AttributeError, RecursionError):
@@ -146,11 +142,7 @@ def read_contract(text: str, where: str) -> Contract:
 
 
 def require_match(contract: Contract, control: ControlParams, robot: RobotSpec, where: str) -> None:
-    """Check that a policy was made for this robot and control.
-
-    Raises:
-        ConfigError: Something differs; the first thing that does is told, with both sides.
-    """
+    """Check that a policy was made for this robot and control."""
     own = contract_of(contract.interface, control, robot)
     if contract.robot_hash != _hash(contract.robot):
         raise ConfigError(

@@ -29,11 +29,7 @@ OBSERVATION, ACTION = "observation", "action"
 def require_names(
     place: str, contract: Contract, inputs: Sequence[str], outputs: Sequence[str]
 ) -> None:
-    """Check what a network takes and answers.
-
-    Raises:
-        ConfigError: An input or output has another name, is missing, or is one too many.
-    """
+    """Check what a network takes and answers."""
     states = contract.states
     for kind, wanted, names in (
         ("inputs", [OBSERVATION, *(s.input for s in states)], inputs),
@@ -63,11 +59,6 @@ class Policy:
 
     Args:
         path: The file.
-
-    Raises:
-        ConfigError: It cannot be read, is no ONNX model, has no contract, or does not answer zeros
-            and an observation of chance with finite numbers.
-        MissingPackageError: onnxruntime is not installed.
 
     Attributes:
         contract: What it was made for.
@@ -149,11 +140,7 @@ class Policy:
     def answer(
         self, observation: Vector, states: dict[str, Vector]
     ) -> tuple[Floats, dict[str, Vector]]:
-        """The answer for one robot, shape (1, k), and its states from then on.
-
-        Raises:
-            ControllerError: The network cannot be run.
-        """
+        """The answer for one robot, shape (1, k), and its states from then on."""
         outputs = [ACTION, *(s.output for s in self.contract.states)]
         try:
             answer, *after = self._session.run(outputs, {OBSERVATION: observation, **states})
@@ -173,9 +160,6 @@ class PolicyController:
         robot: The robot.
         batch: Number of robots B.
         where: The file, for messages.
-
-    Raises:
-        ConfigError: The policy was made for another robot, rate or gait.
 
     Attributes:
         level: Bending levels b of the last step, shape (B, 2).
@@ -251,11 +235,7 @@ class PolicyController:
 
 
 def policy_factory(name: str) -> Callable[[ControlParams, RobotSpec, int], PolicyController]:
-    """What makes controllers of a policy file.
-
-    Raises:
-        ConfigError: There is no such file.
-    """
+    """What makes controllers of a policy file."""
     path = Path(name)
     if not path.is_file():
         raise ConfigError(f"expected a policy file, found no file {shown(name)}")

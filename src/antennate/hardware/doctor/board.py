@@ -93,11 +93,7 @@ class BoardSurvey:
 def survey_board(
     opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> BoardSurvey:
-    """Wait for a greeting and read for a while; without one, see whether servos are there.
-
-    Raises:
-        PortError: The port is gone or cannot be opened.
-    """
+    """Wait for a greeting and read for a while; without one, see whether servos are there."""
     survey = BoardSurvey()
     with opener(BOARD_BAUD) as port:
         port.drain()

@@ -112,11 +112,7 @@ class BusSurvey:
 def survey_bus(
     opener: Opener, robot: RobotSpec, params: DoctorParams, now: Callable[[], float]
 ) -> BusSurvey:
-    """Look at the bus of an expected robot; a few seconds, ten if no servo answers.
-
-    Raises:
-        PortError: The port is gone or cannot be opened.
-    """
+    """Look at the bus of an expected robot; a few seconds, ten if no servo answers."""
     survey = BusSurvey(robot.baud)
     with master(opener, robot.baud, now) as bus:
         survey.here = _present(bus, robot.ids)

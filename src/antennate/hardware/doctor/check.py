@@ -90,11 +90,7 @@ _USUAL_NAME = "ttyUSB0"
 def opener_of(
     path: str, flag: str, key: bytes | None = None, network: NetworkParams | None = None
 ) -> Opener:
-    """Opens a port at any speed; `key` and `network` are those of a board behind udp://.
-
-    Raises:
-        ConfigError: pyserial is not installed.
-    """
+    """Opens a port at any speed; `key` and `network` are those of a board behind udp://."""
     return lambda baud: contextlib.closing(finder(path, baud, flag, key, network)())
 
 

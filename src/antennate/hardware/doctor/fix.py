@@ -83,12 +83,7 @@ def _settings(survey: BusSurvey, robot: RobotSpec) -> list[Change]:
 
 
 def apply(opener: Opener, change: Change, now: Callable[[], float]) -> None:
-    """Make one change: torque off, write if it differs, read back.
-
-    Raises:
-        BringUpError: The servo does not answer alone, keeps its torque, or did not take the value.
-        PortError: The port is gone.
-    """
+    """Make one change: torque off, write if it differs, read back."""
     register = XC430_W240[change.register]
     with master(opener, change.baud, now) as bus:
         _require_alone(bus, change)

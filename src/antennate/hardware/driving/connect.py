@@ -49,9 +49,6 @@ def require_quick(
     """Ping the first servo that answers; the median time to its answers [s], None without any.
 
     `path` is the port's name for the error message.
-
-    Raises:
-        BringUpError: Answers come too late; the message has the command that cures it.
     """
     bus = Bus(port, Timing(baud, gap=_PING_PATIENCE, latest=_PING_PATIENCE), clock=clock)
     times: list[float] = []
@@ -93,12 +90,6 @@ def connect(
         esp32: Address of the antenna board, as `finder` takes it.
         bus: Address of the servo bus.
         key: Of a board behind udp://; empty for one without a key.
-
-    Raises:
-        ConfigError: There is no such controller.
-        PortError: A port cannot be opened.
-        BadInputError: No antenna board sends, or it is refused.
-        BringUpError: The servos are not those expected.
     """
     controller = make_controller(config.controller, config.control, config.robot)
     require_own_senses(controller, config.controller, "a drive")
@@ -161,9 +152,6 @@ def await_board(
     """Wait for a greeting and samples of the board. The bus is read only; nothing is written to it.
 
     A port without any byte is given up earlier than one on which a board may be starting.
-
-    Raises:
-        BadInputError: None came; the message says what came instead. Or the bus sends unasked.
     """
     begin, unasked = clock.now(), 0
     while board.clock.newest is None:
@@ -211,11 +199,7 @@ def _unasked(bus: Port) -> int:
 
 
 def require_servos(bus: Bus, robot: RobotSpec) -> None:
-    """Check that all servos answer, are of the right model, well, and have the right settings.
-
-    Raises:
-        BringUpError: One does not; the message names its id and the cure.
-    """
+    """Check that all servos answer, are of the right model, well, and have the right settings."""
     try:
         bringup.require(bus, robot.models)
     except BringUpError as error:

@@ -52,10 +52,6 @@ class Gamepad:
         path: Its device file, such as /dev/input/js0.
         clock: Monotonic time [s].
         silence: Time without an event after which nothing counts as held [s].
-
-    Raises:
-        OSError: It cannot be opened.
-        BadInputError: It is no joystick.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float], silence: float) -> None:
@@ -225,11 +221,7 @@ class KeyController(RuleController):
         self._phase = 0.0
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One control period: the command for this frame.
-
-        Raises:
-            KeyboardInterrupt: A key ends the drive.
-        """
+        """One control period: the command for this frame."""
         for key in self._keys():
             self._press(key)
         recent = self._clock() - self._pressed_at <= self._params.release

@@ -255,10 +255,6 @@ class DynamixelActuators:
         """Torque on where everything stands, for all servos or for none.
 
         Legs count their turns from where they stand, so that `command` is near.
-
-        Raises:
-            BringUpError: A servo is not fit, or did not take it.
-            PortError: The bus is gone.
         """
         try:
             self._goals = self._enable(command)
@@ -286,11 +282,7 @@ class DynamixelActuators:
         return place
 
     def disable(self, again: bool = False) -> list[int]:
-        """Torque off, group by group, verified: ids that did not confirm it.
-
-        Raises:
-            PortError: Only with `again`: the bus is gone.
-        """
+        """Torque off, group by group, verified: ids that did not confirm it."""
         if again:
             self.left_on = torque.disable(self.bus, self.left_on, 1, READ_ALL)
             return list(self.left_on)
@@ -308,12 +300,7 @@ class DynamixelActuators:
         return list(self.left_on)
 
     def command(self, command: JointCommand | None, time: float = math.inf) -> int:
-        """Send goals a time [s] nearer to a command, or as they are; joints too slow for it.
-
-        Raises:
-            CommandError: The command cannot be sent; nothing is.
-            PortError: The bus is gone.
-        """
+        """Send goals a time [s] nearer to a command, or as they are; joints too slow for it."""
         goals, slow = self._goals, 0
         if command is not None:
             wanted: Floats = self.joints.ticks(command).astype(float)
@@ -331,23 +318,14 @@ class DynamixelActuators:
         return slow
 
     def away(self, command: JointCommand, time: float) -> int:
-        """How many joints a time [s] is too short for, on their way to a command.
-
-        Raises:
-            CommandError: The command cannot be sent.
-        """
+        """How many joints a time [s] is too short for, on their way to a command."""
         if self._goals is None:
             return 0
         way = abs(self.joints.ticks(command) - self._goals)
         return int((way > self.joints.reach(time)).sum())
 
     def maintain(self, may_begin: bool) -> None:
-        """Let legs that have turned far forget their turns, a step a tick.
-
-        Raises:
-            BringUpError: A leg did not do its part; it has no torque then.
-            PortError: The bus is gone.
-        """
+        """Let legs that have turned far forget their turns, a step a tick."""
         if self._goals is None:
             return
         if may_begin:

@@ -38,11 +38,7 @@ class BringUpError(ActuatorError):
 
 
 def require(bus: Bus, expected: Mapping[int, int]) -> None:
-    """Whether the servos of these model numbers by id are on the bus, and nothing else.
-
-    Raises:
-        BringUpError: Otherwise; the text says each id that is not, and why.
-    """
+    """Whether the servos of these model numbers by id are on the bus, and nothing else."""
     seen = {i: inquiry.look(bus, i) for i in expected}
     doubled = [i for i, servo in seen.items() if servo and servo.state in ("collides", "broken")]
     perhaps = f", perhaps it answers as {', '.join(map(str, doubled))}" if doubled else ""
@@ -70,11 +66,7 @@ def _named(ids: Sequence[int], count: int) -> str:
 
 
 def require_models(bus: Bus, models: Mapping[int, int]) -> None:
-    """All ids answer with these model numbers: a glance of some ms, unlike `require`.
-
-    Raises:
-        BringUpError: One did not answer, or with another model.
-    """
+    """All ids answer with these model numbers: a glance of some ms, unlike `require`."""
     numbers = read_register(bus, list(models), XC430_W240["model_number"])
     if wrong := {i: numbers[i] for i, model in models.items() if numbers[i] != model}:
         wanted = {i: models[i] for i in wrong}
@@ -82,11 +74,7 @@ def require_models(bus: Bus, models: Mapping[int, int]) -> None:
 
 
 def require_modes(bus: Bus, modes: Mapping[int, int]) -> None:
-    """All ids are in these operating modes: another program may have changed one since.
-
-    Raises:
-        BringUpError: One did not answer, or is in another mode.
-    """
+    """All ids are in these operating modes: another program may have changed one since."""
     present = read_register(bus, list(modes), XC430_W240["operating_mode"])
     if wrong := {i: present[i] for i, mode in modes.items() if present[i] != mode}:
         wanted = {i: modes[i] for i in wrong}
@@ -94,11 +82,7 @@ def require_modes(bus: Bus, modes: Mapping[int, int]) -> None:
 
 
 def read_register(bus: Bus, ids: Sequence[int], register: Register) -> dict[int, int]:
-    """One register of each servo.
-
-    Raises:
-        BringUpError: A servo did not answer after several tries.
-    """
+    """One register of each servo."""
     values = inquiry.read_some(bus, ids, register, _READS, READ_OUTSIDE)
     if left := [servo for servo in ids if servo not in values]:
         raise BringUpError(f"could not read {register.name} of servos {left}")

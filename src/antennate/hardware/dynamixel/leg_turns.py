@@ -90,10 +90,6 @@ class LegTurns:
             goals: Of all servos [ticks], shape (n,).
             positions: Newest positions by id [ticks].
             may_begin: Whether the next leg may lose its torque; one that has lost it goes on.
-
-        Raises:
-            BringUpError: A leg did not do its part; it has no torque then.
-            PortError: The bus is gone.
         """
         waits = self.stage == 0 and not may_begin
         if not self.standing or waits or not self._calm(positions):

@@ -78,11 +78,7 @@ class Board:
         return len(self._take(self._read(), now))
 
     def wait(self, timeout: float, clock: Callable[[], float]) -> list[Timed]:
-        """Usable samples that have come, or come within `timeout` [s]; `clock` tells the time [s].
-
-        Raises:
-            PortError: The port is gone.
-        """
+        """Usable samples that have come, or come within `timeout` [s] of `clock`."""
         data = self._port.read(CHUNK, timeout)
         return self._take(data, clock())
 

@@ -70,12 +70,7 @@ class Recorder:
         self._last: tuple[Timed, float] | None = None
 
     def run(self) -> None:
-        """Write the header, then all rows.
-
-        Raises:
-            BadInputError: The board is silent.
-            PortError: Its port is gone.
-        """
+        """Write the header, then all rows."""
         for _ in self._readings():  # it has to be there before anybody is asked for anything
             break
         if self._params.marks:

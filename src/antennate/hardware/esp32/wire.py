@@ -165,11 +165,7 @@ def names_board(sensor_id: str) -> bool:
 
 
 def require_sensor(hello: Hello | None, sensor_id: str | None) -> None:
-    """Refuse a board to which the calibrated sensor is not soldered, where its id names a board.
-
-    Raises:
-        CalibrationError: Says both serial numbers.
-    """
+    """Refuse a board to which the calibrated sensor is not soldered, where its id names a board."""
     if sensor_id is None or not names_board(sensor_id) or hello is None:
         return
     if hello.device_id != sensor_id:

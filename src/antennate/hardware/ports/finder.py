@@ -38,9 +38,6 @@ def read_key(path: Path | None, way_out: str = "") -> bytes:
     Args:
         path: The file.
         way_out: What else can be done without a key, for the error.
-
-    Raises:
-        BadInputError: There is none, others may read the file, or it holds no key.
     """
     if path is None:
         text = os.environ.get(ENVIRONMENT)
@@ -88,9 +85,6 @@ def finder(
         flag: What named it, for errors.
         key: Of the board behind udp://; empty for one without a key.
         network: Pace and limits of udp://.
-
-    Raises:
-        BadInputError: It is no address, or needs a key.
     """
     scheme, separator, _ = address.partition("://")
     if not separator:

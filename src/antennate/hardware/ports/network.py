@@ -218,9 +218,6 @@ class UdpPort(Port):
         key: The board's key; empty for a board without one, in whose place anybody can send frames.
         params: Pace and limits.
         clock: Time that never steps [s].
-
-    Raises:
-        PortError: The host is not known.
     """
 
     def __init__(

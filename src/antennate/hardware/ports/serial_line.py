@@ -104,11 +104,7 @@ class SerialFinder:
         self._known: Identity | None = None
 
     def __call__(self) -> SerialPort:
-        """The line, opened.
-
-        Raises:
-            PortError: It is not there, cannot be told from others, or cannot be opened.
-        """
+        """The line, opened."""
         if self._known is not None:
             return SerialPort(find(self._known, self._path), self._baud, self._flag)
         line = SerialPort(self._path, self._baud, self._flag)
@@ -133,11 +129,7 @@ def identity(path: str) -> Identity | None:
 
 
 def find(known: Identity, path: str) -> str:
-    """Device file of a known adapter.
-
-    Raises:
-        PortError: None of those plugged in is it, or more than one may be.
-    """
+    """Device file of a known adapter."""
     alike = {device: other for device, other in adapters().items() if _alike(known, other)}
     same = [device for device, other in alike.items() if other.location == known.location]
     if not same and known.serial_number:
@@ -156,11 +148,7 @@ def _alike(known: Identity, other: Identity) -> bool:
 
 
 def adapters() -> dict[str, Identity]:
-    """All serial USB adapters by their device file.
-
-    Raises:
-        PortError: They cannot be listed, as while one of them is being unplugged.
-    """
+    """All serial USB adapters by their device file."""
     try:
         ports: list[Any] = list(list_ports.comports())
     except Exception as error:  # pyserial reads files of sysfs that may vanish meanwhile

@@ -239,9 +239,6 @@ class ChannelDiagnosis:
         bad: Readings not believed.
         outside: Readings beyond the band that were believed.
         noise: The noise of a channel that is NOISE: of a hum the largest while it is in force.
-
-    Raises:
-        CalibrationError: The band is empty or reaches a rail, where a broken wire looks alive.
     """
 
     def __init__(self, band: Band, hum_time: float = SupervisorParams().hum_time) -> None:

@@ -48,9 +48,6 @@ def require_order(limits: SupervisorParams, period: float) -> None:
     Args:
         limits: The deadlines that a user may set.
         period: Control period [s].
-
-    Raises:
-        ConfigError: One does not; names both, with their times.
     """
     answer, watchdog = ("the latest answer", ANSWER), ("the watchdogs of the servos", WATCHDOG)
     pause = ("limits.longest_pause", limits.longest_pause)

@@ -28,11 +28,7 @@ _TORQUE, _GOAL = _COMMON["torque_enable"], _COMMON["goal_position"]
 
 
 def send_goals(bus: Bus, goals: Mapping[int, int]) -> None:
-    """Goal positions by id [ticks]; nothing is read back.
-
-    Raises:
-        PortError: The bus is gone, or did not become quiet in time.
-    """
+    """Goal positions by id [ticks]; nothing is read back."""
     bus.write_all(_GOAL.address, {servo: _GOAL.encode(goal) for servo, goal in goals.items()})
 
 
@@ -42,11 +38,7 @@ def ask_goal(bus: Bus, servo: int, goal: int) -> Answer:
 
 
 def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
-    """Make each goal position the present one [ticks], and read it back.
-
-    Raises:
-        BringUpError: A servo did not answer, or refused: a tripped bus watchdog locks goals.
-    """
+    """Make each goal position the present one [ticks], and read it back."""
     wrong = dict[int, int]()
     for _ in range(_WRITES):
         present = read_register(bus, ids, _COMMON["present_position"])  # it may be moved by hand
@@ -57,13 +49,7 @@ def hold_here(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
 
 
 def arm_watchdogs(bus: Bus, ids: Sequence[int], counts: int = WATCHDOG_COUNTS) -> None:
-    """Clear the bus watchdogs, hold the present position, and arm them.
-
-    Raises:
-        BringUpError: A servo did not take it; or it is in extended position mode with a homing
-            offset, where the watchdog makes it move
-            (https://github.com/ROBOTIS-GIT/DynamixelSDK/issues/584).
-    """
+    """Clear the bus watchdogs, hold the present position, and arm them."""
     modes = read_register(bus, ids, _COMMON["operating_mode"])
     offsets = read_register(bus, ids, _COMMON["homing_offset"])
     if bad := [i for i in ids if modes[i] == EXTENDED_MODE and offsets[i]]:
@@ -79,9 +65,6 @@ def limit_speed(bus: Bus, velocities: Mapping[int, int]) -> None:
     """Give each servo its profile velocity [0.229 rev/min], and no profile acceleration.
 
     Another program may have left others; after a restart there is none.
-
-    Raises:
-        BringUpError: A servo did not take it.
     """
     _write_checked(bus, _COMMON["profile_acceleration"], dict.fromkeys(velocities, 0))
     _write_checked(bus, _COMMON["profile_velocity"], velocities)
@@ -92,9 +75,6 @@ def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
 
     Goal PWM bounds the force in every mode of position. It stays as it is written until the supply
     goes off, so that a `setup jog` that was killed would leave a joint without force.
-
-    Raises:
-        BringUpError: A servo did not take it.
     """
     limits = read_register(bus, ids, _COMMON["pwm_limit"])
     limit_pwm(bus, limits)
@@ -102,20 +82,12 @@ def allow_full_pwm(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
 
 
 def limit_pwm(bus: Bus, pwm: Mapping[int, int]) -> None:
-    """Give each servo its largest PWM [0.113 %].
-
-    Raises:
-        BringUpError: A servo did not take it.
-    """
+    """Give each servo its largest PWM [0.113 %]."""
     _write_checked(bus, _COMMON["goal_pwm"], pwm)
 
 
 def enable(bus: Bus, ids: Sequence[int]) -> dict[int, int]:
-    """Torque on, each servo where it stands: those positions [ticks].
-
-    Raises:
-        BringUpError: A servo did not take it; those that did keep holding their place.
-    """
+    """Torque on, each servo where it stands: those positions [ticks]."""
     left, wrong = dict.fromkeys(ids, 1), dict[int, int]()
     for _ in range(_WRITES):
         present = hold_here(bus, ids)

@@ -79,12 +79,7 @@ class Jog:
         self._newest = JogState(0.0, 0.0, 0, 0)
 
     def begin(self) -> None:
-        """Torque on where it stands: slow, weak and watched. Call `end` even if this fails.
-
-        Raises:
-            BringUpError: The servo is not fit, or did not take a value; it gets no torque then.
-            SetupError: It is not set as the joint needs it; no torque either.
-        """
+        """Torque on where it stands: slow, weak and watched. Call `end` even if this fails."""
         servo, bus = self.joint.servo, self._bus
         if (seen := inquiry.look(bus, servo)) and seen.state != "ok":
             raise SetupError(
@@ -121,9 +116,6 @@ class Jog:
         """Set the goal some steps further, within the limit of the joint.
 
         A joint that stands outside its limit goes inwards, step by step, and no further out.
-
-        Raises:
-            SetupError: The servo did not take it.
         """
         before = self._newest.goal
         wanted = before + steps * self._params.step
@@ -137,12 +129,7 @@ class Jog:
         self._newest = self._newest._replace(goal=goal)
 
     def look(self) -> JogState:
-        """What the joint does; call it at least every 0.2 s, or its watchdog stops it.
-
-        Raises:
-            SetupError: It does not answer any more, or reports an error.
-            PortError: The bus is gone.
-        """
+        """What the joint does; call it at least every 0.2 s, or its watchdog stops it."""
         reply = self._bus.read(self.joint.servo, Span(126, 10))
         if not isinstance(reply, Value):
             self._lost += 1

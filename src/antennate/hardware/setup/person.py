@@ -34,11 +34,7 @@ class Person(Protocol):
         ...
 
     def ask(self, text: str) -> str:
-        """Ask and wait: the answer in lower case, empty for Enter alone.
-
-        Raises:
-            BadInputError: No answer can come.
-        """
+        """Ask and wait: the answer in lower case, empty for Enter alone."""
         ...
 
     def answer(self) -> str | None:
@@ -47,12 +43,7 @@ class Person(Protocol):
 
 
 def agrees(person: Person, text: str) -> bool:
-    """Ask for y or n.
-
-    Raises:
-        Quit: The answer was q.
-        BadInputError: No answer can come.
-    """
+    """Ask for y or n."""
     while True:
         answer = person.ask(f"{text} [y, n; q ends]")
         if answer in ("q", "quit"):
@@ -63,12 +54,7 @@ def agrees(person: Person, text: str) -> bool:
 
 
 def confirm(person: Person, text: str) -> bool:
-    """Ask for Enter: True for it, False if the step is to be left out (s).
-
-    Raises:
-        Quit: The answer was q.
-        BadInputError: No answer can come.
-    """
+    """Ask for Enter: True for it, False if the step is to be left out (s)."""
     while True:
         answer = person.ask(f"{text} [Enter; s leaves it out, q ends]")
         if answer in ("q", "quit"):
@@ -85,11 +71,7 @@ _LOOK = 0.1
 
 
 def all_ports() -> frozenset[str]:
-    """The serial ports of this machine, by their lasting names where they have one.
-
-    Raises:
-        PortError: They cannot be listed.
-    """
+    """The serial ports of this machine, by their lasting names where they have one."""
     from antennate.hardware.ports.serial_line import adapters
 
     lasting = {os.path.realpath(name): str(name) for name in sorted(_NAMES.glob("*"))}
@@ -117,11 +99,6 @@ def find_port(
         listing: All ports that are there now.
         wait: Lets a time pass [s].
         patience: Longest time for a port to go or to come [s].
-
-    Raises:
-        Quit: The person wants to end.
-        BadInputError: No answer can come.
-        PortError: The ports cannot be listed.
     """
     before = listing()
     while True:

@@ -26,11 +26,6 @@ def change(path: Path, values: Mapping[Key, Value]) -> None:
     Args:
         path: The file.
         values: By their tables and name, such as `("robot", "yaw", "zeros")`.
-
-    Raises:
-        ConfigError: The file cannot be read, is no TOML, or has a value where a table has to be;
-            it is as before.
-        OutputError: It cannot be written.
     """
     data, changed = _read_and_edited(path, values)
     if changed != data:
@@ -43,9 +38,6 @@ def require_changeable(path: Path, values: Mapping[Key, Value]) -> None:
     Args:
         path: The file.
         values: As of `change`.
-
-    Raises:
-        ConfigError: As of `change`.
     """
     _read_and_edited(path, values)
 
@@ -72,12 +64,7 @@ def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[bytes, by
 
 
 def edited(text: str, values: Mapping[Key, Value]) -> str:
-    """The text with keys set.
-
-    Raises:
-        TOMLKitError: It is no TOML.
-        ValueError: A value stands where a table has to be, or the text would be spoilt.
-    """
+    """The text with keys set."""
     document = tomlkit.parse(text)
     for (*tables, name), value in values.items():
         table: MutableMapping[str, Any] = document

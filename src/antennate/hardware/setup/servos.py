@@ -88,11 +88,7 @@ class ServoSetup:
         self._rules = all_settings(robot)
 
     def present(self) -> dict[str, str]:
-        """What each joint's servo lacks, of those that answer at the robot's speed; "" is nothing.
-
-        Raises:
-            PortError: The port is gone or cannot be opened.
-        """
+        """What each servo that answers at the robot's speed lacks, by joint; "" is nothing."""
         with self._master(self._baud) as bus:
             answering = {status.id for status in bus.scan(self._scan)}
             return {j.name: self._lacks(bus, j) for j in self.joints if j.servo in answering}
@@ -103,12 +99,6 @@ class ServoSetup:
         Args:
             joint: The joint.
             done: Names of joints that have their servo.
-
-        Raises:
-            SetupError: There is not exactly one servo, or not the right one; nothing was changed.
-            OwnedError: It is that of a joint that is done; nothing was changed.
-            BringUpError: It did not take a value.
-            PortError: The port is gone or cannot be opened.
         """
         baud, servo = self.alone()
         if servo.state != "ok":
@@ -130,11 +120,7 @@ class ServoSetup:
         return changes
 
     def alone(self) -> tuple[int, Present]:
-        """The one servo on the bus and its speed.
-
-        Raises:
-            SetupError: There is none, or more than one.
-        """
+        """The one servo on the bus and its speed."""
         present: list[tuple[int, Present]] = []
         usual = (FACTORY_BAUD, self._baud)
         others = [b for b in BAUD_RATES if b not in usual and b <= _FASTEST]
@@ -256,11 +242,7 @@ class Assembly:
         self.done = [joint.name for joint in servos.joints if joint.name in known]
 
     def look(self) -> list[JointState]:
-        """All joints; those whose servo answers as it has to are done.
-
-        Raises:
-            PortError: The port is gone or cannot be opened.
-        """
+        """All joints; those whose servo answers as it has to are done."""
         present = self._servos.present()
         fit = {name for name, lacks in present.items() if not lacks}
         if fit - set(self.done):
@@ -274,10 +256,6 @@ class Assembly:
             person: Who is asked.
             states: All joints.
             only: Names of the joints to set up, done or not; all that are not done if empty.
-
-        Raises:
-            Quit: The person wants to end.
-            BadInputError: No answer can come.
         """
         left = [
             state.joint

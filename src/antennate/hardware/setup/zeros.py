@@ -87,12 +87,7 @@ class Positions:
         self._newest: dict[int, int] = {}
 
     def __iter__(self) -> Iterator[Ints]:
-        """Positions [ticks], shape (n,), for ever, one every 50 ms.
-
-        Raises:
-            SetupError: A servo does not answer any more.
-            PortError: The bus is gone.
-        """
+        """Positions [ticks], shape (n,), for ever, one every 50 ms."""
         while True:
             answers = self._bus.read_all(self._ids, POSITION, READ_OUTSIDE)
             for servo, reply in answers.items():
@@ -130,13 +125,7 @@ class Zeroing:
         self._limited = np.isfinite(robot.limits)
 
     def zeros(self, person: Person) -> list[int]:
-        """The zero of each joint [ticks], once the robot is held straight and still.
-
-        Raises:
-            Quit: The person wants to end.
-            BadInputError: No answer can come.
-            SetupError: A servo does not answer any more.
-        """
+        """The zero of each joint [ticks], once the robot is held straight and still."""
         while True:
             person.say(f"{POSE}; then Enter [q ends]")
             self._wait_for_enter(person)
@@ -193,13 +182,7 @@ class Zeroing:
         ]
 
     def directions(self, person: Person) -> list[int]:
-        """The direction of each joint, 1 or -1, as each is moved by hand in turn.
-
-        Raises:
-            Quit: The person wants to end.
-            BadInputError: No answer can come.
-            SetupError: A servo does not answer any more.
-        """
+        """The direction of each joint, 1 or -1, as each is moved by hand in turn."""
         signs = list(self._robot.directions)
         for at, name in enumerate(self._names):
             before = next(iter(self._positions))  # the person may answer at once

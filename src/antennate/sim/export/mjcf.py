@@ -52,9 +52,6 @@ def to_mjcf(spec: mujoco.MjSpec, title: str) -> Mjcf:
     Args:
         spec: The model; it is compiled.
         title: Comment in the first line.
-
-    Raises:
-        ConfigError: The engine cannot write all digits.
     """
     model = spec.compile()
     with _all_digits():

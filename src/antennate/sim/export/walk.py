@@ -53,9 +53,6 @@ def walk(world: World, gait: GaitParams, period: float, ticks: int = TICKS) -> W
         gait: The gait.
         period: Control period [s], a whole number of physics steps.
         ticks: How many of them.
-
-    Raises:
-        SimulationError: The physics became invalid.
     """
     robot, steps = world.robot, round(period / world.model.opt.timestep)
     walker, parts = Gait(gait, robot, 1, period), list(robot.command_shapes())

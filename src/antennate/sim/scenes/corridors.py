@@ -40,11 +40,7 @@ class CorridorsScene:
         self._params = params or CorridorsParams()
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
-        """Draw one corridor.
-
-        Raises:
-            SceneError: The robot does not fit, or nothing that can stand was drawn.
-        """
+        """Draw one corridor."""
         params = self._params
         if params.free_width[0] < robot.width:
             raise SceneError(

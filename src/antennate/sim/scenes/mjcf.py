@@ -75,9 +75,6 @@ def require_compiles(
         path: The file.
         limit: Time that it may take on the clock [s].
         child: What Python runs there, with the path as its argument.
-
-    Raises:
-        SceneError: The engine crashes, or takes longer, or more than 10 s of CPU time.
     """
     try:
         code = subprocess.run(  # noqa: S603 a list of words, no shell: this Python and our own module
@@ -103,11 +100,7 @@ def _too_slow(path: Path, limit: str) -> SceneError:
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
-    """Read a model as a spec.
-
-    Raises:
-        SceneError: It cannot be read, is too large, or holds what a scene must not hold.
-    """
+    """Read a model as a spec."""
     data = read_limited(path, LARGEST_MODEL, SceneError)
     try:
         if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
@@ -260,9 +253,6 @@ class MjcfScene:
 
     Args:
         path: The file.
-
-    Raises:
-        SceneError: It cannot be used.
     """
 
     random = False

@@ -63,11 +63,7 @@ def shared_limit(name: str) -> float:
 
 
 def check_name(name: str) -> str:
-    """Return the name if it may be that of a scene; no code of the user runs.
-
-    Raises:
-        ConfigError: The name has another form.
-    """
+    """Return the name if it may be that of a scene; no code of the user runs."""
     return name if _is_file(name) else SCENES.check(name)
 
 
@@ -86,10 +82,6 @@ def make_scene(
         tunnel: Parameters of `tunnel`; no other scene takes them.
         corridors: Parameters of `corridors`, likewise.
         ground: Sizes of the scenes of ground that is not flat, likewise.
-
-    Raises:
-        ConfigError: There is no such scene.
-        SceneError: The file cannot be used, or the constructor failed.
     """
     if name == TUNNEL:
         return TunnelScene(tunnel)

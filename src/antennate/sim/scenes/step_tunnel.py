@@ -83,11 +83,7 @@ class StepTunnelScene:
         self._plain = TunnelScene(self._tunnel)
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> StepTunnel:
-        """Draw one tunnel, and where the step is.
-
-        Raises:
-            SceneError: The robot does not fit.
-        """
+        """Draw one tunnel, and where the step is."""
         step = float(rng.uniform(*FROM_START))
         drawn = self._plain.draw(robot, rng)
         stays = ~self._in_the_way(drawn.cylinders, step)

@@ -57,11 +57,7 @@ class TunnelScene:
         self.variation = variation or {}
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Tunnel:
-        """Draw one tunnel.
-
-        Raises:
-            SceneError: The robot does not fit, or the strewn cylinders do not.
-        """
+        """Draw one tunnel."""
         params = self._params
         if params.free_width - 2 * params.lining_inset < robot.width:
             inset = f", less twice an inset of {params.lining_inset} m" * (params.lining_inset > 0)
@@ -90,11 +86,7 @@ def build_along(
     mirrored: bool = False,
     time_limit: float = TIME_LIMIT,
 ) -> Tunnel:
-    """Draw the cylinders of a passage.
-
-    Raises:
-        SceneError: The strewn ones find no room.
-    """
+    """Draw the cylinders of a passage."""
     centre, distance = plan.centre, params.wall_distance
     walls = (
         plan.line(distance, params.corner_radius),

@@ -53,11 +53,7 @@ class PaddedTunnels:
         self._walls = max((len([*each.pieces()]) for each in tunnels), default=0)
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> SceneInstance:
-        """Draw the same instance as the scene itself, filled up with parked cylinders and walls.
-
-        Raises:
-            SceneError: There is none.
-        """
+        """Draw the same instance as the scene itself, filled up with parked cylinders and walls."""
         drawn = self._scene.draw(robot, rng)
         if not isinstance(drawn, Tunnel):
             return drawn
@@ -248,11 +244,7 @@ class WarpRobot:
         return self
 
     def load(self, row: int, world: World, chance: Disturbance) -> None:
-        """Put a fresh world into a row; it reaches the device with its first command.
-
-        Raises:
-            SceneError: It has another number of joints than the first.
-        """
+        """Put a fresh world into a row; it reaches the device with its first command."""
         if not self.positions.size:
             self.positions = np.zeros((self._batch, world.model.nq))
             self._controls = np.zeros((self._batch, world.model.nu))

@@ -26,12 +26,7 @@ _MODULES = {"mujoco_warp": "mujoco-warp", "warp": "warp-lang", "absl": "absl-py"
 
 
 def require_warp() -> tuple[Any, Any]:
-    """The modules warp and mujoco_warp.
-
-    Raises:
-        ConfigError: mujoco-warp is of another series than the engine.
-        MissingPackageError: A package is not installed.
-    """
+    """The modules warp and mujoco_warp."""
     missing = [package for module, package in _MODULES.items() if find_spec(module) is None]
     if missing:
         raise MissingPackageError(
@@ -52,12 +47,7 @@ def require_warp() -> tuple[Any, Any]:
 
 
 def require_device(name: str | None) -> Any:
-    """The device of a name, or a GPU.
-
-    Raises:
-        ConfigError: There is none.
-        MissingPackageError: Warp is not installed.
-    """
+    """The device of a name, or a GPU."""
     warp, _ = require_warp()
     try:
         device = warp.get_device(name) if name else warp.get_preferred_device()
@@ -112,10 +102,6 @@ class WarpWorlds:
         batch: Number of worlds B.
         limits: Sizes on the device.
         device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
-
-    Raises:
-        ConfigError: There is no such device, or Warp cannot hold that model.
-        MissingPackageError: Warp is not installed.
     """
 
     def __init__(
@@ -164,11 +150,7 @@ class WarpWorlds:
         return self._spread[name]
 
     def put(self, row: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Let a row be the world of a model from now on, in the state that it is in.
-
-        Raises:
-            SceneError: It differs from the first in what all have in common.
-        """
+        """Let a row be the world of a model from now on, in the state that it is in."""
         values = _values(model)
         differing = {n for n, value in values.items() if not same(value, self._base.get(n))}
         if alien := sorted((differing | (self._base.keys() - values.keys())) - self._by_world):
@@ -271,10 +253,6 @@ class RobotWorlds(WarpWorlds):
         batch: Number of worlds B.
         limits: Sizes on the device.
         device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
-
-    Raises:
-        ConfigError: There is no such device, or Warp cannot hold that model.
-        MissingPackageError: Warp is not installed.
     """
 
     def __init__(self, first: World, batch: int, limits: Limits, device: str | None = None) -> None:
@@ -294,11 +272,7 @@ class RobotWorlds(WarpWorlds):
         self._force = self._wp.zeros(self._batch, dtype=float)
 
     def put_world(self, row: int, world: World) -> None:
-        """Let a row be a world from now on, in the state that it is in.
-
-        Raises:
-            SceneError: It differs from the first in what all have in common.
-        """
+        """Let a row be a world from now on, in the state that it is in."""
         if any(not same(*pair) for pair in zip(_terms(world), _terms(self._first), strict=True)):
             raise SceneError(
                 "--engine warp: expected the same friction of gears under load in all worlds"

@@ -68,11 +68,7 @@ class Poses(NamedTuple):
 
     @classmethod
     def unpack(cls, content: bytes) -> Poses:
-        """Back from `pack`.
-
-        Raises:
-            BadInputError: It is something else.
-        """
+        """Back from `pack`."""
         try:
             t, count = np.frombuffer(content, np.float64, 2)
             numbers = np.frombuffer(content, np.float32, offset=16)

@@ -48,10 +48,6 @@ class FoxgloveSink:
 
     Args:
         port: Port on this computer, 0 for any that is free.
-
-    Raises:
-        MissingPackageError: foxglove-sdk is not installed.
-        BadInputError: The port is taken.
     """
 
     def __init__(self, port: int) -> None:

@@ -53,11 +53,7 @@ class Tuning:
         }
 
     def set(self, name: str, value: Any) -> str:
-        """Change one of them; what was changed, empty if there is none of that name.
-
-        Raises:
-            ConfigError: It is out of bounds.
-        """
+        """Change one of them; what was changed, empty if there is none of that name."""
         if name not in self._places:
             return ""
         group, field = self._places[name]
@@ -125,11 +121,7 @@ class Pace:
         return True
 
     def wait(self, t: float) -> None:
-        """Return when time t [s] of the program has come.
-
-        Raises:
-            Restart: A person wants it anew.
-        """
+        """Return when time t [s] of the program has come."""
         while self.state["paused"] and not self._steps and not self.channel.closed:
             select.select((self.channel,), (), (), _LOOK)
             self.look()
@@ -159,11 +151,7 @@ class Pace:
         """Show again what may have been changed while it stands."""
 
     def look(self) -> None:
-        """Carry out what the page wants.
-
-        Raises:
-            Restart: A person wants it anew.
-        """
+        """Carry out what the page wants."""
         for kind, content in self.channel.receive():
             if kind == ORDER:
                 self.carry_out(read(content))

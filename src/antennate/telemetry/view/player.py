@@ -118,11 +118,7 @@ class LogPlayer(Pace):
         self.channel.send(HEADER, self._header.pack())
 
     def show(self, tick: Tick) -> None:
-        """Show a tick if a picture is due, once its time has come.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-        """
+        """Show a tick if a picture is due, once its time has come."""
         if self._begin_at is None:
             self._begin_at = tick.now
         self.wait(tick.now - self._begin_at)
@@ -134,12 +130,7 @@ class LogPlayer(Pace):
             self.channel.send(TICK, tick.pack())
 
     def play(self, log: LogReader) -> None:
-        """Show all ticks of a log.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-            LogError: The disk fails.
-        """
+        """Show all ticks of a log."""
         for records, tick in log.groups():
             for record in records:
                 if record.topic is EVENTS:
@@ -150,21 +141,13 @@ class LogPlayer(Pace):
                 self.show(tick)
 
     def rest(self) -> None:
-        """Wait at the end until the page is gone.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-        """
+        """Wait at the end until the page is gone."""
         while not self.channel.closed:
             self.look()
             time.sleep(_LOOK)
 
     def carry_out(self, order: Mapping[str, Any]) -> None:
-        """Carry out one order; an unknown one is left alone.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-        """
+        """Carry out one order; an unknown one is left alone."""
         super().carry_out(order)
         if order.get("do") == "restart":
             raise Restart(0)
@@ -206,10 +189,6 @@ class ReplayPlayer(LogPlayer):
         arena: The world in which it was simulated, None for a bare floor.
         name: The controller that decides, None for the recorded one.
 
-    Raises:
-        LogError: It is code outside this package, and only the log names it.
-        ConfigError: There is none of that name.
-
     Attributes:
         controller: What decides.
     """
@@ -239,11 +218,7 @@ class ReplayPlayer(LogPlayer):
                 yield tick
 
     def decided(self, tick: Tick, decision: Decision) -> None:
-        """Show a tick with what was decided upon it now.
-
-        Raises:
-            Restart: A person wants it from the beginning.
-        """
+        """Show a tick with what was decided upon it now."""
         self._now = tick.now
         level: Any = np.asarray(self.controller.level, float).ravel().tolist()
         self.show(

@@ -35,10 +35,6 @@ class ViewProcess:
     Attributes:
         channel: To it.
         port: The port of the page, 0 without one.
-
-    Raises:
-        MissingPackageError: viser or foxglove-sdk is not installed.
-        BadInputError: A port is taken or wanted twice, or the process cannot serve.
     """
 
     def __init__(

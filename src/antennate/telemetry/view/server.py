@@ -180,11 +180,7 @@ _STYLE = f"""\
 
 
 def load_page(port: int) -> tuple[bytes, str]:
-    """The page and its Content-Security-Policy.
-
-    Raises:
-        BadInputError: The installed viser has a page of another form.
-    """
+    """The page and its Content-Security-Policy."""
     text = resources.files("viser").joinpath("client/build/index.html").read_text("utf-8")
     match = _SCRIPT.search(text)
     if match is None or text.count("<script") != 1:
@@ -236,11 +232,7 @@ class _Server(viser.ViserServer):
 
 
 def serve(listener: socket.socket, gate: Gate) -> viser.ViserServer:
-    """Serve the page on a socket that is bound.
-
-    Raises:
-        BadInputError: The installed viser serves in another way, so that nothing would be checked.
-    """
+    """Serve the page on a socket that is bound."""
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # refusals are no errors
     begin: Any = websockets_server.serve
     checked = False

@@ -70,11 +70,7 @@ class SimulationView(Pace):
     def controller(
         self, name: str, control: ControlParams, robot: RobotSpec, batch: int = 1
     ) -> Controller:
-        """A controller of that name whose numbers the page can change.
-
-        Raises:
-            ConfigError: There is none, or it cannot be made.
-        """
+        """A controller of that name whose numbers the page can change."""
 
         def make(values: ControlParams) -> Controller:
             return make_controller(name, values, robot, batch)
@@ -102,9 +98,6 @@ class SimulationView(Pace):
 
         Returns:
             What was changed by hand since the last tick, for the log.
-
-        Raises:
-            Restart: A person wants the trial anew, with a seed.
         """
         self._number += 1
         if self._seen is not model:
@@ -148,20 +141,12 @@ class SimulationView(Pace):
         )
 
     def look(self) -> None:
-        """Carry out what the page wants, if it may want anything.
-
-        Raises:
-            Restart: A person wants the trial anew, with a seed.
-        """
+        """Carry out what the page wants, if it may want anything."""
         if self._steered:
             super().look()
 
     def carry_out(self, order: Mapping[str, Any]) -> None:
-        """Carry out one order; one that cannot be is left alone, and the page says so.
-
-        Raises:
-            Restart: A person wants the trial anew, with a seed.
-        """
+        """Carry out one order; one that cannot be is left alone, and the page says so."""
         super().carry_out(order)
         what = order.get("do")
         if what == "move":
