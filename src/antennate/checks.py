@@ -107,7 +107,7 @@ def whole_array(
     shape: tuple[int | str, ...],
     error: type[BadInputError] = ConfigError,
 ) -> Ints:
-    """The same, of whole numbers that have room in 64 bits."""
+    """An array of whole numbers that have room in 64 bits, checked as `array` does."""
     numbers = array(name, value, shape, error=error)
     odd = (numbers != np.rint(numbers)) | (numbers < -(2.0**63)) | (numbers >= 2.0**63)
     if odd.any():

@@ -128,7 +128,7 @@ def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
 
 @contextlib.contextmanager
 def writing_whole(path: Path, overwrite: bool = False) -> Iterator[BinaryIO]:
-    """The same, piece by piece: the file is there once the block has ended without an error."""
+    """A file written piece by piece, there once the block has ended without an error."""
     with replacing(path, overwrite) as fresh, fresh.open("xb") as file:
         lock(file)
         yield file

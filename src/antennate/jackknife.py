@@ -7,10 +7,10 @@ import numpy as np
 from antennate.types import Floats, Ints
 
 ENOUGH = 5
-"""Fewest trials of which an interval of a mean is told. By Student's t that of two is seven times
+"""Fewest trials from which an interval of a mean is told. By Student's t that of two is seven times
 as wide as that of five at the same spread: such an interval decides nothing."""
 MANY = 10
-"""From so many groups on, the interval of a median is that of a share, taken as quantiles."""
+"""Fewest groups from which the interval of a median is that of a share, taken as quantiles."""
 
 
 def student95(freedom: int) -> float:

@@ -15,7 +15,7 @@ _LONGEST = 80
 _SIMILAR = 0.7
 """Least similarity of a word to the choice that is hinted at, from 0 to 1."""
 _SIMILAR_END = 0.6
-"""The same of what follows the last dot of both."""
+"""Least similarity of what follows the last dot of both, from 0 to 1."""
 
 
 def one_line(text: str) -> str:

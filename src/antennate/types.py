@@ -91,7 +91,7 @@ class AntennaFrame:
     linear_acceleration: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def copy(self) -> AntennaFrame:
-        """The same in arrays of its own."""
+        """A copy with arrays of its own."""
         return AntennaFrame(*(getattr(self, part.name).copy() for part in fields(self)))
 
 

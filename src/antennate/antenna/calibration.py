@@ -33,7 +33,7 @@ NARROWEST_SPAN = 20.0
 NARROWEST_RISE = 10.0
 """Fewest counts over which the level may rise from 0.1 to 0.9: four times a reading's noise."""
 _RISE = 2.0 * math.log(9.0)
-"""That rise of a sigmoid in units of 1 / slope."""
+"""Rise of a sigmoid from 0.1 to 0.9 in units of 1 / slope."""
 _LARGEST_FILE = 1_000_000
 
 
@@ -132,7 +132,7 @@ class Calibration(Strict):
         return ConditioningParams(averaging_time=averaging_time, **self._of_curve())
 
     def curve(self) -> CurveParams:
-        """The same without the running mean, as of one antenna of two."""
+        """The curve of one antenna alone, without the running mean."""
         return CurveParams(**self._of_curve())
 
     def _of_curve(self) -> dict[str, Any]:

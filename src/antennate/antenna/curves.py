@@ -145,7 +145,7 @@ def knots(
 MOST_KNOTS = 256
 """Knots of an isotonic curve: one a count of the simulated sensor's range."""
 FEWEST_PUSHES = 3
-"""Of fewer pushes slope and midpoint have no intervals, nor is a misfit told from noise."""
+"""Fewest pushes for intervals of slope and midpoint, and for telling a misfit from noise."""
 _PARTS, _CHANCE, _LEAST = 10, 0.01, 0.005
 """Parts of the readings in which errors are averaged, chance that noise alone is called a misfit,
 and the least mean error that is one [b], about a count of the simulated sensor."""
@@ -263,12 +263,13 @@ def gain_of(errors: dict[str, list[Floats]], rival: str) -> Gain:
 
 
 PLATEAU_FEWEST = 150
-"""Fewest readings of which a plateau is told: the noise of the quietest real sensor, 1.7 counts,
-puts a fifth of so many within a count of the highest once in 50,000 times (computed)."""
+"""Fewest readings from which a plateau is told. The noise of the quietest real sensor, 1.7 counts,
+puts a fifth of them within a count of the highest once in 50,000 times (computed)."""
 PLATEAU_SHARE = 0.2
 """Share of the readings that stand at their highest from which on they say nothing (assumed)."""
 PLATEAU_SHOWN = 0.05
-"""The same share over different bends, from which on it is told: noise alone does 1 % (assumed)."""
+"""Share of the readings over different bends from which on a plateau is told: noise alone does 1 %
+(assumed)."""
 _COVERED = 0.1
 """Share of all bends that a plateau covers at least; a quiet antenna that is held covers none."""
 _NEAR = 1.0
@@ -287,12 +288,12 @@ class Plateau:
     counts: float
     """Highest reading [counts]."""
     share: float
-    """Share of all readings that stand at it."""
+    """Share of all readings that stand at the highest one."""
     still: bool = False
     """Whether no reading lies below it by more than a converter that is stuck toggles."""
 
     def text(self, whose: str) -> str:
-        """It in words, with what may be wrong."""
+        """The plateau in words, with what may be wrong."""
         if self.still:
             return (
                 f"all of {whose} stand at {self.counts:.0f} counts or at most {_STILL:.0f} below: "

@@ -72,7 +72,7 @@ class LinearChain:
         return max(self.modes(), key=lambda mode: mode.share)
 
     def modes(self) -> list[Mode]:
-        """Its modes, the slowest first; two real eigenvalues are two modes that do not swing."""
+        """Modes of the chain, slowest first; two real eigenvalues are two without a swing."""
         from scipy.linalg import eig  # takes long; only where it is needed
 
         inverse, n = np.linalg.inv(self.mass), len(self.mass)
@@ -130,7 +130,7 @@ def least_damping(left: float) -> float:
 
 
 def fitted_mode(mode: Mode, t: Floats, angles: Floats, speeds: Floats) -> Mode:
-    """The same mode with the eigenvalue that a recorded ring-down has.
+    """A mode with the eigenvalue that a recorded ring-down has.
 
     Args:
         mode: The mode of the chain.

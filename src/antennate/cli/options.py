@@ -34,8 +34,8 @@ def option(
         default: Its default.
         meaning: What it does.
         metavar: What stands for its value in the help, such as FILE.
-        needs: Flags of which one must be given beside it, as `--video`; with the begin of its value
-            where not all do, as `--engine slurm`.
+        needs: Flags, one of which must be given beside it, as `--video`; with the begin of its
+            value where not all do, as `--engine slurm`.
         more: As for pydantic's Field; `positional` is for a value without a flag.
     """
     extra = {"metavar": metavar, "needs": list(needs), "positional": more.pop("positional", False)}
@@ -62,7 +62,7 @@ class Option:
         limits: Bounds in words, such as `at least 1`.
         default: Its default in words, empty if there is none to show.
         positional: Whether it is given without a flag.
-        needs: Flags of which one must be given beside it.
+        needs: Flags, one of which must be given beside it.
     """
 
     path: tuple[str, ...]

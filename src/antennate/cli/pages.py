@@ -69,7 +69,7 @@ class PageOptions(FoxgloveOptions):
 
 @dataclass(frozen=True)
 class ViewOptions(PageOptions):
-    """The same where time is simulated."""
+    """Where the page of a simulation is, and how fast it shows time."""
 
     view_paused: bool = option(False, "start paused, so that nothing is missed", needs=["--view"])
     view_speed: float = option(

@@ -282,7 +282,7 @@ def failed(result: Mapping[str, Any]) -> bool:
 
 
 def _idle(result: Mapping[str, Any]) -> bool:
-    """It was to walk, and never did."""
+    """Whether the robot was to walk and never did."""
     return result["armed"] and not result["commands_sent"]
 
 

@@ -42,7 +42,7 @@ turn in that round [s], each (n,), a turn to the right positive."""
 _BLIND_ESCAPE = ("reverse_time", "turn_time", "alternate", "second_turn")
 """What an escape depends on where nothing was touched before."""
 _KNOWING_ESCAPE = ("lost_time", "return_time")
-"""And where a simulation tells it that it faces the entrance, or a map."""
+"""What else it depends on where a simulation tells it a map, or that it faces the entrance."""
 
 
 class TimedRule:
@@ -61,7 +61,7 @@ class TimedRule:
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, walking."""
+        """Start rows anew, walking."""
         self._escape.reset(rows)
         self._walked[rows] = 0
 
@@ -78,7 +78,7 @@ class TimedRule:
         return read.model_copy(update={"retry_time": math.inf})
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`; of the readings it only matters whether they can be used."""
+        """Maneuvers of this tick; a row whose readings cannot be used holds."""
         known = _known(contact)
         walking = known & (self._escape.maneuver == int(Maneuver.FORWARD))
         stuck = walking & (self._walked >= self._ticks)
@@ -109,12 +109,12 @@ class RoundRule:
         self._rounds: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew with their first round."""
+        """Start rows anew with their first round."""
         self._left[:, rows] = 0
         self._rounds[rows] = 0
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`; of the readings it only matters whether they can be used."""
+        """Maneuvers of this tick, by the plan; a row whose readings cannot be used holds."""
         known = _known(contact)
         over = np.flatnonzero(known & ~self._left.any(axis=0))
         if len(over):
@@ -187,7 +187,7 @@ class Chance:
         self._generators[row] = self._generator(phase)
 
     def __call__(self, rows: Ints, number: Ints) -> tuple[Floats, Floats, Floats]:
-        """As of a `Plan`."""
+        """Times to walk, to back off and to turn, drawn for these rows [s]."""
         params = self._params
         drawn = [
             (g.exponential(), *g.uniform(size=2)) for g in map(self._generators.__getitem__, rows)

@@ -184,7 +184,7 @@ class ContactState:
         self._state: Ints = np.full((batch, 2), int(Contact.FREE))
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows start free."""
+        """Start rows without contact."""
         self._state[rows] = Contact.FREE
 
     def step(self, level: Floats) -> Ints:
@@ -210,7 +210,7 @@ class RepetitionDetector:
         self._walked: Ints = np.zeros(batch, dtype=np.int64)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows forget everything."""
+        """Forget the samples of rows."""
         for memory in (self._last, self._change, self._press):
             memory[:, rows] = 0.0
         self._walked[rows] = 0

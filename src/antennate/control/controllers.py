@@ -81,7 +81,7 @@ class Hold:
         self.until: Floats = np.full(batch, -np.inf)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows start FORWARD and free to change."""
+        """Start rows FORWARD and free to change."""
         self.current[rows] = Maneuver.FORWARD
         self.until[rows] = -np.inf
 
@@ -115,7 +115,7 @@ class MapRule:
         self._map: Floats = np.full(batch, math.nan)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, walking."""
+        """Start rows anew, walking."""
         self._maneuver[rows] = Maneuver.FORWARD
         self._until[rows] = 0.0
 
@@ -127,7 +127,7 @@ class MapRule:
             self._map = knowledge.map
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`; a row without a heading, or with a reading that is UNKNOWN, holds."""
+        """Maneuvers of this tick; a row without a heading, or with an UNKNOWN reading, holds."""
         known = ~(contact == int(Contact.UNKNOWN)).any(axis=1) & ~np.isnan(self._map)
         walking = known & (self._maneuver == int(Maneuver.FORWARD))
         backing = known & (self._maneuver == int(Maneuver.REVERSE))
@@ -207,7 +207,7 @@ class _OpenRule:
     """FORWARD, unless a reading cannot be used."""
 
     turn_offset = 0.0
-    """It never turns."""
+    """Yaw offset of turns [rad]; this rule never turns."""
 
     def reset(self, rows: Ints | Bools) -> None:
         pass
@@ -323,7 +323,7 @@ class RuleController:
 
     @property
     def rule(self) -> Rule:
-        """Its rule, for whoever watches it."""
+        """Rule that decides, for whoever watches it."""
         return self._rule
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:

@@ -61,7 +61,7 @@ class Escape:
         self.knowledge = Knowledge()
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, walking, with no memory."""
+        """Start rows anew, walking, with no memory."""
         self.maneuver[rows] = Maneuver.FORWARD
         self._ended[rows] = -np.inf
         self._until[rows] = 0.0
@@ -203,7 +203,7 @@ class Search:
         self.knowledge = Knowledge()
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, walking, with no memory."""
+        """Start rows anew, walking, with no memory."""
         self.maneuver[rows] = _FORWARD
         self.tries[rows] = 0
         self._begun[rows] = self._last[rows] = np.nan
@@ -331,7 +331,7 @@ class SearchRule:
         self._search.knowledge = knowledge
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`."""
+        """Maneuvers of this tick: FORWARD until readings repeat, then those of the search."""
         unknown = np.isnan(flex[:, LEFT] + flex[:, RIGHT])
         walking = (self._search.maneuver == _FORWARD) & ~unknown
         left, right = (flex > self._pressure).T

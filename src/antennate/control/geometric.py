@@ -37,7 +37,7 @@ _SLOWEST, _LEAST_TURN = 0.02, 0.03
 """Least speed [m/s] and rate of turns [rad/s]: an escape would take half a minute (assumed)."""
 
 _SIZES = ("reverse_time", "reverse_most", "turn_time", "lost_turn", "return_time")
-"""Of the search, what `geometric` has in metres and degrees."""
+"""Parameters of the search that `geometric` has in metres and degrees."""
 
 
 @lru_cache
@@ -63,7 +63,8 @@ class TwoGaits:
     Attributes:
         phase: Gait phase [rad], shape (B,).
         wave: Amplitude [rad], wave number, lead [rad] and offset [rad] now, shape (B, 4).
-        bent: Largest flex of each row, 0 to 1, shape (B,), of which `soften` gives way.
+        bent: Largest flex of each row, 0 to 1, shape (B,); `soften` lowers the amplitude
+            by it.
         speed: Forward speed by the model [m/s].
         turning: Rate of a turn by the model [rad/s].
     """
@@ -154,7 +155,7 @@ class GeometricRule(SearchRule):
         super().__init__(control, batch, sizes_of(control, gait.speed, gait.turning))
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`."""
+        """Maneuvers of this tick; the gait is told the largest flex of each row."""
         self._moves.bent = np.clip(np.nan_to_num(flex).max(axis=1), 0.0, 1.0)
         return super().step(t, level, contact, flex)
 

@@ -237,17 +237,17 @@ class Wrapped:
 
     @property
     def maneuver(self) -> Ints:
-        """As of a `Controller`."""
+        """`Maneuver` of the last step, shape (B,)."""
         return self._made.maneuver
 
     @property
     def contact(self) -> Ints:
-        """As of a `Controller`."""
+        """`Contact` of each antenna in the last step, shape (B, 2)."""
         return self._made.contact
 
     @property
     def level(self) -> Floats:
-        """As of a `Controller`."""
+        """Bending level b of each antenna in the last step, 0 to 1, shape (B, 2)."""
         return self._made.level
 
     @property
@@ -257,30 +257,30 @@ class Wrapped:
 
     @property
     def void_decisions(self) -> Ints | None:
-        """As of a learned policy; None of any other controller."""
+        """Decisions of a learned policy without a number, shape (B,); None of any other."""
         return getattr(self._made, "void_decisions", None)
 
     @property
     def knows(self) -> tuple[Kind, ...]:
-        """As of `Knowing`; none of a controller that is none."""
+        """Kinds of knowledge that the other controller can use."""
         return self._made.knows if isinstance(self._made, Knowing) else ()
 
     @property
     def needs(self) -> tuple[Kind, ...]:
-        """As of `Knowing`; none of a controller that is none."""
+        """Kinds of knowledge without which the other controller cannot walk."""
         return self._made.needs if isinstance(self._made, Knowing) else ()
 
     def know(self, knowledge: Knowledge) -> None:
-        """As of `Knowing`."""
+        """Pass knowledge on to a controller that can use it."""
         if isinstance(self._made, Knowing):
             self._made.know(knowledge)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of a `Controller`."""
+        """Start rows of the other controller anew, their gait at a phase [rad]."""
         self._made.reset(rows, phase)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """As of a `Controller`."""
+        """One control period of the other controller: the joint targets for this frame."""
         return self._made.step(frame)
 
 

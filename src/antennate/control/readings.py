@@ -142,7 +142,7 @@ class Readings(Protocol):
     """Changes the readings of B robots; the rows never influence one another."""
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew."""
+        """Start rows anew."""
         ...
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:
@@ -157,7 +157,7 @@ class Own:
         """Nothing to forget."""
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:
-        """The same frame."""
+        """The frame as it is."""
         return frame
 
 
@@ -195,7 +195,7 @@ class Delayed:
         self._fresh: Bools = np.ones(batch, dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows forget what they read."""
+        """Forget what rows have read."""
         self._fresh[rows] = True
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:
@@ -225,7 +225,7 @@ class Yoked:
         self._donors[row] = counts
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin with the first of their recorded counts."""
+        """Start rows with the first of their recorded counts."""
         self._tick[rows] = 0
 
     def change(self, frame: AntennaFrame) -> AntennaFrame:

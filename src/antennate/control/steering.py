@@ -73,12 +73,12 @@ class SteeringRule:
         self.turn_offset: Floats = np.zeros(batch)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, straight, with no memory."""
+        """Start rows anew, straight, with no memory."""
         self._begun[rows] = False
         self._mean[rows] = self.turn_offset[rows] = 0.0
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`; a row with an antenna that is UNKNOWN holds and keeps its state."""
+        """Maneuvers of this tick; a row with an UNKNOWN antenna holds and keeps its state."""
         known = ~np.isnan(flex[:, LEFT] + flex[:, RIGHT])
         error = np.where(known, self._error(flex), self._mean)
         self._mean = np.where(known & ~self._begun, error, self._mean)

@@ -9,7 +9,8 @@ from antennate.sim.scenes.wall import GAP, Wall
 from antennate.types import Floats
 
 REWARD_VERSION = 1
-"""It rises when a term or a weight changes; then the environments get a new version too."""
+"""Version of the reward. A change of a term or a weight raises it, and the environments get a new
+version too."""
 
 
 @dataclass(frozen=True, slots=True)

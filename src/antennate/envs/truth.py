@@ -44,7 +44,7 @@ class Truth:
 
     @classmethod
     def empty(cls, batch: int) -> Truth:
-        """That of rows without an episode."""
+        """Truth of rows without an episode."""
         whole = (np.zeros(batch, np.int64) for _ in range(3))
         real = (np.zeros(batch) for _ in range(4))
         seed, episode, maneuver = whole

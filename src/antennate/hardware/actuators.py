@@ -148,7 +148,7 @@ class Actuators(Protocol):
         ...
 
     def away(self, command: JointCommand, time: float) -> int:
-        """How many joints a time [s] is too short for, on their way to a command [rad]."""
+        """Number of joints that a time [s] is too short for, on their way to a command [rad]."""
         ...
 
     def maintain(self, may_begin: bool) -> None:

@@ -46,7 +46,7 @@ class RobotConfig(Params):
     sensor_id: str | None = number(None, "1", "assumed: that of the calibration file")
     """Name of the flex sensor; 16 hexadecimal digits name the board it is soldered to."""
     sensor_id_right: str | None = number(None, "1", "assumed: that of its calibration file")
-    """The same of the right antenna, where it has its own file."""
+    """Name of the flex sensor of the right antenna, where that has its own file."""
     reach: float | None = number(
         None, "1", "assumed: of the calibration file, or 0.8", ge=0, le=200
     )
@@ -54,7 +54,7 @@ class RobotConfig(Params):
     reach_right: float | None = number(
         None, "1", "assumed: of its calibration file, or that of both", ge=0, le=200
     )
-    """The same of the right antenna, where it has its own."""
+    """Reach of the right antenna in calibrated spans, where that has its own."""
     robot: RobotSpec = RobotSpec()
     zeros: ZerosParams = ZerosParams()
     control: ControlParams = ControlParams()
@@ -67,7 +67,7 @@ class RobotConfig(Params):
         return self.reach, self.reach if self.reach_right is None else self.reach_right
 
     def calibrated(self) -> Self:
-        """The configuration with curve and flex sensor of the calibration file in place of its name."""
+        """The configuration with curve and flex sensor of its calibration file."""
         self._require_files()
         if self.calibration is None and self.calibration_right is None:
             return self
@@ -164,7 +164,7 @@ class DoctorConfig(RobotConfig):
         return dict.fromkeys(("doctor.gravity_error", "doctor.turning"), why)
 
     def calibrated(self) -> Self:
-        """The same with curve, flex sensor and noise of the calibration file, as of a robot."""
+        """The configuration with curve, flex sensor and noise of its calibration file."""
         names = {"calibrated_noise": self.calibration}
         names["calibrated_noise_right"] = self.calibration_right or self.calibration
         done = super().calibrated()

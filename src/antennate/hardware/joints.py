@@ -43,7 +43,7 @@ class Setting(NamedTuple):
     cure: int
 
     def allows(self, value: int) -> bool:
-        """The value may stay."""
+        """Whether the value may stay."""
         return self.low <= value <= self.high
 
     def __str__(self) -> str:
@@ -53,7 +53,7 @@ class Setting(NamedTuple):
 
 
 def settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
-    """By register and id, in the order in which they are set."""
+    """Required settings by register and id, in the order in which they are set."""
     zero = dict.fromkeys(robot.ids, Setting(0, 0, 0))
     low, high = _position_limits(robot)
     return {
@@ -67,13 +67,13 @@ def settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
 
 
 def all_settings(robot: RobotSpec) -> Mapping[str, Mapping[int, Setting]]:
-    """The same, and the return delay: it makes answers late, and forbids no torque."""
+    """Required settings and the return delay, which makes answers late and forbids no torque."""
     delay = dict.fromkeys(robot.ids, Setting(0, 0, 0))
     return {**settings(robot), "return_delay_time": delay}
 
 
 def settings_of(rules: Mapping[str, Mapping[int, Setting]], servo: int) -> dict[str, Setting]:
-    """Those of one servo by register."""
+    """Settings of one servo by register."""
     return {name: by_id[servo] for name, by_id in rules.items() if servo in by_id}
 
 
@@ -128,7 +128,7 @@ def _position_limits(robot: RobotSpec) -> tuple[dict[int, Setting], dict[int, Se
 def unmeasured(
     robot: RobotSpec, zeros: ZerosParams, lists: Sequence[str] = ("zeros", "directions")
 ) -> tuple[str, ...]:
-    """Names of the joints of which one of these lists was neither measured nor stated."""
+    """Names of the joints that lack a measured or stated value in one of these lists."""
     return tuple(dict.fromkeys((*robot.unstated(*lists), *zeros.missing)))
 
 

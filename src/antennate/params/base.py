@@ -27,7 +27,7 @@ from antennate.files import TOO_LONG, read_toml
 from antennate.params.faults import Unread, describe, group_of
 
 LARGEST_SEED = 2**62
-"""Other programs read seeds as numbers of 64 bits."""
+"""Largest seed: other programs read seeds as numbers of 64 bits."""
 ROBOT = "robot"
 """This group is described whole: a file may hold what a command does not read, a flag may not."""
 ALLOWED = "allowed"
@@ -100,7 +100,7 @@ class Params(Strict):
 
 
 def changes(config: Params, paths: Iterable[str]) -> Iterator[tuple[str, Any]]:
-    """Those of these dotted parameters that differ from their default, with their values."""
+    """Parameters at these dotted paths that differ from their default, with their values."""
     for path in paths:
         *groups, name = path.split(".")
         group: Any = config
@@ -166,7 +166,7 @@ def number(
         default: Its default.
         unit: Its unit, "1" if it has none.
         source: Where the default comes from.
-        needs: Flags of which one must be given beside its own.
+        needs: Flags, one of which must be given beside its own.
         metavar: What stands for its value in the help, such as FILE; else its type.
         bounds: As for pydantic's Field.
     """
@@ -255,9 +255,9 @@ Config = TypeVar("Config", bound=Params)
 def read_file(path: Path, model: type[Config]) -> Config:
     """A configuration from a TOML file with the model's keys.
 
-    Where the model has a group of which some are known by name, such as a robot, the file may hold
-    that name or the path of a file, or a table whose `base` is one; a path starts at the folder of
-    the file that holds it.
+    A group may have known names, such as a robot. In its place the file may hold such a name, the
+    path of a file, or a table whose `base` is one; a path starts at the folder of the file that
+    holds it.
 
     Args:
         path: The file.

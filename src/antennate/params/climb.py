@@ -274,7 +274,7 @@ class ClimbParams(Params):
     over_time: float = number(3.0, "s", "assumed: it walks into it within", ge=0, le=30)
     """Time within which something new means that the step was not so low."""
     drop_time: float = number(4.0, "s", "assumed: its length at the usual speed", ge=0, le=30)
-    """The same after a drop whose ground it has felt."""
+    """Time for which it feels nothing new after a drop whose ground it has felt."""
     attempts: int = number(3, "1", "assumed: thrice the same place is a wall", ge=1, le=20)
     """Climbs one after the other that make a wall."""
     retreat_time: float = number(1.0, "s", "assumed: a link and a half", gt=0, le=30)

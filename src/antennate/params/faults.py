@@ -72,9 +72,9 @@ class Unread(ValueError):
         return f"{names[0]}: expected a parameter that is read{such}, found {found}, but {self.why}"
 
     def _instead(self) -> list[str]:
-        """Those read of the same name, else of its group or one around it, else groups with some.
+        """Parameters to name instead: read ones of this name, else of the group or one around it.
 
-        None of a robot, whose parts are what they are.
+        Else groups with parameters that are read. None for a robot, whose parts are what they are.
         """
         top, group, name = (*self.path.partition(".")[:1], *self.path.rpartition(".")[::2])
         if top == "robot":

@@ -59,7 +59,7 @@ class ZerosParams(Params):
     measured: str = number("", "1", "assumed: not known; kept by `antennate setup zero`")
     """Date on which they were measured."""
     missing: tuple[str, ...] = number((), "1", "assumed: none; kept by `antennate setup`")
-    """Joints of which they are not known: another servo, or a direction that was not measured."""
+    """Joints without known zero or direction: another servo, or no direction measured."""
 
 
 class JogParams(Params):
@@ -133,7 +133,7 @@ class DoctorParams(Params):
     calibrated_noise_right: float | None = number(
         None, "counts", "assumed: that of its calibration file", ge=0, le=4095
     )
-    """The same of the right antenna."""
+    """Noise of the right antenna when it was calibrated."""
     gravity_error: float = number(
         0.1, "1", "assumed: five times a zero-g level of 20 mg, or a slope of 6 deg", gt=0, le=1
     )

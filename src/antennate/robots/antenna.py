@@ -31,7 +31,7 @@ CONVERTER_AT_1_2_V = (
     2667, 2706, 2745, 2780, 2813, 2844, 2873, 2901, 2928, 2956,
     2982, 3006, 3032, 3059, 3084, 3110, 3135, 3160, 3184, 3209,
 )
-"""The same with a reference of 1.2 V [mV]."""
+"""Voltage of a compressed reading, ADC1, reference 1.2 V [mV]; same source."""
 # fmt: on
 
 

@@ -18,11 +18,11 @@ from antennate.robots.spec import RobotSpec
 PLUG = 3.0
 """Rated current of a contact of the servos' plugs, JST EH [A] (datasheet JST eEH)."""
 REGULATOR_EFFICIENCY = 0.9
-"""Of the step-down converter for the antennae (assumed: usual at half its load)."""
+"""Efficiency of the step-down converter for the antennae (assumed: usual at half its load)."""
 WALKING_SHARE = 0.1
 """Mean current of a walking servo over its stall current: 2.2 A of 17 in simulated tunnels."""
 PEAK_SHARE = 0.33
-"""The same at the worst moment: 7.3 A."""
+"""Current of a walking servo over its stall current at the worst moment: 7.3 A."""
 CELL_RATE = 20.0
 """Current over capacity that usual hobby cells give for long [1/h] (assumed)."""
 MARGIN = 1.25

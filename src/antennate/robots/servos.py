@@ -37,7 +37,7 @@ _NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Unit and bounds of each number of the model file, in the order of an array of them."""
 MODEL_NUMBERS = tuple(_NUMBERS)
-"""Their names, the fields of `ServoParams` that a fit changes."""
+"""Names of these numbers, the fields of `ServoParams` that a fit changes."""
 
 
 def _rated(model: ServoModel, name: str) -> Any:

@@ -18,7 +18,7 @@ from antennate.types import SIDES
 Place = tuple[float, float]
 
 _ROW = 0.56
-"""From a row of servos to the next; all lengths are in inches."""
+"""Distance from a row of servos to the next; all lengths are in inches."""
 _LEFT, _MIDDLE, _RIGHT = 1.2, 2.45, 3.7
 """Columns of servos."""
 _GROUND, _RAIL = 0.1, 0.25
@@ -32,7 +32,7 @@ _ANTENNAE, _CONVERTER, _FIRST = -2.8, -3.3, -3.95
 _ASIDE, _WIDE = 3.69, 1.36
 """Column of the right antenna's servos where there are two rows, and width of their boxes."""
 _HEIGHT, _LETTERS = 0.3, 8
-"""Of a box, and of its letters [points]."""
+"""Height of a box, and of its letters [points]."""
 _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
 """Blue, red and orange, as the legend calls them."""
 

@@ -43,7 +43,7 @@ class Ball:
     radius: float
 
     def geom(self) -> dict[str, Any]:
-        """The same as arguments of `add_geom`."""
+        """Arguments of `add_geom` for the sphere."""
         kind = mujoco.mjtGeom.mjGEOM_SPHERE
         return {"type": kind, "pos": [self.x, self.y, 0], "size": [self.radius, 0, 0]}
 
@@ -59,7 +59,7 @@ class Bar:
     radius: float
 
     def geom(self) -> dict[str, Any]:
-        """The same as arguments of `add_geom`."""
+        """Arguments of `add_geom` for the capsule."""
         ends = [self.x0, self.y0, 0, self.x1, self.y1, 0]
         kind = mujoco.mjtGeom.mjGEOM_CAPSULE
         return {"type": kind, "fromto": ends, "size": [self.radius, 0, 0]}

@@ -40,7 +40,7 @@ _only = [False]
 
 
 def describe_only(asked: bool) -> None:
-    """Say so before the engine is imported."""
+    """Say, before the engine is imported, whether nothing is simulated."""
     _only[0] = asked
 
 
@@ -50,12 +50,12 @@ def is_described() -> bool:
 
 
 _dropping = [0]
-"""How many hold on to that they are dropped."""
+"""Number of `dropped` blocks that are open."""
 
 
 @contextlib.contextmanager
 def dropped() -> Iterator[None]:
-    """Drop them for a while, also if the engine is imported only then."""
+    """Drop warnings of the engine for a while, also if it is imported only then."""
     engine = _engine()
     before = engine.get_mju_user_warning() if engine is not None else None
     _dropping[0] += 1
@@ -70,7 +70,7 @@ def dropped() -> Iterator[None]:
 
 
 def drop_if_asked() -> None:
-    """Drop them within `dropped`, once the engine is imported."""
+    """Drop warnings of the engine within `dropped`, once it is imported."""
     engine = _engine()
     if engine is not None and _dropping[0]:
         engine.set_mju_user_warning(lambda message: None)

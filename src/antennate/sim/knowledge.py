@@ -25,7 +25,8 @@ from antennate.types import Floats, Ints, Maneuver
 AHEAD = 0.3
 """How far ahead on the route the point is that `map` leads to [m]: half the robot."""
 SIDE_AHEAD = 0.6
-"""The same of `side` [m]: the robot, so that a corner is still seen after it has backed off."""
+"""How far ahead on the route the point is that `side` looks at [m]: the robot, so that a corner is
+still seen after it has backed off."""
 STRAIGHT = math.radians(10.0)
 """Largest angle to a point that counts as straight ahead [rad]."""
 JAM_GAIN = 0.02

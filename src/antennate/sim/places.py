@@ -175,14 +175,14 @@ class Contacts(NamedTuple):
 
     @classmethod
     def of(cls, data: mujoco.MjData) -> Contacts:
-        """Those of a state."""
+        """Contacts of a state."""
         contact: Any = data.contact
         parts = contact.geom, contact.efc_address, contact.pos, contact.frame, data.efc_force
         return cls(*(part.copy() for part in parts))
 
     @classmethod
     def joined(cls, several: Sequence[Contacts]) -> Contacts:
-        """Those of several states as if they were of one."""
+        """Contacts of several states as if they were of one."""
         before = np.cumsum([0, *(len(each.force) for each in several)])
         parts = [np.concatenate(part) for part in zip(*several, strict=True)]
         shift = np.repeat(before[:-1], [len(each.address) for each in several])

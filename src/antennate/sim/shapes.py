@@ -188,7 +188,7 @@ class Shapes(NamedTuple):
 
     @classmethod
     def unpack(cls, content: bytes) -> Shapes:
-        """Back from `pack`."""
+        """Shapes from the bytes of `pack`."""
         try:
             with np.load(io.BytesIO(content[:_LARGEST]), allow_pickle=False) as file:
                 return cls(*(file[name] for name in cls._fields))

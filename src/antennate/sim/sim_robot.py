@@ -81,7 +81,7 @@ class Disturbance:
         return self._imu_noise[at]
 
     def imu_error_block(self) -> Floats:
-        """The same of the next NOISE_BLOCK ticks, shape (NOISE_BLOCK, 6)."""
+        """Errors of the inertial sensor in the next NOISE_BLOCK ticks, shape (NOISE_BLOCK, 6)."""
         if self._imu_rng is None:
             return np.zeros((NOISE_BLOCK, 2 * AXES))
         noise = noise_of(self._robot.imu, self._imu_rng, NOISE_BLOCK, self._period)

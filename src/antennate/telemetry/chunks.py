@@ -36,7 +36,7 @@ _SKIPPED = (Opcode.HEADER, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METAD
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 """Kinds of records that stand in chunks."""
 _PREFIX = struct.Struct("<QQQII")
-"""Of a chunk: first and last time, size and CRC of its content, length of the next word."""
+"""Begin of a chunk: first and last time, size and CRC of its content, length of the next word."""
 _LZ4 = b"\x03\0\0\0lz4"
 _BEGIN = re.compile(
     rb"\x06.{%d}(?:\x04\0\0\0zstd|%b|\0\0\0\0)" % (RECORD.size + _PREFIX.size - 5, _LZ4),

@@ -261,7 +261,7 @@ def messages(stream: BinaryIO, idle: Callable[[], None] | None = None) -> Iterat
 
 
 def read(stream: BinaryIO, count: int) -> bytes:
-    """So many bytes, fewer at the end."""
+    """Read that many bytes of a stream, fewer at its end."""
     data = b""
     while len(data) < count and (piece := stream.read(count - len(data))):
         data += piece

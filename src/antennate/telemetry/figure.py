@@ -41,7 +41,7 @@ _BESIDE_THE_TITLE: dict[str, Any] = {
 }
 """Place of a short legend, above its panel."""
 _COLUMNS = 4
-"""Of a long one, below all panels."""
+"""Columns of a long legend, below all panels."""
 
 
 @dataclass(frozen=True, slots=True)

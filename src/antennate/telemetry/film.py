@@ -78,7 +78,7 @@ class Film:
     ending: str = ""
 
     def seen_from(self, view: FilmView) -> Film:
-        """The same film of a walk, seen from there."""
+        """The film of a walk, seen from this side."""
         if view == "above":
             return self
         near = replace(self.shot, distance=_NEARER * self.shot.distance, elevation=_LOW)

@@ -107,7 +107,7 @@ class Header(Strict):
 
     @classmethod
     def unpack(cls, content: bytes) -> Header:
-        """Back from `pack`.
+        """Header from the bytes of `pack`.
 
         Raises:
             LogError: It is no header.
@@ -115,7 +115,7 @@ class Header(Strict):
         return _checked(content)
 
     def messages(self) -> dict[Topic, bytes]:
-        """Its messages in a log."""
+        """Messages of the header in a log."""
         apart = {"calibration", "versions"}
         texts = {
             CONFIG: self.model_dump_json(exclude=apart),
@@ -127,7 +127,7 @@ class Header(Strict):
 
     @classmethod
     def of_messages(cls, messages: Mapping[Topic, bytes]) -> Header:
-        """Back from `messages`.
+        """Header from the messages of a log.
 
         Raises:
             LogError: One is missing or damaged.

@@ -290,7 +290,7 @@ class LogReader:
 
 
 def _comes_again(topic: Topic, group: Sequence[Record]) -> bool:
-    """Whether a group has a message of a topic of which a tick has one."""
+    """Whether a group already has the message of this topic that a tick has once."""
     return topic not in _BESIDE and any(record.topic is topic for record in group)
 
 

@@ -244,11 +244,11 @@ class SimulatedLog(TickLog):
         self._ticks = 0
 
     def take(self, decided: bytes) -> None:
-        """Keep one tick, of which `Decisions` says this."""
+        """Keep one tick, given what `Decisions` says of it."""
         self.add(self.tick(decided))
 
     def tick(self, decided: bytes) -> TakenTick:
-        """One tick, of which `Decisions` says this, for `add` or `write`."""
+        """One tick for `add` or `write`, given what `Decisions` says of it."""
         self._ticks += 1
         look = (self._ticks - 1) % LOOK_EVERY == 0
         world = self._world

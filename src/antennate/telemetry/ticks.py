@@ -143,7 +143,7 @@ class Tick:
         return tuple(n for each in values for n in (each if isinstance(each, tuple) else (each,)))
 
     def row(self, robot: RobotSpec, measured: Container[str] = ()) -> dict[str, Any]:
-        """It as a row of a table: numbers as they are, so that they come back exactly.
+        """The tick as a row of a table: numbers as they are, so that they come back exactly.
 
         Args:
             robot: Gives the names of the joints.
@@ -175,7 +175,7 @@ class Tick:
 
     @classmethod
     def unpack(cls, content: bytes) -> Tick:
-        """Back from `pack`.
+        """Tick from the bytes of `pack`.
 
         Raises:
             LogError: It is no tick.
@@ -183,7 +183,7 @@ class Tick:
         return cls(**TICK.decode(content))
 
     def messages(self, names: tuple[str, ...], stamp: int) -> Iterator[tuple[Topic, bytes]]:
-        """Its messages in a log.
+        """Messages of the tick in a log.
 
         Args:
             names: Names of the joints.
@@ -207,7 +207,7 @@ class Tick:
 
     @classmethod
     def of_messages(cls, messages: Mapping[Topic, bytes]) -> Tick:
-        """Back from `messages`.
+        """Tick from its messages.
 
         Raises:
             LogError: One is not of its type.

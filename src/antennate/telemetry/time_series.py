@@ -72,7 +72,7 @@ class TimeSeries:
         return len(self.t)
 
     def __repr__(self) -> str:
-        """It in one line."""
+        """The series in one line."""
         return f"<{self._sentence}>"
 
     def _repr_html_(self) -> str:
@@ -96,7 +96,7 @@ class TimeSeries:
         return f"TimeSeries of {len(self)} ticks, {span:.2f} s{facts and f': {facts}'}"
 
     def _by_maneuver(self) -> Iterator[tuple[str, list[str]]]:
-        """Of each maneuver, and of all: its share of the ticks, mean levels, shares of contact."""
+        """Rows of each maneuver, and of all: share of the ticks, mean levels, shares of contact."""
         parts = {m.name: self.maneuver == m for m in Maneuver} | {
             "all": self.maneuver == self.maneuver
         }

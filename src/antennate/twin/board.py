@@ -276,7 +276,7 @@ class UdpEndpoint:
         self.path = f"udp://{host}:{self._socket.getsockname()[1]}"
 
     def fileno(self) -> int:
-        """Of the socket."""
+        """File of the socket."""
         return self._socket.fileno()
 
     def baud(self) -> int | None:

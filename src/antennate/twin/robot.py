@@ -267,7 +267,7 @@ class TwinRobot:
             self._body.world(0).place_drives(self._joints.angles(ticks))
 
     def _carry_back(self) -> None:
-        """To where the trial began, as a person does between two drives."""
+        """Put the robot where the trial began, as a person does between two drives."""
         self._body.put_back(0, self._start)
         self._standing = True
         for servo, ticks in zip(

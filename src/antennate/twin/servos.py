@@ -39,7 +39,7 @@ def servos_of(robot: RobotSpec) -> list[DrivenServo]:
 
 
 def factory_new(robot: RobotSpec) -> list[DrivenServo]:
-    """The same servos as they come out of their boxes."""
+    """The servos of a robot as they come out of their boxes."""
     kinds = (robot.servos.of(name) for name in robot.servo_names)
     return [DrivenServo(kind.servo, kind.servo["id"].default or 1, drive=kind) for kind in kinds]
 
@@ -123,17 +123,17 @@ class ServoEntry(Params):
     """One servo of a list: all else is as delivered."""
 
     model: str = number("xc430-w240", "1", "assumed: the robot's")
-    """Its model, or a file with one."""
+    """Model of the servo, or a file with one."""
     id: int = number(1, "1", _FACTORY, ge=0, le=252)
-    """Its id."""
+    """Id of the servo."""
     baud: int = number(57_600, "bit/s", _FACTORY, gt=0)
-    """Its speed on the bus."""
+    """Speed of the servo on the bus."""
     position: float = number(
         float(MIDDLE), "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575
     )
-    """Where its shaft is."""
+    """Position of the shaft."""
     name: str = number("", "1", "assumed: its place in the list")
-    """Its name for orders."""
+    """Name of the servo in orders."""
 
     def make(self) -> Servo:
         """The servo."""
@@ -190,7 +190,7 @@ def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
 
 
 class ServoBox:
-    """Some servos on their wire.
+    """Servos on one wire.
 
     Args:
         entries: The servos.

@@ -172,7 +172,7 @@ class Body:
         self.rise = np.where(lowered, lower, self.rise)
 
     def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
-        """As of `Moves`: the targets of maneuver and plans."""
+        """Joint targets of the maneuvers and of the plans."""
         wave = np.where(self.climbs, min(self._params.amplitude, self._usual), self._usual)
         change = self._params.amplitude_rate * self._period * (maneuver != int(Maneuver.HOLD))
         self._amplitude += np.clip(wave - self._amplitude, -change, change)

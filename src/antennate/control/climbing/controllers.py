@@ -37,7 +37,7 @@ class MakeRule(Protocol):
     """Makes a rule that commands a body."""
 
     def __call__(self, control: ControlParams, robot: RobotSpec, batch: int, body: Body) -> Rule:
-        """Of B rows."""
+        """The rule of B robots."""
         ...
 
 
@@ -60,7 +60,7 @@ class ClimbingController(RuleController):
         super().__init__(rule, control, robot, batch, self.body)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """As of a `Controller`."""
+        """Joint targets for this frame, which the body feels first."""
         self.body.feel(frame)
         return super().step(frame)
 

@@ -45,7 +45,7 @@ class Heading:
         self._from: Floats = np.full(batch, np.nan)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, upright, without a mark."""
+        """Start rows anew, upright, without a mark."""
         self._up[rows], self._across[rows] = _UP, _AHEAD
         self._bias[rows] = 0.0
         for memory in (self._rested, self._averaged, self._lost, self._now):

@@ -73,7 +73,7 @@ class ClimbRule:
         self._close: Bools = np.zeros(batch, dtype=bool)
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows begin anew, walking."""
+        """Start rows anew, walking."""
         self._steer.reset(rows)
         self.stage[rows], self.ground[rows] = Stage.WALK, Ground.FLOOR
         for memory in (self._since, self._felt, self._missed, self._free, self._blind):
@@ -82,7 +82,7 @@ class ClimbRule:
         self._passed[rows] = self.height[rows] = np.nan
 
     def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """As of a `Rule`."""
+        """Maneuvers of this tick; a row whose flex cannot be used holds."""
         known: Bools = np.logical_and.reduce(abs(flex) < math.inf, axis=1)
         self._count(flex, known)
         steering = self._steer.step(t, level, contact, flex)
@@ -147,7 +147,7 @@ class ClimbRule:
         return Maneuver.FORWARD if self.stage[row] == Stage.WALK else Maneuver.HOLD
 
     def _misses_ground(self, row: int) -> bool:
-        """Both antennae for a while, or one of them, as at an edge that is met aslant."""
+        """Whether both antennae miss the ground for a while, or one, as at an edge met aslant."""
         low, high = sorted(self._missed[row].tolist())
         return max(low - self._feel.missing_time, high - self._feel.aslant_time) > 0.0
 

@@ -40,7 +40,7 @@ class Actor(Protocol):
     maneuver: Ints
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """Some rows begin anew at a gait phase [rad], straight."""
+        """Start rows anew at a gait phase [rad], straight."""
         ...
 
     def decide(self, answers: Floats, rows: Bools) -> None:
@@ -80,7 +80,7 @@ class _GaitRows:
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of an `Actor`."""
+        """Start rows anew at a gait phase [rad], straight, with no answer yet."""
         self._answers[rows], self._void[rows] = 0.0, False
         self.phase[rows] = phase
         self.pace[rows] = self.offset[rows] = 0.0
@@ -88,14 +88,14 @@ class _GaitRows:
         self.maneuver[rows] = int(Maneuver.FORWARD)
 
     def decide(self, answers: Floats, rows: Bools) -> None:
-        """As of an `Actor`."""
+        """Take answers for some rows, shape (B, n); one that is not finite is void."""
         void: Bools = np.logical_not(np.isfinite(answers).all(axis=1))
         self._void = np.where(rows, void, self._void)
         finite = np.where(void[:, None], 0.0, answers)
         self._answers = np.where(rows[:, None], finite, self._answers)
 
     def goals(self) -> Floats | None:
-        """As of an `Actor`."""
+        """None: only a policy of joints is given their goals."""
         return None
 
     def _toward(self, name: str, goal: Floats, moves: Bools) -> None:
@@ -115,12 +115,12 @@ class ManeuverActor(_GaitRows):
         self._gait = Gait(control.gait, robot, batch, control.period)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of an `Actor`."""
+        """Start rows and their gait anew at a phase [rad]."""
         super().reset(rows, phase)
         self._gait.reset(rows, phase)
 
     def step(self, hold: Bools) -> JointCommand:
-        """As of an `Actor`."""
+        """Joint targets of the chosen maneuvers; a row that holds, or has a void answer, stays."""
         chosen = _CHOICES[np.argmax(self._answers, axis=1)]
         self.maneuver = np.where(self._void | hold, _HOLD, chosen)
         command = self._gait.step(self.maneuver, self._interface.turn_offset)
@@ -133,7 +133,7 @@ class GaitActor(_GaitRows):
     """Amplitude, yaw offset, frequency and direction of the serpenoid gait."""
 
     def step(self, hold: Bools) -> JointCommand:
-        """As of an `Actor`."""
+        """Joint targets of the gait asked for; a row that holds, or has a void answer, stays."""
         gait, period = self._control.gait, self._control.period
         amplitude, offset, frequency, direction = np.clip(self._answers, -1.0, 1.0).T
         moves = ~(self._void | hold)
@@ -165,7 +165,7 @@ class JointActor(_GaitRows):
         self._parts = robot.command_shapes(batch)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of an `Actor`; the goals are the pose of the gait."""
+        """Start rows anew at a gait phase [rad]; the goals are the pose of the gait."""
         super().reset(rows, phase)
         batch = len(self.phase)
         pose = targets(self._control.gait, self._robot, self.phase, np.zeros(batch), lifting=False)
@@ -173,7 +173,7 @@ class JointActor(_GaitRows):
         self._goals[rows] = np.concatenate(parts, axis=1)[rows]
 
     def step(self, hold: Bools) -> JointCommand:
-        """As of an `Actor`."""
+        """Joint targets moved by the answers; a row that holds, or has a void answer, stays."""
         answers = np.clip(self._answers, -1.0, 1.0)
         moves = ~(self._void | hold)
         reach = np.where(self._turns, 0.0, self._limits)
@@ -190,7 +190,7 @@ class JointActor(_GaitRows):
         return JointCommand(**{name: part.reshape(shape) for (name, shape), part in parts})
 
     def goals(self) -> Floats | None:
-        """As of an `Actor`."""
+        """Goals of all joints, shape (B, n); rolling legs have a sine and a cosine."""
         columns = [
             column
             for turns, goal in zip(self._turns.tolist(), self._goals.T, strict=True)

@@ -76,7 +76,7 @@ class Observer:
         self.mean: Floats = np.zeros((batch, 2))
 
     def reset(self, rows: Ints | Bools) -> None:
-        """Some rows have felt nothing yet, and stood still."""
+        """Start rows that have felt nothing yet and stood still."""
         self._average.reset(rows)
         self._past[rows] = 0.0
         self._past[rows, : len(self._free)] = self._free[:, None]

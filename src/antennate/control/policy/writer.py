@@ -153,7 +153,7 @@ def _single(name: str, value: Any, shape: tuple[int, ...]) -> Weights:
 
 
 def _memory(memory: Sequence[Weights]) -> dict[str, Weights]:
-    """Its parameters in the order of ONNX, which has z before r, by the names of their inputs."""
+    """Parameters of the memory by the names of their inputs, in the order of ONNX: z before r."""
     weight, recurrent, bias, recurrent_bias = (_swapped(np.asarray(each)) for each in memory)
     biases = np.concatenate([bias, recurrent_bias])[None]
     return {"W": weight[None], "U": recurrent[None], "b and c": biases}

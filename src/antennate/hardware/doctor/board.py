@@ -74,7 +74,7 @@ class BoardSurvey:
         return (len(self.readings) - 1) / span if span > 0 else None
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json."""
+        """Findings of the board for result.json."""
         counts, hello = self.counts, self.hello
         known = len(counts) > 0
         return {
@@ -314,7 +314,7 @@ def _noise(
 
 
 def _curve(config: DoctorConfig, name: str) -> CurveParams:
-    """Of the antenna on a side; the right one may have its own."""
+    """Curve of the antenna on a side; the right one may have its own."""
     both, right = config.control.conditioning, config.control.conditioning_right
     return right if right is not None and name == "right" else both
 

@@ -56,7 +56,7 @@ _SAMPLE_TIME = 0.3
 
 @dataclass(slots=True)
 class BusSurvey:
-    """What was found on a bus of which a number of bits per second is expected.
+    """What was found on a bus that should run at a number of bits per second.
 
     Attributes:
         here: Servos that answer at that speed, by id.
@@ -89,7 +89,7 @@ class BusSurvey:
         return [servo for servo, present in self.here.items() if present.state == "ok"]
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json."""
+        """Findings of the bus for result.json."""
         return {
             "baud": self.baud,
             "read_time_s": self.read_time,

@@ -48,8 +48,8 @@ class Walk:
 MUCH = 0.02
 """Share of ticks missed since the walk began above which the computer is named late (assumed)."""
 SOME = 0.005
-"""The same where more answers than ticks times MUCH were missed, too: on a computer that is not
-late up to 0.3 % of ticks are (measured, docs/hardware.md)."""
+"""Share of ticks missed that suffices where more answers than ticks times MUCH were missed, too: on
+a computer that is not late up to 0.3 % of ticks are (measured, docs/hardware.md)."""
 _FOLLOW = (Cause.LATE_ANSWERS, Cause.SILENT_SERVO, Cause.WATCHDOG, Cause.PAUSE)
 """What a late computer may cause by itself."""
 
@@ -258,7 +258,7 @@ class Report:
             self._wait("; ".join(missing))
 
     def _wait(self, why: str) -> None:
-        """It is a HOLD, of which no time is known."""
+        """Tell of a HOLD whose time is not known."""
         self.worst, self.why, self._worst = State.HOLD, why, (State.HOLD, True, 0)
 
     def result(self, session: Session) -> dict[str, Any]:

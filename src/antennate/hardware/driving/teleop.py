@@ -37,7 +37,7 @@ _HALF = 16_384
 _CROSS = (6, 7)
 """Axes of the cross of most pads; the first stick has 0 and 1."""
 SHOULDERS = (4, 5)
-"""Buttons of which one has to be held, L1 and R1 of most pads (assumed; `jstest` shows yours)."""
+"""Buttons, one of which has to be held, L1 and R1 of most pads (assumed; `jstest` shows yours)."""
 _CHUNKS = 16
 """Reads of 64 events in one call: more than a pad sends in a period (assumed)."""
 _GREETING = 0.5

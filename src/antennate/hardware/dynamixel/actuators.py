@@ -36,7 +36,8 @@ _PATIENCE = 10
 """Ticks after which watchdog and supply are read even if time is short: a round of all 19 then
 takes 2 s at the slowest (assumed)."""
 _PATIENCE_BEHIND = 3
-"""The same for the drive of a joint that is behind: then three readings take 0.1 s (assumed)."""
+"""Ticks after which the drive of a joint that is behind is read even if time is short: then three
+readings take 0.1 s (assumed)."""
 
 
 class ServoMonitor(ActuatorState):
@@ -318,7 +319,7 @@ class DynamixelActuators:
         return slow
 
     def away(self, command: JointCommand, time: float) -> int:
-        """How many joints a time [s] is too short for, on their way to a command."""
+        """Number of joints that a time [s] is too short for, on their way to a command."""
         if self._goals is None:
             return 0
         way = abs(self.joints.ticks(command) - self._goals)

@@ -200,7 +200,7 @@ class Esp32Recording:
     imu: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __repr__(self) -> str:
-        """It in one line."""
+        """The recording in one line."""
         boots, seconds = len(self.hellos), float(self.t.max())
         return (
             f"<Esp32Recording of {len(self.t)} samples, {seconds:.2f} s, boots: {boots}, "

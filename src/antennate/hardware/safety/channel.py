@@ -205,7 +205,7 @@ class Band:
 
     @property
     def span(self) -> float:
-        """From lowest to highest [counts]."""
+        """Distance from the lowest to the highest reading [counts]."""
         return self.high - self.low
 
     def level(self, counts: float) -> float:

@@ -29,7 +29,7 @@ WATCHDOG_COUNTS = 5
 """Bus watchdog of a robot that walks [20 ms]: a servo stops ten ticks after the last packet
 (assumed)."""
 WATCHDOG = WATCHDOG_COUNTS * WATCHDOG_UNIT
-"""The same time [s]."""
+"""Bus watchdog of a robot that walks [s]."""
 STAND = 2.0
 """Longest time that a robot holds its command before the torque goes off [s]: a cycle of its gait
 (assumed)."""

@@ -31,7 +31,7 @@ from antennate.params.safety import FollowingParams
 from antennate.types import Floats
 
 _GOALS = 3
-"""Ticks of which the nearest goal counts: one on its way, one lost (assumed)."""
+"""Last ticks whose nearest goal counts: one on its way, one lost (assumed)."""
 _READINGS = 3
 """Readings of the drive in a row that must all be wrong: chance spoils single ones (assumed)."""
 
@@ -175,7 +175,7 @@ class Following:
                 self._tell(self.faults.behind, at, text)
 
     def _follows_not(self, at: int) -> bool:
-        """It is named already, or its servo has all that it needs to follow."""
+        """Whether the servo of a joint is named already, or has all that it needs to follow."""
         servo = self._ids[at]
         return servo in self.faults.behind or self._well(servo)
 

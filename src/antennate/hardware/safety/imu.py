@@ -119,6 +119,6 @@ class ImuDiagnosis:
         return "" if self.finding is ImuFinding.OK else self.finding.value
 
     def result(self) -> Mapping[str, int]:
-        """How many readings were found to be what, and how many the board has missed."""
+        """Number of readings by finding, and how many the board has missed."""
         counted = {finding.name.lower(): count for finding, count in self.counted.items()}
         return {**counted, "missed_by_board": self.misses}

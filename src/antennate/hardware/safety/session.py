@@ -41,7 +41,10 @@ from antennate.types import AntennaFrame, Clock, Controller, JointCommand, State
 class Orders:
     """What the operator wants.
 
-    Torque on, of which only the change to True counts; off; no walk, as no key is held.
+    Attributes:
+        arm: Torque on; only the change to True counts.
+        stop: Torque off.
+        released: No walk, as no key is held.
     """
 
     arm: bool = False

@@ -27,7 +27,7 @@ from antennate.types import Floats
 BETWEEN_MASS = 1e-6
 """Mass of a link between two servos, taken from the link behind it [kg]."""
 BETWEEN_INERTIA = 1e-9
-"""Its inertia about any axis [kg·m²]."""
+"""Inertia of such a link about any axis [kg·m²]."""
 _GEOMS = mujoco.mjtGeom
 _FOR_MUJOCO = {"fusestatic": "false", "discardvisual": "false"}
 """So MuJoCo's reader keeps link0, which it fixes to the world, and shapes that touch nothing;

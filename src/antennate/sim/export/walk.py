@@ -37,7 +37,7 @@ class Walk(NamedTuple):
     head: Floats
 
     def table(self) -> str:
-        """Both as CSV, in digits that bring back the same numbers."""
+        """Goals and head as CSV, in digits that bring back the same numbers."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow([*self.servos, *HEAD])

@@ -310,7 +310,7 @@ class Plan:
         return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
 
     def _longer(self, behind: float, ahead: float) -> Plan:
-        """The same passage with a longer first and last piece."""
+        """The passage with a longer first and last piece."""
         centre = self.centre.copy()
         centre[0] -= behind * self._axes(0)[0]
         centre[-1] += ahead * self._axes(len(centre) - 2)[0]

@@ -42,11 +42,11 @@ MOST_ELEMENTS = 20_000
 _MOST_CPU = 10
 """Most CPU time for the first compilation, the start of its process included [s]."""
 _LONGEST_COMPILE = 60.0
-"""Most time for it on a busy machine [s]."""
+"""Most time for that compilation on a busy machine [s]."""
 _MOST_MEMORY = 2 << 30
 """Most memory of that process [bytes]."""
 _NO_MODEL = 3
-"""Its exit code if the file is refused with a reason, which is found again and said later."""
+"""Exit code of that process for a refused file; the reason is found again and said later."""
 _REFUSED = ("include", "extension", "plugin", "model", "size", "lengthrange")
 _COUNTED = ("replicate", "composite", "flexcomp")
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
@@ -244,7 +244,7 @@ _VIA = re.compile("via[0-9]+")
 
 
 class MjcfScene:
-    """The same scene in every trial.
+    """Scene from an MJCF file, the same in every trial.
 
     The head starts at the site `start` and faces the next site; progress is arc length from there
     through the sites `via0`, `via1` and so on, if there are any, to `exit`. Heights of sites do not

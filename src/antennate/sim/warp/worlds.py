@@ -75,7 +75,7 @@ def _version(name: str) -> str:
 
 _STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force")
 _STATIC = ("geom_xpos", "geom_xmat")
-"""Of what does not move, Warp computes these for the first world alone."""
+"""Arrays of what does not move, which Warp computes for the first world alone."""
 _UNREAD = ("bvh_", "dof_M0")
 _DROPPED = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD", "HFIELD", "EPA_HORIZON")
 """Overflows of Warp with which contacts are lost."""
@@ -217,7 +217,7 @@ class WarpWorlds:
 
 
 def _plain(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The same model without what Warp does not have, or what we do not use there."""
+    """A copy of the model without what Warp does not have, or what we do not use there."""
     plain = copy.copy(model)
     plain.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     plain.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)

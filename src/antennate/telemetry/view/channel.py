@@ -62,13 +62,13 @@ class Poses(NamedTuple):
     forces: Any
 
     def pack(self) -> bytes:
-        """It as bytes."""
+        """The poses as bytes."""
         head = np.array([self.t, len(self.poses)], np.float64).tobytes()
         return head + self.poses.tobytes() + self.forces.tobytes()
 
     @classmethod
     def unpack(cls, content: bytes) -> Poses:
-        """Back from `pack`."""
+        """Poses from the bytes of `pack`."""
         try:
             t, count = np.frombuffer(content, np.float64, 2)
             numbers = np.frombuffer(content, np.float32, offset=16)
@@ -102,7 +102,7 @@ class Channel:
         return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
     def fileno(self) -> int:
-        """Its file, to wait for."""
+        """File of the channel, to wait for."""
         return self._end.fileno()
 
     def send(self, kind: bytes, content: bytes = b"") -> bool:
@@ -205,7 +205,7 @@ def _pieces(message: bytes) -> list[tuple[bytes, bytes]]:
 
 
 def _messages(message: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Itself, or the messages in one of the kind `_SEVERAL`."""
+    """The message, or those within one of the kind `_SEVERAL`."""
     if message[:1] != _SEVERAL:
         yield message[:1], message[1:]
         return

@@ -22,7 +22,8 @@ _WINDOW = 10.0
 _KEPT = 1200
 """Most ticks in a chart: more than that time has, even where every tick is shown."""
 _HEIGHT, _PADDING = 120, (10, 10, 0, 0)
-"""Of a chart, and the room above and beside it for the halves of the outermost labels [pixels]."""
+"""Height of a chart, and the room above and beside it for the halves of the outermost labels
+[pixels]."""
 _SIDES = ("left", "right")
 LABELS = {"missed": "missed ticks", "misses": "missed answers"}
 """What counters are called where that is not their name in a log; as in the status line."""
@@ -137,7 +138,7 @@ class Charts:
             chart.data = _data(columns, which)
 
     def _begin(self) -> Floats:
-        """A column at the left end, of which lines show nothing.
+        """A column at the left end, where lines show nothing.
 
         So all charts have the same axis of time at any time, from 0 to 1: where the client loses
         the ends of an axis, as it may while it draws a chart anew, it takes these. The end moves by
@@ -199,7 +200,7 @@ def _chart(server: viser.ViserServer, look: _Look, data: tuple[Floats, ...], ord
 
 
 def _scales(limits: tuple[float, float] | None) -> dict[str, uplot.Scale]:
-    """Of both axes."""
+    """Scales of both axes."""
     y = uplot.Scale(auto=True) if limits is None else uplot.Scale(range=limits)
     return {"x": uplot.Scale(time=False), "y": y}
 

@@ -88,7 +88,7 @@ class FoxgloveSink:
         return f"ws://{_HOST}:{self._server.port}"
 
     def draw(self, now: float) -> float:
-        """Nothing waits to be drawn."""
+        """Time until the next picture [s]; nothing waits to be drawn."""
         return _IDLE
 
     def end(self) -> None:

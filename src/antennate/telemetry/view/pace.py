@@ -19,7 +19,7 @@ from antennate.types import Controller
 
 _PLACES = ("rule.threshold", "conditioning.averaging_time", "rule.hold_time")
 _TURNS = ("gait.turn_offset", "escape.turn_offset")
-"""Of these the first that is read."""
+"""Yaw offset of turns: the first of these that is read."""
 
 
 class Tuning:

@@ -111,7 +111,7 @@ class LogPlayer(Pace):
         self.begin()
 
     def begin(self) -> None:
-        """From the beginning."""
+        """Show the log from its beginning."""
         self._begin_at = self._scene = None
         self._forces = np.zeros((0, 6), np.float32)
         self.tell()

@@ -119,7 +119,7 @@ def arrows(forces: NDArray[np.float32], scale: float, least: float) -> NDArray[n
 
 
 def _thickness(scale: float) -> dict[str, Any]:
-    """Of arrows [m]; thinner beside a single antenna."""
+    """Thickness of arrows [m]; they are thinner beside a single antenna."""
     return {
         "shaft_radius": 0.004 * scale,
         "head_radius": 0.009 * scale,
