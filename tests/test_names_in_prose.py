@@ -221,6 +221,7 @@ def test_a_page_names_what_is_there(page: Path) -> None:
     assert missing(SPAN.findall(CODE.sub("", text)), code) == []
 
 
+@pytest.mark.ci
 def test_a_page_that_is_made_names_what_is_there() -> None:
     for path in made_pages().values():
         test_a_page_names_what_is_there(path)

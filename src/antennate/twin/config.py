@@ -93,13 +93,13 @@ class Passage:
 
     def reset(self) -> None:
         """The robot stands at the start again."""
-        self._episode = Episode(self._scene, math.inf)
+        self._walk = Episode(self._scene, math.inf)
         self.passed = math.inf
 
     @property
     def progress(self) -> float:
         """How far the head has come [m]."""
-        return self._episode.progress
+        return self._walk.progress
 
     def watch(self, world: World) -> None:
         """Look at the world after a tick.
@@ -108,14 +108,14 @@ class Passage:
             SceneError: The scene does not answer as its protocol says.
         """
         self.on_tick(world)
-        self._episode.tick(world, look=self._look)
-        if self._episode.error is not None:
-            raise self._episode.error
+        self._walk.tick(world, look=self._look)
+        if self._walk.error is not None:
+            raise self._walk.error
 
     def _look(self, world: World) -> None:
         head = world.head[:2]
-        self._episode.progress_of(head)
-        if self.passed == math.inf and self._episode.judge.look(head) == "success":
+        self._walk.progress_of(head)
+        if self.passed == math.inf and self._walk.judge.look(head) == "success":
             self.passed = world.t
             self.on_pass()
 
