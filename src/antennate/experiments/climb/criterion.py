@@ -48,7 +48,7 @@ class Criterion:
     """
 
     def __init__(self, cell: Cell, episode: Episode, pitch: float) -> None:
-        self._cell, self._episode, self._pitch = cell, episode, pitch
+        self._cell, self._trial, self._pitch = cell, episode, pitch
         self._scene: Any = episode.scene
 
     def look(self, world: World, links: Floats, verdict: Verdict) -> str | None:
@@ -72,7 +72,7 @@ class Criterion:
         else:
             late = "felt" if self._cell.ground in LEVEL else late
             ended = self._felt(world.t, links, verdict)
-        return in_time(ended, world.t, self._episode.limit, late)
+        return in_time(ended, world.t, self._trial.limit, late)
 
     def _over(self, links: Floats) -> str | None:
         scene = self._scene
@@ -84,7 +84,7 @@ class Criterion:
         if self._cell.scene == FLAT:
             return None
         if self._cell.scene == "step_tunnel":
-            return self._episode.judge.look(world.head[:2])
+            return self._trial.judge.look(world.head[:2])
         if has_left(links):
             return "left"
         if has_fallen(links, self._scene.ground):
