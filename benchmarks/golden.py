@@ -4,7 +4,7 @@ Made before a change and after it, two such folders are compared with `same_numb
 one value may differ. There are runs of the experiments with one worker and with two, one that was
 killed and resumed, logs of simulated trials and what a replay decides upon them, environments under
 drawn actions, a learned policy, each tick of a drive in lock-step, and the bytes that a twin and
-its board sent in a minute. Ten minutes on two cores. Parts by name: `golden.py FOLDER springs
+its board sent in a minute. Ten minutes on two cores. Parts by name: `golden.py FOLDER antenna
 tunnel drive`.
 """
 
@@ -28,10 +28,7 @@ ROOT = Path(__file__).parents[1]
 ANTENNATE = (sys.executable, "-m", "antennate")
 TRIALS = "--trials 3 --seed 5 --time-limit 30"
 ALONE = {
-    "springs": "antenna springs",
-    "taper": "antenna taper",
-    "sensor": "antenna sensor",
-    "ringdown": "antenna ringdown --cone-hinges 6 14",
+    "antenna": "antenna",
     "gait": "gait --cycles 2 --settling-cycles 1 --sweep-points 4",
     "gait_hexapod": "gait --robot hexapod --cycles 2 --settling-cycles 1 --sweep-points 4",
     "calibrate": "calibrate",

@@ -217,7 +217,7 @@ def test_a_folder_given_in_two_ways_is_refused(words: str, capsys) -> None:
 
 @pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])
 def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
-    line = refusal(capsys, "antenna", "springs", flag)
+    line = refusal(capsys, "geometry", flag)
     assert f"expected a flag of this command, found {flag}; " in line
     told = line.partition(f"{flag}; ")[2].partition(" take it;")[0]
     having = set()
@@ -312,10 +312,7 @@ def test_bad_folders(capsys, tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        (
-            "antenna",
-            "springs",
-        ),
+        ("antenna",),
         ("tracks", "--no-figures"),
         ("study", "a.toml"),
         ("doctor",),
@@ -323,14 +320,14 @@ def test_bad_folders(capsys, tmp_path):
 )
 def test_a_path_that_is_too_long_is_one_line(capsys, tmp_path, words):
     """A name has at most 255 bytes (POSIX NAME_MAX of Linux)."""
-    (tmp_path / "a.toml").write_text('experiment = "springs"\n')
+    (tmp_path / "a.toml").write_text('experiment = "antenna"\n')
     assert refusal(capsys, *words, "--out", "a" * 300)
 
 
 @pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])
 def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(capsys, tmp_path, words):
     """The shell's `$'bad\\xff'` comes as a lone surrogate (PEP 383), which UTF-8 cannot write."""
-    line = refusal(capsys, "antenna", "springs", *words)
+    line = refusal(capsys, "antenna", *words)
     assert "--out: expected text in UTF-8, found " in line
     assert not list(tmp_path.iterdir())
 
@@ -461,7 +458,7 @@ def test_flags_override_the_file_and_the_run_says_so(capsys, tmp_path):
 
 
 def test_overwrite_leaves_nothing_old(capsys, tmp_path):
-    assert main(["antenna", "springs", "--out", "run"]) == 0
+    assert main(["antenna", "--out", "run"]) == 0
     assert list((tmp_path / "run" / "figures").iterdir())
     (tmp_path / "run" / "notes.txt").write_text("mine")
     assert main([*QUICK, "--seed", "1", "--out", "run", "--overwrite"]) == 0

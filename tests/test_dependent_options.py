@@ -85,6 +85,6 @@ def test_each_is_refused_alone(
 
 def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:
     with pytest.raises(ConfigError, match="overwrite: expected out beside it, found none"):
-        antennate.run("springs", overwrite=True)
+        antennate.run("antenna", overwrite=True)
     with pytest.raises(ConfigError, match="resume: expected out beside it, found none"):
-        antennate.run("springs", resume=True)
+        antennate.run("antenna", resume=True)

@@ -20,14 +20,14 @@ from PIL import Image
 
 from antennate import figures as style
 from antennate.control.registry import BUILT_IN, USUAL, looks
+from antennate.experiments.antenna import figure as antenna
+from antennate.experiments.antenna.config import AntennaConfig
+from antennate.experiments.antenna.experiment import run as run_antenna
 from antennate.experiments.compete import figure as compete
 from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.experiments.gait import figure as gait
 from antennate.experiments.gait.physics import Pace
 from antennate.experiments.gait.result import CostOfPhase, GaitResult, PhasePoint, WaveOff
-from antennate.experiments.taper import experiment as taper
-from antennate.experiments.taper.experiment import TaperConfig
-from antennate.experiments.taper.experiment import run as run_taper
 from antennate.experiments.tunnel import figure as tunnel
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.lockstep import SHOWN_TRIALS
@@ -150,7 +150,7 @@ def summary():
 
 
 def springs_of_the_taper():
-    return taper.figures(run_taper(TaperConfig()))["taper"]
+    return antenna.figures(run_antenna(AntennaConfig()))["taper"]
 
 
 def cable():

@@ -258,10 +258,10 @@ def test_words_that_do_not_fit_are_one_line(capsys: pytest.CaptureFixture[str]) 
     assert "--video-trial: expected --video beside it" in refusal(capsys, "--video-trial", "1")
     told = refusal(capsys, "--video", "--video-trial", "1")
     assert "expected a trial of this run, 0 to 0, found 1" in told
-    assert main(["antenna", "springs", "--video"]) == 2
+    assert main(["geometry", "--video"]) == 2
     assert "expected a flag of this command, found --video" in capsys.readouterr().err
     with pytest.raises(BadInputError, match="expected an experiment that can be filmed"):
-        antennate.run("springs", out="run", video=0)
+        antennate.run("geometry", out="run", video=0)
     with pytest.raises(BadInputError, match="expected a run directory"):
         antennate.run("tunnel", video=0)
 

@@ -90,24 +90,6 @@ def test_a_row_without_its_end_is_counted_with_any_line_end(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("content", "why"),
-    [
-        (b"segment;diameter_mm\n1;2,0\n", f"row 1: {COMMAS} semicolons"),
-        (b'diameter_mm\n"2,0"\n', "row 2: expected a point as decimal mark, found '2,0'"),
-        (b"2.0\n1.0\n", f"row 1: {NAMES}, such as diameter_mm, found numbers"),
-        (b"diameter_mm\r2.0\r0\r", "row 3: expected a diameter above 0"),
-    ],
-)
-def test_diameters_are_told_the_same(
-    content: bytes, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "theirs.csv"
-    file.write_bytes(content)
-    assert main(["antenna", "taper", "--diameters", str(file), "--out", str(tmp_path / "out")]) == 2
-    assert f"error: {file}: {why}" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
     ("table", "found"),
     [
         ("trial\n1\r2\n", "new-line character"),

@@ -214,12 +214,12 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("springs", ["--shard", "1/2"]),
-        ("springs", ["--engine", "slurm-local"]),
-        ("springs", ["--trial-timeout", "3"]),
-        ("springs", ["--trial-timeout", "3600"]),
-        ("springs", ["--workers", "3"]),
-        ("springs", ["--retry"]),
+        ("antenna", ["--shard", "1/2"]),
+        ("antenna", ["--engine", "slurm-local"]),
+        ("antenna", ["--trial-timeout", "3"]),
+        ("antenna", ["--trial-timeout", "3600"]),
+        ("antenna", ["--workers", "3"]),
+        ("antenna", ["--retry"]),
         ("design", ["--shard", "1/2"]),
     ],
 )
@@ -233,7 +233,7 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     )
     if name == "design":
         pytest.importorskip("optuna")
-    assert main(["antenna", "springs", "--out", str(run)]) == 0
+    assert main(["antenna", "--out", str(run)]) == 0
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     capsys.readouterr()
     file = [str(plan)] if name == "design" else []
@@ -252,7 +252,7 @@ def test_a_finished_run_that_cannot_grow_takes_no_more_trials_and_says_so(tmp_pa
         RunDirectory.create("touch", run, identity={"versions": {}, "trials": 2}, resume=True)
 
 
-IN_THIS_PROCESS = ["springs", "taper", "sensor", "ringdown", "servo", "tracks"]
+IN_THIS_PROCESS = ["antenna", "servo", "tracks"]
 OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-timeout"}
 
 
@@ -291,7 +291,7 @@ def test_a_shard_of_a_finished_study_leaves_it_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan, run = tmp_path / "plan.toml", tmp_path / "run"
-    plan.write_text('experiment = "springs"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 4.0]\n')
+    plan.write_text('experiment = "antenna"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 4.0]\n')
     assert main(["study", str(plan), "--out", str(run), "--workers", "1"]) == 0
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     capsys.readouterr()

@@ -22,8 +22,8 @@ import antennate
 from antennate import experiments
 from antennate.control.controllers import open_loop
 from antennate.errors import ControllerError
+from antennate.experiments.antenna.config import AntennaConfig
 from antennate.params.control import ControlParams
-from antennate.params.spring import SpringParams
 from antennate.types import AntennaFrame, JointCommand
 
 SHORT = {"trials": 2, "time_limit": 1.0}
@@ -65,8 +65,8 @@ def test_a_result_is_one_line_and_shows_sentence_table_and_figure(
 
 
 def test_a_result_without_trials_shows_itself_too() -> None:
-    result = antennate.run("springs")
-    assert repr(result) == f"<Result of springs: {result.sentence}>"
+    result = antennate.run("antenna")
+    assert repr(result) == f"<Result of antenna: {result.sentence}>"
     assert "<img" in result._repr_html_()
 
 
@@ -89,19 +89,17 @@ def test_a_run_directory_is_written_and_read(tmp_path: Path) -> None:
     assert tomllib.loads((place / "config.toml").read_text())["controllers"] == ["open"]
     assert (place / "figures" / "summary.png").stat().st_size > 1000
     with pytest.raises(antennate.AntennateError, match="expected a folder without a run"):
-        antennate.run("springs", out=place)
-    antennate.run("springs", out=place, overwrite=True)
+        antennate.run("antenna", out=place)
+    antennate.run("antenna", out=place, overwrite=True)
     assert not (place / "trials.csv").exists()
 
 
 def test_a_configuration_serves_as_well_as_its_name() -> None:
-    config = SpringParams(coil_mm=4.0)
-    by_config, by_name = antennate.run(config), antennate.run("springs", coil_mm=4.0)
+    config = AntennaConfig(coil_mm=4.0)
+    by_config, by_name = antennate.run(config), antennate.run("antenna", coil_mm=4.0)
     assert by_config.summary == by_name.summary
-    assert by_config.summary["spring_index"] == 8.0
-    lost = (
-        r"expected trials, found none: springs .* pandas.DataFrame\(result.summary\['springs'\]\)"
-    )
+    assert by_config.summary["springs"]["spring_index"] == 8.0
+    lost = "expected trials, found none: antenna .* take result.summary"
     with pytest.raises(antennate.BadInputError, match=lost):
         by_config.to_dataframe()
 
@@ -120,9 +118,8 @@ def test_a_result_of_every_experiment_can_be_pickled(name: str, tunnel: antennat
     assert (again.experiment, again.config, again.path) == (known, known.config(), Path("kept"))
 
 
-@pytest.mark.parametrize("name", ["springs", "sensor", "taper"])
-def test_what_came_out_survives_pickling(name: str) -> None:
-    result = antennate.run(name)
+def test_what_came_out_survives_pickling() -> None:
+    result = antennate.run("antenna")
     again = pickle.loads(pickle.dumps(result))
     assert (again.summary, again.sentence) == (result.summary, result.sentence)
 
@@ -174,10 +171,10 @@ def test_an_own_class_of_a_module_runs_in_workers() -> None:
             "control.gait.frequency",
         ),
         ({"experiment": "tunnel", "controllers": ("opne",)}, "opne"),
-        ({"experiment": SpringParams(), "wire_mm": 0.4}, "settings only beside a name"),
+        ({"experiment": AntennaConfig(), "wire_mm": 0.4}, "settings only beside a name"),
         ({"experiment": antennate.run}, "expected a name or the configuration"),
-        ({"experiment": "springs", "engine": "dask"}, "that runs trials on workers, found springs"),
-        ({"experiment": "springs", "out": "a\0b"}, "out: expected a path, found"),
+        ({"experiment": "antenna", "engine": "dask"}, "that runs trials on workers, found antenna"),
+        ({"experiment": "antenna", "out": "a\0b"}, "out: expected a path, found"),
         *(
             ({"experiment": "wall", "workers": workers}, "workers: expected a whole number")
             for workers in (0, -1, 1.5, None, True)

@@ -23,7 +23,7 @@ from antennate.messages import extra
 from antennate.studies.tables import Table
 
 ROOT = Path(__file__).parents[1]
-RUN = [sys.executable, "-m", "antennate", "antenna", "springs", "--out", "run"]
+RUN = [sys.executable, "-m", "antennate", "antenna", "--out", "run"]
 NO_FIGURES = ["--no-figures"]  # they take most of the time
 SHELL = ["bash", "-c"]
 
@@ -31,7 +31,7 @@ SHELL = ["bash", "-c"]
 def run(
     redirection: str, folder: Path, more: Sequence[str] = NO_FIGURES
 ) -> subprocess.CompletedProcess[str]:
-    """`antennate antenna springs` with its streams redirected by a shell."""
+    """`antennate antenna` with its streams redirected by a shell."""
     words = [*SHELL, f'"$@" {redirection}', "bash", *RUN, *more]
     return subprocess.run(
         words, cwd=folder, capture_output=True, text=True, timeout=120, check=False
@@ -41,7 +41,7 @@ def run(
 def is_whole(folder: Path) -> bool:
     """Whether the run left its result and its page."""
     found = folder / "run"
-    assert json.loads((found / "result.json").read_text())["command"] == "springs"
+    assert json.loads((found / "result.json").read_text())["command"] == "antenna"
     return "</html>" in (found / "report.html").read_text()
 
 
@@ -57,7 +57,7 @@ def test_an_output_that_cannot_be_written_costs_no_result(
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         "written to run",
-        f"antennate antenna springs: error: standard output: expected to write, found: {reason}",
+        f"antennate antenna: error: standard output: expected to write, found: {reason}",
     ]
     assert is_whole(tmp_path)
 
@@ -142,7 +142,7 @@ def test_a_width_that_is_none_counts_as_not_given(
     tmp_path: Path,
 ) -> None:
     def printed() -> str:
-        words = ["antenna", "springs", "--no-figures", "--out", str(tmp_path), "--overwrite"]
+        words = ["antenna", "--no-figures", "--out", str(tmp_path), "--overwrite"]
         assert main(words) == 0
         return capsys.readouterr().out
 

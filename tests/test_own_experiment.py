@@ -184,7 +184,7 @@ def test_a_damaged_directory_is_one_line(tmp_path: Path, name: str, text: str, a
     (tmp_path / "config.toml").touch()
     (tmp_path / name).write_text(text)
     run = RunDirectory.open(tmp_path)
-    wants = (experiments.load("springs").config,) if ask == "config" else ()
+    wants = (experiments.load("antenna").config,) if ask == "config" else ()
     with pytest.raises(BadInputError, match=name) as error:
         getattr(run, ask)(*wants)
     assert "\n" not in str(error.value)

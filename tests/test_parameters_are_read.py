@@ -249,7 +249,10 @@ TINY: dict[str, list[dict[str, Any]]] = {
             ("xc430_w240", {}, "rolling"),
         )
     ],
-    "sensor": [{"hold_time": 1.0}, {"sensor": OTHER_SENSOR}],
+    "antenna": [
+        {},
+        {"hold_time": 1.0, "diameters_mm": [2.0, 1.0], "antenna": {"sensor": OTHER_SENSOR}},
+    ],
     "servo": [
         {"recording": ["servo.json"], "fit": True},
         {"recording": ["silent.json"], "servo": "xc430_w240", "supply": 11.1},
@@ -271,12 +274,9 @@ TINY: dict[str, list[dict[str, Any]]] = {
             )
         ),
     ],
-    "springs": [{}],
-    "taper": [{}],
-    "ringdown": [{}],
     "reproduce": [{"quick": True}],
 }
-PARTS = {"springs": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
+PARTS = {"antenna": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
 
 
@@ -324,7 +324,7 @@ def test_all_experiments_of_ours_are_walked() -> None:
 
 
 def test_the_walk_sees_what_is_not_read() -> None:
-    config = experiments.load("springs").config()
+    config = experiments.load("antenna").config()
     with recorded(config) as read:
         assert config.wire_mm > 0
         config.model_copy(update={"coil_mm": 3.0}).coil_mm  # noqa: B018

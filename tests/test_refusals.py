@@ -37,7 +37,7 @@ bench sweep --solver mujoco :: it is gone: leave it out
 calibrate --solver=mujoco :: it is gone: leave it out
 tunnel --bogus :: expected a known flag, found '--bogus'
 gait --tunnel.free-width 1 :: expected a known flag
-antenna springs --video :: expected a flag of this command, found --video
+antenna --video :: expected a flag of this command, found --video
 gait --video :: expected a flag of this command, found --video
 """
 VALUES = """
@@ -208,18 +208,20 @@ bench touch --antenna.sensor.kind fsr :: conditioning.polarity must be 1 for a f
 bench force --antenna.sensor.kind fsr :: conditioning.polarity must be 1 for a fsr sensor :: found -1 :: antennate calibrate --antenna.sensor.kind fsr
 """
 ANTENNA = """
-antenna springs --coil-mm 1 :: coil_mm: expected 4 to 12 wire diameters
-antenna springs --coil-mm 10 :: coil_mm: expected
-antenna springs --index-limits 12 4 :: index_limits: expected the smaller first
-antenna springs --coil-limits 9 9 :: coil_limits: expected the smaller first
-antenna taper --diameters none.csv :: none.csv: expected a readable file
-antenna taper --coil-limits 9 3 :: the smaller first
-antenna ringdown --beside missing.toml :: missing.toml: expected a readable file
-antenna ringdown --antenna.base-angle 0.5 :: --antenna.base-angle: expected a parameter that antenna ringdown reads
-antenna ringdown --antenna.sensor.hysteresis 0.1 :: --antenna.sensor.hysteresis: expected
-antenna ringdown --deflection -1 :: --deflection: expected a number above 0
-antenna ringdown --cone-hinges 1 :: --cone-hinges: expected
-antenna ringdown --config missing.toml :: missing.toml: expected a readable file
+antenna --coil-mm 1 :: coil_mm: expected 4 to 12 wire diameters
+antenna --coil-mm 10 :: coil_mm: expected
+antenna --index-limits 12 4 :: index_limits: expected the smaller first
+antenna --coil-limits 9 9 :: coil_limits: expected the smaller first
+antenna none.toml :: none.toml: expected a readable file
+antenna --ladder-limits 9 3 :: ladder_limits: expected the smaller first
+antenna --beside missing.toml :: missing.toml: expected a readable file
+antenna --antenna.base-angle 0.5 :: --antenna.base-angle: expected a parameter that antenna reads
+antenna --diameters-mm 1 :: --diameters-mm: expected
+antenna springs :: antenna springs is `
+antenna sensor --out run :: antenna sensor is `
+ringdown :: ringdown is `
+antenna --deflection -1 :: --deflection: expected a number above 0
+antenna --config missing.toml :: missing.toml: expected a readable file
 servo :: --recording: expected one file or more
 servo --recording none.json :: none.json: expected a readable file
 servo --servos.xc430-w240.armature 0.1 :: expected the default, as the servo is xl330

@@ -129,7 +129,7 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
     assert files() == before
 
 
-SPRINGS = ["antenna", "springs", "--no-figures"]
+SPRINGS = ["antenna", "--no-figures"]
 
 
 def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(tmp_path: Path) -> None:
@@ -216,7 +216,7 @@ KILLED = """
 import json, os, shutil, signal, sys
 from pathlib import Path
 from antennate.cli import main
-WORDS = ["antenna", "springs", "--no-figures", "--out", "run", "--overwrite"]
+WORDS = ["antenna", "--no-figures", "--out", "run", "--overwrite"]
 def killed(left):
     def watch(name, arguments):
         nonlocal left
@@ -230,7 +230,7 @@ def killed(left):
                     os.kill(os.getpid(), signal.SIGKILL)
     sys.addaudithook(watch)
     sys.exit(main(WORDS))
-main([*WORDS[:3], "--out", "imported"])  # all that the others import
+main([*WORDS[:2], "--out", "imported"])  # all that the others import
 codes = []
 while not codes or codes[-1] == -signal.SIGKILL:  # until one meets its end
     kill = len(codes) + 1
@@ -276,7 +276,7 @@ def test_a_file_system_without_room_costs_no_old_run() -> None:
 import resource, sys
 from antennate.cli import main
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-sys.exit(main(["antenna", "springs", "--out", "run", "--overwrite"]))
+sys.exit(main(["antenna", "--out", "run", "--overwrite"]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
@@ -290,7 +290,7 @@ def test_a_parent_that_cannot_be_written_is_refused(capsys: pytest.CaptureFixtur
     shutil.copytree("run", "run.old")
     before = files(".")
     Path().chmod(0o555)
-    code = main(["antenna", "springs", "--out", "run", "--overwrite"])
+    code = main(["antenna", "--out", "run", "--overwrite"])
     Path().chmod(0o755)
     assert code == 2
     assert capsys.readouterr().err.endswith("run, found: Permission denied\n")
@@ -304,7 +304,7 @@ def test_a_folder_without_a_name_of_its_own_is_not_renamed(
     Path("run/sub").mkdir()
     monkeypatch.chdir("run/sub" if place == ".." else "run")
     before = files(".")
-    assert main(["antenna", "springs", "--out", place, "--overwrite"]) == 2
+    assert main(["antenna", "--out", place, "--overwrite"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"expected to write {place}, found: Device or resource busy" in line
     assert files(".") == before
@@ -347,14 +347,14 @@ def test_overwrite_takes_a_run_of_ours_alone(
         shutil.copy(f"run/{name}", f"forged/{name}")
     for place in ("theirs", "link", "forged"):
         before = files(place)
-        for words in (["antenna", "springs"], WALL, ["log", "replay", "no.mcap"], ["robot"]):
+        for words in (["antenna"], WALL, ["log", "replay", "no.mcap"], ["robot"]):
             assert main([*words, "--out", place, "--overwrite"]) == 2
             (line,) = capsys.readouterr().err.splitlines()
             if words[0] != "log":
                 assert f"{place}: expected a run of this program to overwrite" in line
             assert files(place) == before
         with pytest.raises(OutputError, match="expected a run of this program to overwrite"):
-            antennate.run("springs", out=place, overwrite=True)
+            antennate.run("antenna", out=place, overwrite=True)
         assert files(place) == before
     words = ["drive", "--esp32", "/dev/no-board", "--bus", "/dev/no-bus"]
     assert main([*words, "--out", "theirs", "--overwrite"]) == 2
@@ -367,7 +367,7 @@ def test_of_a_link_to_a_run_the_link_is_renamed() -> None:
     assert main([*SPRINGS, "--out", "link", "--overwrite"]) == 0
     assert Path("link.old").is_symlink()
     assert contents("run") == contents("link.old") == before
-    assert RunDirectory.open("link").result()["command"] == "springs"
+    assert RunDirectory.open("link").result()["command"] == "antenna"
 
 
 THEIRS = ["notes.txt", "frames.csv", "figures/mine.png", "logs/of-the-robot.mcap", "sub/run.txt"]

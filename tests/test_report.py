@@ -77,14 +77,14 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "springs", "--coil-mm", "4", "--out", "run"]) == 0
+    assert main(["antenna", "--coil-mm", "4", "--out", "run"]) == 0
     sentence = capsys.readouterr().out.splitlines()[0]
     page = Page(Path("run/report.html"))
     assert page.alone
     assert sentence in page.text
-    assert "antennate antenna springs --coil-mm 4 --out run" in page.text
+    assert "antennate antenna --coil-mm 4 --out run" in page.text
     assert antennate.__version__ in page.text
-    assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 1
+    assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 4
     assert "prefers-color-scheme: dark" in page.source
     assert "@media print" in page.source
     assert "></pre>" not in page.source, "an empty box"
@@ -129,7 +129,7 @@ def test_every_figure_has_a_sentence() -> None:
 
 
 def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "sensor", "--out", "run"]) == 0
+    assert main(["antenna", "--out", "run"]) == 0
     first = Path("run/report.html").read_bytes()
     Path("run/report.html").unlink()
     assert main(["report", "run"]) == 0
@@ -141,7 +141,7 @@ def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "springs", "--out", "run"]) == 0
+    assert main(["antenna", "--out", "run"]) == 0
     before = Path("run/result.json").read_bytes()
     for words in (["run"], ["--compare", "run", "run"]):
         said = refusal(capsys, *words, "--out", "run/result.json", "--overwrite")
@@ -150,7 +150,7 @@ def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixt
 
 
 def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "springs", "--out", "run"]) == 0
+    assert main(["antenna", "--out", "run"]) == 0
     os.mkfifo("pipe")
     Path("null").symlink_to("/dev/null")
     for name in ("pipe", "null"):
@@ -164,7 +164,7 @@ def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]
 
 
 def test_a_link_is_written_through() -> None:
-    assert main(["antenna", "springs", "--out", "run"]) == 0
+    assert main(["antenna", "--out", "run"]) == 0
     Path("page.html").write_text("old")
     Path("link.html").symlink_to("page.html")
     assert main(["report", "run", "--out", "link.html", "--overwrite"]) == 0
@@ -173,10 +173,10 @@ def test_a_link_is_written_through() -> None:
 
 
 def test_python_and_commands_of_the_robot_leave_one() -> None:
-    antennate.run("taper", out="taper")
-    page = Page(Path("taper/report.html"))
+    antennate.run("antenna", out="antenna")
+    page = Page(Path("antenna/report.html"))
     assert page.alone
-    assert "antennate.run('taper', ...)" in page.text
+    assert "antennate.run('antenna', ...)" in page.text
     assert main(["robot", "--out", "robot", "--json"]) == 0
     page = Page(Path("robot/report.html"))
     assert page.alone
@@ -213,34 +213,34 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
 
 def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
     for coil in ("3.6", "4"):
-        assert main(["antenna", "springs", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
+        assert main(["antenna", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
     assert main(["report", "--compare", "coil-3.6", "coil-4"]) == 0
     page = Page(Path("comparison.html"))
     assert page.alone
     assert "coil_mm3.64.0" in page.text.replace("\n", "")
-    assert page.tags.count("img") == 2
+    assert page.tags.count("img") == 8
     stiffness = [
-        json.loads(Path(f"coil-{coil}/result.json").read_text())["springs"][0]
+        json.loads(Path(f"coil-{coil}/result.json").read_text())["springs"]["springs"][0]
         for coil in ("3.6", "4")
     ]
     for row in stiffness:
         assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
     assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
-    main(["antenna", "taper", "--no-figures", "--out", "other"])
+    main(["geometry", "--robot.links", "3", "--no-figures", "--out", "other"])
     told = refusal(capsys, "--compare", "coil-4", "other")
-    assert "expected two runs of one command, found springs in coil-4 and taper in other" in told
+    assert "expected two runs of one command, found antenna in coil-4 and geometry in other" in told
 
 
 def test_points_of_two_studies_stand_together_by_what_varies() -> None:
     """Of two grids that share one value, which is the second of one and the first of the other."""
-    column = "springs.0.stiffness_n_mm_per_deg"
+    column = "springs.springs.0.stiffness_n_mm_per_deg"
     values = {"coarse": (3.5, 4.0), "fine": (4.0, 4.5)}
     for name, coils in values.items():
-        settings = {"experiment": "springs", "response": column, "vary": {"coil_mm": list(coils)}}
+        settings = {"experiment": "antenna", "response": column, "vary": {"coil_mm": list(coils)}}
         antennate.run("study", out=name, **settings)
     assert main(["report", "--compare", "coarse", "fine"]) == 0
     rows = Rows(Path("comparison.html")).found
-    assert ["", "run", "coil [mm]", "stiffness (springs.0) [N·mm/deg]"] in rows
+    assert ["", "run", "coil [mm]", "stiffness (springs.springs.0) [N·mm/deg]"] in rows
     lines = [row for row in rows if len(row) == 4 and row[1:2] in (["coarse"], ["fine"])]
     assert [line[:3] for line in lines] == [
         ["3.5", "coarse", "3.5"],

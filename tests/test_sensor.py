@@ -13,13 +13,15 @@ from antennate import simulate
 from antennate.antenna import sensor
 from antennate.cli import main
 from antennate.errors import ConfigError
+from antennate.experiments.antenna.config import AntennaConfig
+from antennate.experiments.antenna.experiment import run, tables
+from antennate.experiments.antenna.physics import sensor_of
 from antennate.experiments.bench import flex_of
-from antennate.experiments.sensor.experiment import SensorConfig, run, tables
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.params.base import read_file
 from antennate.params.control import ControlParams, CurveParams
-from antennate.robots.antenna import SensorParams
+from antennate.robots.antenna import AntennaSpec, SensorParams
 
 FLAT, GAIN = 10e3, 1.2 / math.pi
 
@@ -139,7 +141,8 @@ def test_each_antenna_needs_a_curve_of_its_own_kind() -> None:
 def test_the_bench_tells_what_the_datasheet_says() -> None:
     """Flat 10 kOhm on 10 kOhm at 3.3 V: half of it. E24 nearest to the geometric mean of ends."""
     plain = SensorParams(hysteresis=0, creep=(0, 0))
-    result = run(SensorConfig(sensor=plain, largest_flex=math.pi)).result()
+    config = AntennaConfig(antenna=AntennaSpec(sensor=plain), largest_flex=math.pi)
+    result = sensor_of(config)[0]
     first, last = result.curve[0], result.curve[-1]
     assert (first.flex_deg, last.flex_deg) == pytest.approx((0.0, 180.0))
     assert (first.resistance_ohm, last.resistance_ohm) == pytest.approx((10e3, 22e3))
@@ -151,7 +154,7 @@ def test_the_bench_tells_what_the_datasheet_says() -> None:
     assert result.creep_counts == 0
     assert result.noise_sd_counts == pytest.approx(2.5, rel=0.1)
     assert result.best_divider_ohm == pytest.approx(math.sqrt(10e3 * 22e3), rel=0.1)
-    (table,) = tables(result)
+    table = next(t for t in tables(run(config).result()) if "Sensor" in t.title)
     assert table.columns == ["R [kOhm]", "V", "counts"]
     assert table.rows[0][0] == "0 deg"
     assert table.rows[0][1][:2] == ["10.00", "1.650"]
@@ -163,10 +166,11 @@ def test_a_bend_that_creeps_and_a_wide_loop_are_told() -> None:
     By hand: of 90 deg a tenth creeps, from 3.3 V / 2.54 to 3.3 V / 2.6, 37 counts.
     """
     params = SensorParams(hysteresis=0.1, creep=(0, 0))
-    result = run(SensorConfig(sensor=params)).result()
+    result, _ = sensor_of(AntennaConfig(antenna=AntennaSpec(sensor=params)))
     assert result.loop_width_share == pytest.approx(0.1, rel=0.2)
     creeping = SensorParams(hysteresis=0, creep=(0.05, 0.05))
-    assert run(SensorConfig(sensor=creeping)).result().creep_counts == pytest.approx(37, rel=0.1)
+    result, _ = sensor_of(AntennaConfig(antenna=AntennaSpec(sensor=creeping)))
+    assert result.creep_counts == pytest.approx(37, rel=0.1)
 
 
 def test_without_memory_the_chain_is_the_static_curve() -> None:

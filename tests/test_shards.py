@@ -15,7 +15,7 @@ from antennate.cli import main
 
 pytestmark = pytest.mark.ci
 
-PLAN = 'experiment = "springs"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 3.5, 4.0, 4.5]\n'
+PLAN = 'experiment = "antenna"\nplan = "grid"\n[vary]\ncoil_mm = [3.0, 3.5, 4.0, 4.5]\n'
 TRIALS = "trials.jsonl"
 
 

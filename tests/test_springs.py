@@ -10,9 +10,12 @@ import pytest
 
 from antennate.antenna import springs
 from antennate.errors import ConfigError
-from antennate.experiments.springs.experiment import SpringsResult, run, tables
+from antennate.experiments.antenna.config import AntennaConfig
+from antennate.experiments.antenna.experiment import run, tables
+from antennate.experiments.antenna.physics import springs_of
+from antennate.experiments.antenna.result import AntennaResult
 from antennate.params.spring import SpringParams
-from antennate.robots.antenna import N_MM_PER_DEG
+from antennate.robots.antenna import N_MM_PER_DEG, AntennaSpec
 from antennate.studies.columns import content, typed
 from antennate.studies.formats import to_json
 
@@ -21,7 +24,7 @@ E = 193e9
 
 @pytest.mark.parametrize(("coils", "printed"), [(3, 0.274), (6, 0.137), (9, 0.091)])
 def test_the_papers_table_within_its_rounding(coils: int, printed: float) -> None:
-    found = run(SpringParams()).result().springs
+    found = springs_of(AntennaConfig()).springs
     spring = next(spring for spring in found if spring.active_coils == coils)
     assert spring.stiffness_n_mm_per_deg == pytest.approx(printed, abs=6e-4)
     assert spring.stiffness_n_m_per_rad == pytest.approx(printed * 0.0573, rel=5e-3)
@@ -77,7 +80,7 @@ def test_a_straight_wire_yields_at_its_surface() -> None:
 
 
 def test_wound_sets_keep_all_limits_and_their_own_law() -> None:
-    found = run(SpringParams()).result().windings
+    found = springs_of(AntennaConfig()).windings
     assert found
     for wound in found:
         assert 4 - 1e-9 <= wound.spring_index <= 12 + 1e-9
@@ -91,19 +94,20 @@ def test_wound_sets_keep_all_limits_and_their_own_law() -> None:
 
 
 def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
-    wound = run(SpringParams()).result().windings[0]
+    wound = springs_of(AntennaConfig()).windings[0]
     assert wound.coil_mm - wound.mandrel_mm == pytest.approx(wound.wire_mm)
 
 
 def test_the_tables_of_a_result_that_was_read_are_those_of_the_run() -> None:
     """Also of a count that the paper lacks, and of wire that no stock comes near."""
-    for config in (SpringParams(active_coils=(3, 5)), SpringParams(wanted_n_mm_per_deg=(90.0,))):
+    two = AntennaConfig(antenna=AntennaSpec(active_coils=(3, 5, 5)))
+    for config in (two, AntennaConfig(wanted_n_mm_per_deg=(90.0,))):
         result = run(config).result()
-        assert typed(SpringsResult, json.loads(to_json(content(result)))) == result
-        asked, wound = (dict(table.rows) for table in tables(result))
-        assert len(asked["stiffness [N·mm/deg]"]) == len(config.active_coils)
-        assert bool(wound) == bool(result.windings)
-    asked, wound = tables(run(SpringParams(active_coils=(3, 5))).result())
+        assert typed(AntennaResult, json.loads(to_json(content(result)))) == result
+        asked, wound, *_ = (dict(table.rows) for table in tables(result))
+        assert len(asked["stiffness [N·mm/deg]"]) == len({*config.antenna.active_coils})
+        assert bool(wound) == bool(result.springs.windings)
+    asked, wound, *_ = tables(run(two).result())
     assert dict(asked.rows)["  the paper prints"] == ["0.274", "-"]
     assert dict(wound.rows)["active coils"][0] == "4 8 12"
 

@@ -65,10 +65,10 @@ def test_a_function_is_studied_from_python() -> None:
     assert [row["value"] for row in result.rows[:3]] == pytest.approx([0.2, 0.4, 0.6])
     assert result.summary["statuses"] == {"ok": 6}
     assert list(result.to_dataframe().columns[:2]) == ["point", "x"]
-    springs = antennate.study("springs", {"coil_mm": [3.5, 4.0]})
+    springs = antennate.study("antenna", {"coil_mm": [3.5, 4.0]})
     assert len(springs.rows) == 2
     with pytest.raises(antennate.BadInputError, match="did you mean"):
-        antennate.study("springs", {"coil_m": [1.0]})
+        antennate.study("antenna", {"coil_m": [1.0]})
     with pytest.raises(
         antennate.BadInputError, match=r"assumed: .* whose parameters have no sources"
     ):
@@ -97,7 +97,7 @@ def test_a_function_that_workers_cannot_import_costs_no_other_study(
     monkeypatch.setitem(sys.modules, "made_here", module)
     here = antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=1)
     assert [row["value"] for row in here.rows] == [1.0, 2.0]
-    springs = antennate.study("springs", {"coil_mm": [3.5, 4.0]}, workers=2)
+    springs = antennate.study("antenna", {"coil_mm": [3.5, 4.0]}, workers=2)
     assert springs.summary["statuses"] == {"ok": 2}
     with pytest.raises(WorkerError, match=r"^own: expected what workers can import.* one worker$"):
         antennate.study(module.own, {"x": [1.0, 2.0]}, trials=1, workers=2, out="there")
@@ -272,7 +272,7 @@ def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Pat
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("distributed")
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     assert main(["study", "plan.toml", "--engine", "dask://127.0.0.1:9", "--out", "run"]) == 2
     said = capsys.readouterr().err.strip().splitlines()
     assert said[-1].startswith("antennate study: error: dask: expected a scheduler at")
@@ -282,7 +282,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture
 
 def test_a_name_that_submitit_does_not_know_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("submitit")
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     words = ["--engine", "slurm-local", "--slurm", "timeout=5", "--out", "run"]
     assert main(["study", "plan.toml", *words]) == 2
     said = capsys.readouterr().err.strip().splitlines()[-1]
@@ -368,7 +368,7 @@ def test_limits_that_no_job_can_meet_are_refused_before_the_first(
     asked: str, found: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("submitit")
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     words = ["--engine", "slurm-local", "--slurm", asked, "--out", "run"]
     assert main(["study", "plan.toml", *words]) == 2
     said = capsys.readouterr().err.strip().splitlines()
@@ -380,7 +380,7 @@ def test_limits_that_no_job_can_meet_are_refused_before_the_first(
 def test_a_folder_in_which_jobs_alone_left_something_can_be_overwritten() -> None:
     Path("run/slurm").mkdir(parents=True)
     Path("run/slurm/1_0_log.err").write_text("")
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     assert main(["study", "plan.toml", "--out", "run", "--overwrite"]) == 0
     assert Path("run.old/slurm/1_0_log.err").exists()
 
@@ -498,7 +498,7 @@ def test_another_program_at_the_port_of_a_scheduler_is_one_line(
     """One that answers, and one that says nothing."""
     pytest.importorskip("distributed")
     monkeypatch.setattr("antennate.studies.dask.CONNECT", 0.5)
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"127.0.0.1:{server.getsockname()[1]}"
 
@@ -525,7 +525,7 @@ def test_dask_says_what_it_waits_for_and_what_became_of_its_scheduler(
 ) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("antennate.studies.dask.CONNECT", 5.0)
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     with scheduler(0) as (address, (process,)):
 
         def kill() -> None:
@@ -547,7 +547,7 @@ def test_dask_says_what_it_waits_for_and_what_became_of_its_scheduler(
 
 def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
     """Its commands in the order of its rules; `snakemake --cores 2` runs the same ones."""
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     text = (ROOT / "examples" / "snakemake" / "Snakefile").read_text()
     shard, merge = re.findall(r'shell:\s*f?"(.*)"', text)
     outputs = dict(re.findall(r'rule (\w+):(?:\n    .*?)*?\n    output: "(.*)"', text))
@@ -565,7 +565,7 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
 def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
     if shutil.which("snakemake") is None:
         pytest.skip("snakemake is not installed; `uv run --with snakemake pytest` brings it")
-    Path("plan.toml").write_text('experiment = "springs"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     words = ["snakemake", "--cores", "2", "--config", "study=plan.toml", "--snakefile"]
     words.append(str(ROOT / "examples" / "snakemake" / "Snakefile"))

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from antennate.antenna import springs
-from antennate.errors import BadInputError
-from antennate.experiments.taper.experiment import TaperConfig, TaperResult, run, tables
+from antennate.experiments.antenna.config import AntennaConfig
+from antennate.experiments.antenna.physics import taper_of
 from antennate.params.spring import TaperParams
-from antennate.studies.columns import content, typed
-from antennate.studies.formats import to_json
+from antennate.robots.antenna import AntennaSpec
 
 LINEAR = (
     *(1, 0.759, 0.564, 0.410, 0.289, 0.198, 0.130, 0.0809, 0.0474, 0.0256, 0.0123, 0.00506),
@@ -32,7 +28,7 @@ def test_proxies_of_fourteen_segments(law: str, expected: tuple[float, ...]) -> 
 
 
 def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
-    result = run(TaperConfig()).result()
+    result = taper_of(AntennaConfig())
     assert result.base_over_tip == pytest.approx(3164, abs=1)
     assert result.ladder.base_over_tip == pytest.approx(3)
 
@@ -63,42 +59,19 @@ def test_a_steeper_taper_ends_at_the_limits() -> None:
 
 
 def test_the_suggested_ladder_is_nearer_than_the_papers() -> None:
-    result = run(TaperConfig()).result()
+    result = taper_of(AntennaConfig())
     assert result.suggested.distance_decades < result.ladder.distance_decades
 
 
-def test_a_long_antenna_is_tabled_in_steps_and_its_result_can_be_read() -> None:
-    result = run(TaperConfig(segments=41)).result()
-    assert typed(TaperResult, json.loads(to_json(content(result)))) == result
-    animal, ladders = tables(result)
-    assert [name for name, _ in animal.rows] == [f"segment {n}" for n in range(1, 42, 3)]
-    assert (animal.columns, animal.rows[0][1][2]) == (["d [mm]", "I [mm⁴]", "proxy"], "1")
-    assert len(ladders.rows) == 6
+def test_measured_diameters_replace_the_law() -> None:
+    """(1/2)^4 and (1/4)^4."""
+    taper = taper_of(AntennaConfig(diameters_mm=(2.0, 1.0, 0.5)))
+    assert taper.proxy == [1, 1 / 16, 1 / 256]
+    assert taper.diameters_mm == [2.0, 1.0, 0.5]
 
 
-def test_measured_diameters_replace_the_law(tmp_path: Path) -> None:
-    file = tmp_path / "antenna.csv"
-    file.write_text("segment,diameter_mm\n1,2.0\n2,1.0\n3,0.5\n")
-    result = run(TaperConfig(diameters=str(file), ladder=(3, 6, 9))).result()
-    assert [segment.proxy for segment in result.segments] == [1, 1 / 16, 1 / 256]
-    assert [segment.diameter_mm for segment in result.segments] == [2.0, 1.0, 0.5]
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("", "row 1: expected a header with diameter_mm"),
-        ("diameter_m\n1\n", "row 1: expected a column diameter_mm, found diameter_m"),
-        ("diameter_mm\n1.5\n", "at least 2 rows"),
-        ("diameter_mm\n1.5\nwide\n", "row 3: expected a diameter above 0.*'wide'"),
-        ("diameter_mm\n1.5\n-1\n", "row 3"),
-        ("diameter_mm\n1.5\nnan\n", "row 3"),
-        ("diameter_mm\n1500\n1\n", "row 2.*up to 100 mm"),
-        ("a,diameter_mm\n1,1.5\n2\n", "row 3"),
-    ],
-)
-def test_bad_files_name_the_row(tmp_path: Path, text: str, word: str) -> None:
-    file = tmp_path / "antenna.csv"
-    file.write_text(text)
-    with pytest.raises(BadInputError, match=word):
-        run(TaperConfig(diameters=str(file)))
+def test_the_springs_are_those_of_the_antenna() -> None:
+    taper = taper_of(AntennaConfig(antenna=AntennaSpec(active_coils=(2.0, 8.0))))
+    assert taper.ladder.name == "2-8"
+    assert taper.ladder.base_over_tip == 4.0
+    assert len(taper.stretches) == 2

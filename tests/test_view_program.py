@@ -367,7 +367,7 @@ def test_a_port_of_foxglove_that_is_taken_is_told_in_one_line(tmp_path: Path) ->
         (["tunnel", "--view", "--view-port", "65536"], "--view-port"),
         (["tunnel", "--view", "--view-speed", "-1"], "--view-speed"),
         (["tunnel", "--foxglove-port", "1"], "--foxglove-port"),
-        (["antenna", "sensor", "--view"], "--view"),
+        (["antenna", "--view"], "--view"),
     ],
 )
 def test_what_would_be_ignored_is_refused(words: list[str], flag: str, tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ def test_a_study_of_another_experiment_has_no_batches(
     tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     study = tmp_path / "springs.toml"
-    study.write_text('experiment = "springs"\n[vary]\nwire_mm = [0.4, 0.5]\n')
+    study.write_text('experiment = "antenna"\n[vary]\nwire_mm = [0.4, 0.5]\n')
     assert "study of it; springs has none" in refused(
         "study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")
     )

@@ -36,13 +36,19 @@ def ended_by(status: int) -> str:
 
 COMMAND_GROUPS = {
     "bench": ("wall", "touch", "sweep", "force"),
-    "antenna": ("springs", "taper", "sensor", "ringdown"),
     "study": ("design", "merge"),
     "setup": ("zero", "jog"),
     "drive": ("teleop",),
     "log": ("replay", "view"),
 }
 """Commands that are typed behind the name of their group."""
+_OF_ANTENNA = ("springs", "taper", "sensor", "ringdown")
+FORMER = {
+    f"{group}{part}": "`{antenna}` now, which does springs, taper, sensor and ring-down at once"
+    for group in ("", "antenna ")
+    for part in _OF_ANTENNA
+}
+"""Former commands, by what was typed, and what does their work now."""
 _GROUP_OF = {name: group for group, names in COMMAND_GROUPS.items() for name in names}
 
 
@@ -72,6 +78,14 @@ def typed(command: str, *words: str) -> str:
     return shlex.join([*program, *command_words(command).split(), *words])
 
 
+def former(words: Sequence[str]) -> str:
+    """What is said of a command that another one does now; empty of any other words."""
+    for name in (" ".join(words[:2]), " ".join(words[:1])):
+        if name in FORMER:
+            return f"{name} is {FORMER[name].format(antenna=typed('antenna'))}"
+    return ""
+
+
 def extra(name: str) -> str:
     """How to get an extra of this package; it follows words such as `install it with`."""
     return (
@@ -85,7 +99,10 @@ def shown(value: Any) -> str:
     return shortened(repr(value))
 
 
-_RENAMED = {"arms": ("controllers", "profiles")}
+_RENAMED = {
+    "arms": ("controllers", "profiles"),
+    **dict.fromkeys(_OF_ANTENNA, ("antenna",)),
+}
 """New names of what had another one in version 1."""
 _GONE = ("solver",)
 """Parameters that are no more; all is done as with their defaults."""

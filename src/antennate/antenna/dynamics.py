@@ -1,4 +1,4 @@
-"""How an antenna swings: a chain of springs, small angles, and the tapered rod it stands for.
+"""How an antenna swings: a chain of springs, at small angles.
 
 Around the straight chain M q" + C q' + K q = 0, where q are the angles of the base and of each
 hinge. Its eigenvalues tell how fast each mode swings and how soon it stops. Links are capsules of
@@ -17,10 +17,6 @@ from antennate.robots.antenna import AntennaSpec
 from antennate.types import Floats
 
 Complex = NDArray[np.complex128]
-
-CONE_MODE = 8.7193
-"""First root of a clamped cone: w = CONE_MODE / L^2 sqrt(E r^2 / 4 rho), r at its base (Conway,
-Becker and Dubil 1964)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,25 +139,6 @@ def fitted_mode(mode: Mode, t: Floats, angles: Floats, speeds: Floats) -> Mode:
     grown = np.log(abs(size)) + 1j * np.unwrap(np.angle(size))
     decay, swing = (np.polyfit(t, part, 1, w=weight)[0] for part in (grown.real, grown.imag))
     return Mode(complex(decay, swing), mode.left, mode.share)
-
-
-def cone_ratio(hinges: int) -> float:
-    """First frequency of a cone cut into a chain, over that of the cone itself.
-
-    Every link is a uniform rod with the mass of its piece of the cone. Every hinge gives as the
-    piece does from the middle of the link before it to the middle of its own link.
-    """
-    from scipy.linalg import eigh  # takes long; only where it is needed
-
-    joints = np.arange(hinges) / hinges  # in units of the length, the base's radius, E and density
-    link = 1.0 / hinges
-    mass = math.pi * ((1 - joints) ** 3 - (1 - joints - link).clip(0) ** 3) / 3
-    links = np.full(hinges, link)
-    matrix = _rods(joints, joints, links, mass, mass * link**2 / 12)
-    before, after = (joints - link / 2).clip(0), joints + link / 2
-    give = ((1 - after) ** -3 - (1 - before) ** -3) / 3 / (math.pi / 4)
-    lowest = eigh(np.diag(1 / give), matrix, eigvals_only=True)[0]
-    return float(math.sqrt(lowest) / (CONE_MODE / 2))
 
 
 def _rods(joints: Floats, starts: Floats, lengths: Floats, mass: Floats, inertia: Floats) -> Floats:

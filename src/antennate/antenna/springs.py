@@ -306,7 +306,9 @@ def _wind(
 
 
 def diameters(params: TaperParams) -> Floats:
-    """Diameters base to tip [m], shape (segments,)."""
+    """Diameters base to tip [m], as measured or by the law, shape (segments,)."""
+    if params.diameters_mm is not None:
+        return 1e-3 * np.array(params.diameters_mm)
     ends, count = (1e-3 * params.base_mm, 1e-3 * params.tip_mm), params.segments
     return np.geomspace(*ends, count) if params.law == "geometric" else np.linspace(*ends, count)
 

@@ -54,7 +54,6 @@ _FUNCTIONS = {
 _OWN = {**ROBOT_COMMANDS, **LOG_COMMANDS, **_OTHERS}
 _GROUPS = {
     "bench": "An antenna before walls and posts",
-    "antenna": "What an antenna is made of",
 }
 """Groups that are no command of their own."""
 _FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
@@ -176,7 +175,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         return BAD_INPUT
     from antennate.cli.arguments import HelpRequest
     from antennate.cli.terminal import write_result
-    from antennate.errors import AntennateError, BadInputError, reason
+    from antennate.errors import AntennateError, reason
     from antennate.messages import one_line, shortened
 
     try:
@@ -186,10 +185,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
             pages = (described(name) for name in commands())
             sys.stdout.write(script(words[1:], commands(), pages))
             return OK
-        if name in ("", *_GROUPS):
-            raise BadInputError(_unknown(name, words[0]))
-        if words and (hint := _misspelt(name, words[0])):
-            raise BadInputError(f"{hint}, found {shortened(words[0])}")
+        _refuse_names(name, words)
         return carry_out(name, words)
     except HelpRequest as page:
         write_result(str(page))
@@ -201,6 +197,19 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         where = f"{shortened(str(error.filename))}: " if error.filename is not None else ""
         sys.stderr.write(f"{title}: error: {one_line(where + reason(error))}\n")
         return BAD_INPUT
+
+
+def _refuse_names(name: str, words: Sequence[str]) -> None:
+    """Refuse words that name no command, or one that another does now."""
+    from antennate.errors import BadInputError
+    from antennate.messages import former, shortened
+
+    if gone := former([*name.split(), *words]):
+        raise BadInputError(gone)
+    if name in ("", *_GROUPS):
+        raise BadInputError(_unknown(name, words[0]))
+    if words and (hint := _misspelt(name, words[0])):
+        raise BadInputError(f"{hint}, found {shortened(words[0])}")
 
 
 def _unknown(group: str, word: str) -> str:

@@ -29,6 +29,7 @@ from antennate.experiments import FITTED, fitted
 from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import command_words, shortened, typed
 from antennate.params.base import Params
+from antennate.robots.spec import ROBOTS
 from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
 from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
@@ -105,6 +106,20 @@ class StudyOptions(Options):
     config: Path | None = option(None, "TOML file of the study or search", "FILE", positional=True)
 
 
+@dataclass(frozen=True)
+class AntennaOptions(Options):
+    """The same where a file may hold an antenna alone."""
+
+    config: Path | None = option(
+        None,
+        "robot, by its name or TOML file, or a TOML file of an antenna or of parameters, or the "
+        f"word {FITTED}: numbers that the paper does not give; flags override it",
+        "FILE",
+        positional=True,
+        examples=[*ROBOTS, FITTED],
+    )
+
+
 OF_WORKERS = ("workers", "engine", "slurm", "shard", "resume", "retry", "trial_timeout")
 """Options that only trials on workers have."""
 
@@ -153,13 +168,15 @@ def parsed(experiment: Experiment[Any, Any], argv: Sequence[str]) -> tuple[Param
     Raises:
         ConfigError: As `parse`, or a file is named as if it were that of fitted numbers.
     """
-    usual = FittedOptions if experiment.name in fitted() else Options
+    kind = FittedOptions if experiment.name in fitted() else Options
+    kind = AntennaOptions if experiment.of_file else kind
     return parse(
         experiment.name,
         experiment.description,
         experiment.config,
         argv,
-        StudyOptions if experiment.continued else usual,
+        StudyOptions if experiment.continued else kind,
+        read=experiment.of_file,
         without=_without(experiment),
         file_of=lambda options: _file_of(experiment, options.config),
     )

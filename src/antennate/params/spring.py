@@ -54,6 +54,7 @@ STOCK_WIRES_MM = (
 """Wire diameters that makers stock [mm]: the usual metric series."""
 
 _Positive = Annotated[float, Field(gt=0)]
+_Diameter = Annotated[float, Field(gt=0, le=100)]
 _Coils = Annotated[int, Field(ge=1, le=1000)]
 
 
@@ -70,10 +71,6 @@ class SpringParams(Params):
     """Wire diameter."""
     coil_mm: float = number(3.77, "mm", "assumed: follows from the paper's table", gt=0.05, le=200)
     """Mean coil diameter."""
-    active_coils: tuple[_Positive, ...] = number(
-        (3.0, 6.0, 9.0), "1", "paper: table of springs", min_length=1, max_length=50
-    )
-    """Active coils of each spring."""
     wanted_n_mm_per_deg: tuple[_Positive, ...] = number(
         (0.274, 0.137, 0.091), "N·mm/deg", "paper: table of springs", min_length=1, max_length=50
     )
@@ -95,7 +92,7 @@ class SpringParams(Params):
 
 
 class TaperParams(Params):
-    """A tapering antenna as a row of segments, and the ladder of springs that follows it."""
+    """A tapering antenna as a row of segments, and the springs that follow it."""
 
     segments: int = number(14, "1", "paper: segments of the model of the animal", ge=2, le=1000)
     """Number of segments."""
@@ -105,11 +102,11 @@ class TaperParams(Params):
     """Diameter at the tip."""
     law: Literal["linear", "geometric"] = number("linear", "1", "assumed: unpublished")
     """How diameters fall from base to tip."""
-    ladder: tuple[_Positive, ...] = number(
-        (3.0, 6.0, 6.0, 9.0, 9.0, 9.0), "1", "paper: its springs", min_length=2, max_length=50
+    diameters_mm: tuple[_Diameter, ...] | None = number(
+        None, "mm", "assumed: no measurement", min_length=2, max_length=1000
     )
-    """Active coils of the ladder, base to tip."""
-    coil_limits: tuple[_Coils, _Coils] = number(
+    """Measured diameters, base first; they replace segments, ends and law."""
+    ladder_limits: tuple[_Coils, _Coils] = number(
         (3, 30), "1", "assumed: fewest of the paper's springs, most that a link holds"
     )
     """Fewest and most coils of a suggested ladder."""

@@ -148,6 +148,8 @@ class Experiment(Generic[Config, Out]):
             first trial; empty for nothing.
         tasks: tasks(config) -> an identity for each task of `run`. Tasks that stay the same with
             more trials have the same, so a finished run can take more. None: that of `trials`.
+        of_file: of_file(path) -> the configuration of a FILE that is given without a flag; None
+            where only --config takes one.
         undivided: undivided(config) -> why several machines cannot each run a share of its trials,
             a shard; empty if they can. None where they never can, as trials follow from others.
     """
@@ -179,6 +181,7 @@ class Experiment(Generic[Config, Out]):
     undivided: Callable[[Config], str] | None = lambda config: ""
     foretold: Callable[[Config, Workers], str] = lambda config, workers: ""
     tasks: Callable[[Config], Sequence[Any]] | None = None
+    of_file: Callable[[Path], Config] | None = None
 
     @property
     def view(self) -> View:

@@ -22,11 +22,10 @@ from antennate.experiments.reproduce.verdict import (
 from antennate.studies.columns import shown
 
 if TYPE_CHECKING:
+    from antennate.experiments.antenna.result import AntennaResult
     from antennate.experiments.calibrate.result import CalibrateResult
     from antennate.experiments.force.result import ForceResult
-    from antennate.experiments.springs.experiment import SpringsResult
     from antennate.experiments.sweep.result import SweepResult
-    from antennate.experiments.taper.experiment import TaperResult
     from antennate.experiments.touch.result import TouchResult
     from antennate.experiments.wall.experiment import WallResult
 
@@ -50,7 +49,7 @@ _OTHERS = "an antenna of other springs at the same angle, judged as a claim of i
 
 
 @claim(
-    "springs",
+    "antenna",
     "N·mm/deg",
     paper="0.274, 0.137, 0.091 N·mm/deg",
     criterion="All three agree within half of the last digit",
@@ -58,9 +57,9 @@ _OTHERS = "an antenna of other springs at the same angle, judged as a claim of i
     best="fitted",
     ceiling="the coil diameter was worked out from this table, for one of several wires",
 )
-def springs(result: SpringsResult) -> Finding:
+def springs(result: AntennaResult) -> Finding:
     """Springs of 3, 6 and 9 coils have these stiffnesses."""
-    springs = result.springs
+    springs = result.springs.springs
     ours = [each.stiffness_n_mm_per_deg for each in springs]
     paper = [printed for each in springs if (printed := each.paper_n_mm_per_deg)]
     bars = [
@@ -78,7 +77,7 @@ def springs(result: SpringsResult) -> Finding:
 
 
 @claim(
-    "taper",
+    "antenna",
     "stiffness of the base over the tip",
     paper="fourth power of a diameter from 1.5 to 0.2 mm",
     criterion="The ladder is at most half as far from the animal's taper as equal springs are "
@@ -86,11 +85,12 @@ def springs(result: SpringsResult) -> Finding:
     rival="springs that are all equal",
     best="reproduced",
 )
-def taper(result: TaperResult) -> Finding:
+def taper(result: AntennaResult) -> Finding:
     """The ladder of springs follows the animal's taper, stiff at the base and soft at the tip."""
-    animal, ladder = result.base_over_tip, result.ladder.base_over_tip
-    course = np.array(result.stretches)
-    ours, equal = result.ladder.distance_decades, distance_decades(course * 0 + 1, course)
+    taper = result.taper
+    animal, ladder = taper.base_over_tip, taper.ladder.base_over_tip
+    course = np.array(taper.stretches)
+    ours, equal = taper.ladder.distance_decades, distance_decades(course * 0 + 1, course)
     return Finding(
         f"animal {animal:.0f} : 1, ladder {ladder:g} : 1; {ours:.2f} decades from the taper, equal "
         f"springs {equal:.2f}",

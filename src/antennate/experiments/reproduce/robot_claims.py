@@ -311,7 +311,7 @@ def centred(result: TunnelResult) -> Finding:
     f"million cycles (Gerber), in {ENOUGH_TO_STAY} trials or more",
     rival="none: strengths of the wire from Shigley, tables 10-4 and 10-10",
     ceiling="wire and coil are ours",
-    beside=("springs",),
+    beside=("antenna",),
 )
 def unbroken(result: TunnelResult, wire: SpringParams) -> Finding:
     """No antenna fails."""
