@@ -13,7 +13,7 @@ import pytest
 
 import antennate
 from antennate.cli import main
-from antennate.experiments.design.experiment import EXPERIMENT
+from antennate.experiments.study.experiment import EXPERIMENT
 
 HERE = Path(__file__).parent
 TRIAL = f"{HERE / 'design_trials.py'}:trial"
@@ -22,26 +22,23 @@ BOTH = 'minimize = ["near", "far"]'
 
 def plan(
     goals: str = BOTH,
-    search: str = "x = { low = -2.0, high = 3.0 }",
+    vary: str = "x = { low = -2.0, high = 3.0 }",
     reference: str = "[reference]\npaper = { x = 2.0 }\n",
-    name: str = "plan.toml",
     settings: dict[str, Any] | None = None,
     **more: Any,
-) -> str:
+) -> None:
     """A small search over a function, as a file."""
-    given_ = {"proposals": 12, "batch": 4, "validated": 2, **more}
-    lines = [f"{key} = {json.dumps(value)}" for key, value in given_.items()]
+    told = {"experiment": TRIAL, "plan": "optuna", "points": 12, "batch": 4, "trials": 3}
+    lines = [
+        f"{key} = {json.dumps(value)}" for key, value in (told | {"validated": 2} | more).items()
+    ]
     inner = [f"{key} = {json.dumps(value)}" for key, value in (settings or {}).items()]
-    Path(name).write_text(
-        "\n".join(lines) + f"\n[search]\n{search}\n{reference}\n"
-        f'[evaluate.bowls]\nexperiment = "{TRIAL}"\ntrials = 3\n{goals}\n'
-        "[evaluate.bowls.settings]\n" + "\n".join(inner) + "\n"
-    )
-    return name
+    text = [*lines, goals, "[vary]", vary, reference, "[settings]", *inner]
+    Path("plan.toml").write_text("\n".join(text) + "\n")
 
 
 def words(*more: str, out: str = "run") -> list[str]:
-    return ["study", "design", "plan.toml", "--trust-code", "--no-figures", "--out", out, *more]
+    return ["study", "plan.toml", "--trust-code", "--no-figures", "--out", out, *more]
 
 
 def design(out: str = "run", workers: int = 1, figures: bool = False) -> antennate.Result:
@@ -49,13 +46,13 @@ def design(out: str = "run", workers: int = 1, figures: bool = False) -> antenna
     with pytest.MonkeyPatch.context() as patch:
         if not figures:
             without = dataclasses.replace(EXPERIMENT, figures=lambda outcome: {})
-            patch.setattr("antennate.experiments.design.experiment.EXPERIMENT", without)
+            patch.setattr("antennate.experiments.study.experiment.EXPERIMENT", without)
         values = tomllib.loads(Path("plan.toml").read_text())
-        return antennate.run("design", out=out, workers=workers, **values)
+        return antennate.run("study", out=out, workers=workers, **values)
 
 
 def result(run: str = "run") -> dict[str, Any]:
-    return json.loads(Path(run, "result.json").read_text())
+    return json.loads(Path(run, "result.json").read_text())["search"]
 
 
 def table(run: str = "run") -> list[dict[str, str]]:

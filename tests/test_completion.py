@@ -79,7 +79,7 @@ def test_bash_offers(script: Path, words: list[str], expected: list[str]) -> Non
 @pytest.mark.smoke
 def test_every_flag_of_a_command_is_offered(script: Path) -> None:
     flags = offered(script, "antenna", "--")
-    assert {"--config", "--out", "--wire", "--wanted-n-mm-per-deg", "--help-all"} <= set(flags)
+    assert {"--seed", "--out", "--wire", "--wanted-n-mm-per-deg", "--help-all"} <= set(flags)
     assert len(flags) == len(set(flags))
 
 

@@ -114,7 +114,7 @@ WHERE = [
     ("tunnel --config tunnel.toml", "tunnel.toml: control.gait.turn_offset: "),
     ("study settings.toml", "settings: tunnel: control.gait.turn_offset: "),
     ("study vary.toml", "vary: tunnel: control.gait.turn_offset: "),
-    ("study design design.toml", "evaluate.tunnel.settings: tunnel: control.gait.turn_offset: "),
+    ("study design.toml", "settings: tunnel: control.gait.turn_offset: "),
 ]
 
 
@@ -134,8 +134,8 @@ def test_what_is_read_in_its_place_is_named_as_it_is_written_there(
     for name, text in {
         "tunnel": closed + turn,
         "settings": f"{study}[settings]\n{closed}{turn}[vary]\n{varied}",
-        "design": f"[search]\n{varied}[evaluate.tunnel]\nminimize = ['time_s']\n"
-        f"[evaluate.tunnel.settings]\n{closed}{turn}",
+        "design": f"{study}plan = 'optuna'\nminimize = ['time_s']\n[vary]\n{varied}"
+        f"[settings]\n{closed}{turn}",
         "vary": f'{study}[settings]\n{closed}[vary]\n"control.gait.turn_offset" = [0.2]\n',
     }.items():
         (tmp_path / f"{name}.toml").write_text(text)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import antennate
 from antennate import experiments
 from antennate.cli import main
-from antennate.experiments.design.designs import front, spread
+from antennate.experiments.study.designs import front, spread
 
 pytestmark = pytest.mark.usefixtures("there")
 
@@ -42,21 +42,12 @@ def test_validated_designs_lie_along_the_front() -> None:
     assert spread(list(range(10)), 1) == [5]
 
 
-def test_every_goal_is_an_objective() -> None:
-    config = experiments.load("design").config(
-        evaluate={"a": {"maximize": ["p", "q"], "minimize": ["r"]}, "b": {"minimize": ["p"]}}
-    )
-    names = [(o.name, o.goal) for o in config.objectives()]
-    large, small = ["a.p", "a.q"], ["a.r", "b.p"]
-    assert names == [(n, "maximize") for n in large] + [(n, "minimize") for n in small]
-
-
 def test_a_known_optimum_is_found() -> None:
     """40 designs drawn at random have one so near in 18 of 100 searches."""
     plan(
         'minimize = ["bowl"]',
         "x = { low = -2.0, high = 3.0 }\nn = { low = 1, high = 8, whole = true }",
-        proposals=40,
+        points=40,
         validated=0,
     )
     design()
@@ -69,14 +60,11 @@ def test_a_known_optimum_is_found() -> None:
 @pytest.mark.ci
 def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]) -> None:
     """x^2 and (x - 1)^2 trade off from 0 to 1: there nothing dominates, elsewhere 0 or 1 does."""
-    plan(proposals=24, settings={"noise": 0.01})
+    plan(points=24, settings={"noise": 0.01})
     import optuna
 
     quiet = optuna.logging.get_verbosity()
-    assert (
-        main(["study", "design", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"])
-        == 0
-    )
+    assert main(["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"]) == 0
     out, err = capsys.readouterr()
     assert "optuna" not in (out + err).lower()
     said = [line for line in err.splitlines() if not re.match(r"So far|[ ─]|trials +[0-9]|$", line)]
@@ -97,10 +85,10 @@ def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]
     again = [each for each in designs if each["fresh"]]
     assert [each["name"] for each in again if each["reference"]] == ["paper"]
     assert len(again) == 3
-    one = again[-1]["fresh"]["bowls.near"]
+    one = again[-1]["fresh"]["near"]
     assert one["trials"] == 12
     assert one["value95"][0] < again[-1]["values"]["x"] ** 2 + 0.01
-    assert one["value"] != again[-1]["objectives"]["bowls.near"]["value"]
+    assert one["value"] != again[-1]["objectives"]["near"]["value"]
     rows = table()
     assert len(rows) == 3 * 25 + 12 * 3
     seeds = [{r["trial"] for r in rows if r["phase"] == p} for p in ("search", "validation")]
@@ -127,7 +115,7 @@ def test_a_list_of_each_length_rises_and_stays_in_its_range() -> None:
 
 
 def test_a_design_that_comes_again_is_not_run_again() -> None:
-    plan(search="x = [0.0, 0.5, 1.0]", proposals=9, batch=2, validated=0)
+    plan(vary="x = [0.0, 0.5, 1.0]", points=9, batch=2, validated=0)
     design()
     found = result()
     assert (found["proposed"], found["repeated"]) == (9, 6)
@@ -135,54 +123,25 @@ def test_a_design_that_comes_again_is_not_run_again() -> None:
     assert len(table()) == 3 * 4
 
 
-def test_several_experiments_evaluate_one_design() -> None:
-    """A name is the whole path of a parameter, or its end; who has none is run without."""
+def test_an_experiment_without_trials_is_searched_as_a_whole() -> None:
+    """The index of a spring is its coil over its wire, of 0.5 mm; it has no chance in it."""
     found = antennate.run(
-        "design",
-        proposals=3,
-        batch=3,
+        "study",
+        experiment="antenna",
+        plan="optuna",
+        points=2,
         validated=1,
-        validation_factor=2,
-        search={
-            "antenna.active_coils": {"low": 3, "high": 9, "whole": True, "entries": (2, 3)},
-            "rule.threshold": {"low": 0.3, "high": 0.7},
-        },
-        reference={"paper": {"antenna.active_coils": (3, 6, 6, 9, 9, 9)}},
-        evaluate={
-            "tunnel": {
-                "trials": 1,
-                "settings": {"controllers": ["paper"], "time_limit": 0.2},
-                "minimize": ["time_s"],
-                "maximize": ["success_share"],
-            },
-            "wall": {
-                "trials": 1,
-                "settings": {
-                    "profiles": ["descending"],
-                    "wall": {"travel": 0.03, "start": 0.002, "speed": 0.2},
-                },
-                "minimize": ["force_mean_n"],
-            },
-            "bench": {
-                "experiment": "calibrate",
-                "trials": 2,
-                "settings": {"rig": {"pushes": 2, "speeds": [0.3]}},
-                "maximize": ["calibration.r2"],
-            },
-        },
+        vary={"coil_mm": (4.0, 5.0)},
+        minimize=("springs.spring_index",),
+        settings={"hold_time": 0.2, "loop_time": 0.2},
     )
-    first = found.summary["designs"][0]
-    assert first["objectives"]["tunnel.time_s"]["value"] == pytest.approx(0.2)
-    assert first["objectives"]["tunnel.success_share"]["value"] == 0.0
-    assert first["objectives"]["wall.force_mean_n"]["value"] > 0.0
-    assert 0.5 < first["objectives"]["bench.calibration.r2"]["value"] <= 1.0
-    assert first["objectives"]["bench.calibration.r2"]["trials"] == 2
-    assert first["fresh"]["bench.calibration.r2"]["trials"] == 4
-    assert first["fresh"]["tunnel.time_s"]["trials"] == 2
-    seeds = [(row["phase"], row["seed"]) for row in found.rows if row["evaluation"] == "bench"]
-    assert len({seed for _, seed in seeds}) == 2 + 4
-    forces = {d["objectives"]["wall.force_mean_n"]["value"] for d in found.summary["designs"]}
-    assert len(forces) == 4
+    designs = found.summary["search"]["designs"]
+    for each in designs:
+        (value,) = each["objectives"].values()
+        assert value["value"] == pytest.approx(each["values"]["coil_mm"] / 0.5)
+    (again,) = [each for each in designs if each["fresh"]]
+    assert again["fresh"]["springs.spring_index"]["trials"] == 1
+    assert {row["seed"] for row in found.rows if row["phase"] == "validation"} == {1_000_000}
 
 
 @pytest.mark.parametrize("goals", ['minimize = ["near"]', 'minimize = ["near", "far", "bowl"]'])
@@ -194,10 +153,10 @@ def test_one_objective_and_three_are_drawn(goals: str) -> None:
 
 
 def test_the_shipped_searches_can_be_run() -> None:
-    config = experiments.load("design").config
+    config = experiments.load("study").config
     from antennate.params.base import read_file
 
     paths = sorted((HERE.parent / "studies").glob("design_*.toml"))
     assert len(paths) > 1
     for path in paths:
-        experiments.load("design").check(read_file(path, config))
+        experiments.load("study").check(read_file(path, config))

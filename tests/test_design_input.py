@@ -12,35 +12,28 @@ pytestmark = pytest.mark.usefixtures("there")
 
 
 BAD = """
- :: evaluate: expected experiments that evaluate a design, found none
-WALL :: search: expected parameters, found none: the space is empty
-[search]; wall.overlap = []; WALL :: the space is empty
-[search]; antenna.frction = { low = 0.1, high = 0.5 }; WALL :: did you mean antenna.friction?
-[search]; seed = [1, 2]; WALL :: expected a parameter of a design, found seed
-[search]; antenna.friction = { low = 0.1, high = 5.0 }; WALL :: search.antenna.friction: wall: antenna.friction: expected a number of at most 2, found 5.0
-[search]; antenna.friction = { low = 0.5, high = 0.1 }; WALL :: search.antenna.friction.range: expected low < high, found low 0.5 and high 0.1
-[search]; antenna.friction = { low = 0.1, high = 0.5, rising = true }; WALL :: search.antenna.friction.range: expected entries beside rising
-[search]; GOOD; [reference]; paper = { 'antenna.friction' = 3.0 }; WALL :: reference.paper: wall: antenna.friction
-[search]; GOOD; [evaluate.wall]; SETTINGS; minimize = ["force_men_n"] :: did you mean force_mean_n?
-[search]; GOOD; [evaluate.wall]; SETTINGS; minimize = ["profile"] :: found profile
-[search]; GOOD; WALL; maximize = ["force_mean_n"] :: evaluate.wall.force_mean_n: expected an objective once, found it twice
-[search]; GOOD; [evaluate.wall] :: evaluate.wall: expected measures to maximize or minimize, found none
-[search]; GOOD; [evaluate.wall]; minimize = ["force_mean_n"] :: expected one profile, found stiff, descending
-[search]; GOOD; [evaluate.wal]; SETTINGS; minimize = ["force_mean_n"] :: expected an experiment (did you mean
-[search]; GOOD; [evaluate.'own.py:f']; minimize = ['a'] :: expected a label of letters
-[search]; GOOD; [evaluate.own]; experiment = 'own.py:f'; minimize = ['a'] :: add --trust-code
-WALL; [search]; wall.gravity = ['down', 'sideways'] :: found 'sideways'
-[search]; "coil_mm" = [3.0, 4.0]; [evaluate.springs]; trials = 2; minimize = ["spring_index"] :: evaluate.springs.trials: expected none, as springs has no seed, found 2
-[search]; GOOD; wall.gravity = ['down']; gravity = ['down']; WALL :: search.gravity: expected each parameter of wall once, found wall.gravity as search.wall.gravity too
-[search]; GOOD; WALL; settings.antenna.friction = 0.4 :: evaluate.wall.settings.antenna.friction: expected none, as search.antenna.friction
-[search]; GOOD; WALL; settings.trials = 4; trials = 3 :: evaluate.wall.settings.trials: expected none beside evaluate.wall.trials
+GOOD :: maximize: expected measures here or in minimize, found none
+FORCE :: vary: expected values, found none: the optuna is empty
+FORCE; [vary]; wall.overlap = [] :: the optuna is empty
+FORCE; [vary]; antenna.frction = { low = 0.1, high = 0.5 } :: vary.antenna.frction: wall: antenna.frction: expected a known key of antenna (did you mean friction?)
+FORCE; [vary]; antenna.friction = { low = 0.1, high = 5.0 } :: vary.antenna.friction: wall: antenna.friction: expected a number of at most 2, found 5.0
+FORCE; [vary]; antenna.friction = { low = 0.5, high = 0.1 } :: vary.antenna.friction.range: expected low < high, found low 0.5 and high 0.1
+FORCE; [vary]; antenna.friction = { low = 0.1, high = 0.5, rising = true } :: vary.antenna.friction.range: expected entries beside rising
+FORCE; GOOD; [reference]; paper = { 'antenna.friction' = 3.0 } :: reference.paper: wall: antenna.friction
+minimize = ["force_men_n"]; GOOD :: did you mean force_mean_n?
+minimize = ["profile"]; GOOD :: found profile
+FORCE; maximize = ["force_mean_n"]; GOOD :: force_mean_n: expected an objective once, found it twice
+settings.antenna.friction = 0.4; FORCE; GOOD :: settings.antenna.friction: expected a parameter that does not vary
+FORCE; response = "force_mean_n"; GOOD :: response: expected plan other than optuna beside it, found optuna
+seeds = 1; FORCE; GOOD :: seeds
+FORCE; [vary]; wall.gravity = ['down', 'sideways'] :: found 'sideways'
 """
 """Lines of a file, and what is said of it."""
 SHORT = {
-    "GOOD": "antenna.friction = { low = 0.1, high = 0.5 }",
-    "WALL": '[evaluate.wall]\nSETTINGS\nminimize = ["force_mean_n"]',
-    "SETTINGS": 'settings.profiles = ["descending"]',
+    "GOOD": "[vary]\nantenna.friction = { low = 0.1, high = 0.5 }",
+    "FORCE": 'minimize = ["force_mean_n"]',
 }
+HEAD = 'experiment = "wall"\nplan = "optuna"\nsettings.profiles = ["descending"]\n'
 
 
 @pytest.mark.parametrize(
@@ -55,6 +48,33 @@ def test_bad_searches_are_one_line(
         quoted = quoted.replace(name, lines)
     for key in ("antenna.friction", "antenna.frction", "wall.overlap", "wall.gravity"):
         quoted = quoted.replace(f"\n{key} =", f'\n"{key}" =')
-    Path("bad.toml").write_text(quoted)
-    assert expected in refusal(capsys, "study", "design", "bad.toml")
+    Path("bad.toml").write_text(HEAD + quoted)
+    assert expected in refusal(capsys, "study", "bad.toml")
     assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            'plan = "optuna"\nminimize = ["force_mean_n"]',
+            "settings: expected one profile, found stiff",
+        ),
+        ('plan = "sobol"\nminimize = ["force_mean_n"]', "minimize: expected plan optuna beside it"),
+    ],
+)
+def test_what_does_not_suit_the_plan_is_one_line(
+    text: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    vary = '[vary]\n"antenna.friction" = { low = 0.1, high = 0.5 }\n'
+    Path("bad.toml").write_text(f'experiment = "wall"\n{text}\n{vary}')
+    assert expected in refusal(capsys, "study", "bad.toml")
+
+
+def test_lists_of_a_range_are_for_searches(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("bad.toml").write_text(
+        'experiment = "wall"\nplan = "sobol"\n'
+        '[vary]\n"antenna.active_coils" = { low = 2, high = 9, entries = [2, 3] }\n'
+    )
+    said = refusal(capsys, "study", "bad.toml")
+    assert "vary.antenna.active_coils: expected plan optuna beside entries, found sobol" in said

@@ -109,8 +109,8 @@ def test_trials_that_say_nothing_are_rows(
     said = design().sentence
     rows = [row for row in table() if row["phase"] == "search"]
     by_design = {
-        number: [row["status"] for row in rows if row["design"] == number]
-        for number in {row["design"] for row in rows}
+        number: [row["status"] for row in rows if row["point"] == number]
+        for number in {row["point"] for row in rows}
     }
     assert {each.count(status) for each in by_design.values()} <= {0, lost}
     assert sum(map(len, by_design.values())) == 3 * 13
@@ -124,7 +124,7 @@ def test_trials_that_say_nothing_are_rows(
 def test_too_few_trials_that_are_ok_fail_a_design() -> None:
     plan(settings={"mode": "nan"}, least_ok=0.7)
     found = design()
-    assert {each["state"] for each in found.summary["designs"]} == {"failed"}
+    assert {each["state"] for each in found.summary["search"]["designs"]} == {"failed"}
     assert found.sentence.endswith("Designs that could not be judged: 13.")
 
 
@@ -151,6 +151,6 @@ def test_bad_words_and_late_findings_are_one_line(
     plan('minimize = ["word"]')
     assert "expected a measure of" in refusal(capsys, *words("--workers", "1", out="later"))
     plan()
-    assert "known flag, found '--shard'" in refusal(capsys, *words("--shard", "1/2"))
+    assert "--shard: expected another plan" in refusal(capsys, *words("--shard", "1/2"))
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert "uv run --extra design antennate" in refusal(capsys, *words())

@@ -220,26 +220,16 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
         ("antenna", ["--trial-timeout", "3600"]),
         ("antenna", ["--workers", "3"]),
         ("antenna", ["--retry"]),
-        ("design", ["--shard", "1/2"]),
     ],
 )
 def test_a_refused_command_leaves_a_finished_run_as_it_is(
     name: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run, plan = tmp_path / "run", tmp_path / "plan.toml"
-    plan.write_text(
-        '[search]\n"antenna.length" = { low = 0.1, high = 0.2 }\n'
-        '[evaluate.wall]\nmaximize = ["success_share"]\nsettings = { profiles = ["stiff"] }\n'
-    )
-    if name == "design":
-        pytest.importorskip("optuna")
+    run = tmp_path / "run"
     assert main(["antenna", "--out", str(run)]) == 0
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     capsys.readouterr()
-    file = [str(plan)] if name == "design" else []
-    assert (
-        main([*command_words(name).split(), *file, "--out", str(run), "--overwrite", *words]) == 2
-    )
+    assert main([*command_words(name).split(), "--out", str(run), "--overwrite", *words]) == 2
     assert f"expected a known flag, found '{words[0]}'" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
@@ -260,14 +250,12 @@ OF_WORKERS = {"workers", "engine", "slurm", "shard", "resume", "retry", "trial-t
     ("name", "missing"),
     [
         *((name, OF_WORKERS) for name in IN_THIS_PROCESS),
-        ("design", {"shard"}),
         ("tunnel", set[str]()),
     ],
 )
 def test_help_lists_no_option_that_is_always_refused(
     name: str, missing: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A search does not know its trials beforehand, so no shards can divide them."""
     assert main([*command_words(name).split(), "--help-all"]) == 0
     listed = set(re.findall(r"^  --([a-z-]+)", capsys.readouterr().out, re.MULTILINE))
     assert OF_WORKERS - listed == missing

@@ -33,7 +33,6 @@ COMMANDS = [
     "reproduce --help",
     "compete --help",
     "geometry --help",
-    "study design --help",
     "study merge --help",
 ]
 DATA = {f"antennate.dxl{name}" for name in ("", ".model", ".model_file", ".models")}

@@ -51,24 +51,19 @@ TINY: dict[str, list[dict[str, Any]]] = {
             ("grid", [0.2], None),
             ("morris", {"low": 0.2, "high": 0.4}, 0.1),
         )
-    ],
-    "design": [
+    ]
+    + [
         {
-            "proposals": 2,
+            "trials": 1,
+            "plan": "optuna",
+            "points": 2,
             "validated": 1,
             "validation_factor": 1,
-            "search": {"wall.speed": [0.2, 0.4]},
+            "minimize": ["force_mean_n"],
+            "settings": {"profiles": ["descending"], "wall": {"travel": 0.03, "start": 0.002}},
+            "experiment": "wall",
+            "vary": {"wall.speed": [0.2, 0.4]},
             "reference": {"first": {"wall.speed": 0.2}},
-            "evaluate": {
-                "wall": {
-                    "trials": 1,
-                    "settings": {
-                        "profiles": ["descending"],
-                        "wall": {"travel": 0.03, "start": 0.002},
-                    },
-                    "minimize": ["force_mean_n"],
-                }
-            },
         }
     ],
     "tunnel": [
@@ -290,7 +285,7 @@ MARKS = {
 def test_every_parameter_of_an_experiment_is_read_or_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if name == "design":
+    if name == "study":
         pytest.importorskip("optuna", reason="the extra `design` is not installed")
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)

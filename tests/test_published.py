@@ -248,13 +248,13 @@ def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path,
     slow = FOLDER / "published_tunnel_slow.toml"
     run = part("tune", "tunnel", slow, "--controller", controller, "--trials", "1")
     assert run.returncode == 0, run.stderr
-    asked = tomllib.loads(run.stdout)["evaluate"]["tunnel"]["settings"]
+    asked = tomllib.loads(run.stdout)["settings"]
     assert asked["controllers"] == [controller]
     assert asked["tunnel"]["turns_deg"] == [75.0]
     pytest.importorskip("optuna")
     file, out = tmp_path / "tune.toml", tmp_path / "run"
     file.write_text(f"{run.stdout}\ntime_limit = 1.0\n")
-    words = f"study design {file} --proposals 1 --validated 0 --no-figures --out {out}"
+    words = f"study {file} --points 1 --validated 0 --no-figures --out {out}"
     assert main([*words.split(), "--workers", "1"]) in (0, 2)  # no trial ends within a second
     said = capsys.readouterr()
     assert (out / "trials.csv").exists(), said.err

@@ -100,8 +100,8 @@ report --compare a :: expected 2 runs, found 1
 report run --compare a b :: expected no other run beside it
 study :: expected a FILE that says what varies
 study --out run :: expected a FILE that says what varies
-study design :: expected a FILE that says what varies
-study design --out run :: expected a FILE that says what varies
+study design plan.toml :: study design is a plan of `
+design :: design is a plan of `
 study nobody.toml :: nobody.toml: expected a readable file: No such file
 bench touch --engine warp --trials 1 :: expected tunnel or a study of it
 tunnel --engine warp:cpu --log --trials 1 :: warp, which keeps no logs

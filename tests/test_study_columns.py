@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from dataclasses import fields
@@ -13,8 +14,8 @@ import pytest
 from antennate import experiments
 from antennate.cli import main
 from antennate.errors import BadInputError
-from antennate.experiments.design.designs import Aim, Design, DesignResult, Value
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.designs import Aim, Design, Search, Value
 from antennate.experiments.study.effects import Elementary, Slope
 from antennate.experiments.study.measures import bounds, measure_of
 from antennate.experiments.study.measures import cell as shown_cell
@@ -166,38 +167,31 @@ STUDY = StudyResult(
     ],
 )
 VALUE = Value(value=0.5, value95=(0.0, 1.0), trials=4)
-DESIGN = DesignResult(
-    interrupted=False,
+SEARCH = Search(
     optuna="4.0",
-    objectives=[Aim(name="a.x", goal="minimize", title="x", scale=1.0)],
-    axes=["x"],
+    objectives=[Aim(name="x", goal="minimize", title="x", scale=1.0)],
     proposed=1,
     repeated=0,
-    trials=4,
-    statuses={"ok": 4},
     designs=[
         Design(
-            design=0,
+            point=0,
             name="0",
             reference=False,
             state="ok",
-            reason="",
             values={"x": [1, "a"]},
             front=True,
-            objectives={"a.x": VALUE},
-            fresh=None,
-            fresh_front=False,
+            objectives={"x": VALUE},
         )
     ],
 )
 
 
-@pytest.mark.parametrize("found", [STUDY, DESIGN])
+@pytest.mark.parametrize("found", [STUDY, dataclasses.replace(STUDY, plan="optuna", search=SEARCH)])
 def test_a_result_is_read_back_as_it_was_written(found: Any) -> None:
     """Whether trials have an outcome, and whichever effects there are."""
     written = json.loads(json.dumps(content(found)))
     assert typed(type(found), written) == found
-    for key in set(written) - {"schema", "command"}:
+    for key in set(written) - {"schema", "command", "search"}:
         less = {name: value for name, value in written.items() if name != key}
         with pytest.raises(ValueError, match=f"{key}: field required"):
             typed(type(found), less)

@@ -46,7 +46,7 @@ DRAWN; "tunnel.free_width" = [0.4, nan] :: vary.tunnel.free_width: expected fini
 [settings]; tunnel = 3; GOOD :: settings.tunnel: expected a table, as tunnel.strewn varies, found 3
 [settings]; controllers = ["clsoed"]; GOOD :: found 'clsoed' (did you mean closed?)
 [vary]; controllers = [["clsoed"]] :: vary: tunnel: controllers: expected one of open
-experiment = "tunel"; [vary]; x = [1] :: experiment: expected an experiment (did you mean tunnel?), one of calibrate
+experiment = "tunel"; [vary]; x = [1] :: experiment: expected an experiment (did you mean tunnel?), one of antenna, calibrate
 experiment = 3; GOOD :: bad.toml: experiment: expected text, found 3
 plan = "gird"; GOOD :: bad.toml: plan: expected one of grid, list, random
 trails = 3; GOOD :: trails: expected a known key (did you mean trials?)
@@ -59,8 +59,8 @@ trials = 20000; [vary]; "tunnel.strewn" = {list(range(100))} :: trials: expected
 [vary]; "tunnel.strewn" = [1, 2, 1] :: vary.tunnel.strewn: expected each value once, found 1 twice
 [vary]; x = [1.0, nan] :: vary.x: expected finite numbers, found nan
 plan = "list"; [vary]; "tunnel.strewn" = [1, 1]; seed = [3, 3] :: vary: expected each point once, found [1, 3] twice
-points = 8; GOOD :: points: expected plan random, sobol or morris beside it, found grid
-seed = 8; GOOD :: seed: expected plan random, sobol or morris beside it, found grid
+points = 8; GOOD :: points: expected plan random, sobol, morris or optuna beside it, found grid
+seed = 8; GOOD :: seed: expected plan random, sobol, morris or optuna beside it, found grid
 leave_out = ["robot"]; GOOD :: leave_out: expected assumed beside it, found none
 trials = 2; [settings]; trials = 3; GOOD :: settings.trials: expected none beside trials = 2
 trials = 2; [vary]; trials = [2, 3] :: vary.trials: expected none beside trials = 2

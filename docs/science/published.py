@@ -987,13 +987,13 @@ def best(name: str, files: Sequence[Path], count: int, write: bool) -> None:
 
 SEARCHED = {
     "paper": """
-"rule.threshold" = { low = 0.05, high = 0.9 }
-"rule.hysteresis" = { low = 0.0, high = 0.1 }
-"rule.strong" = { low = 0.3, high = 0.95 }
-"rule.similar" = { low = 0.05, high = 0.5 }
-"rule.hold_time" = { low = 0.3, high = 6.0, log = true }
-"conditioning.averaging_time" = { low = 0.02, high = 0.5, log = true }
-"gait.turn_offset" = { low = 0.1, high = 0.6 }
+"control.rule.threshold" = { low = 0.05, high = 0.9 }
+"control.rule.hysteresis" = { low = 0.0, high = 0.1 }
+"control.rule.strong" = { low = 0.3, high = 0.95 }
+"control.rule.similar" = { low = 0.05, high = 0.5 }
+"control.rule.hold_time" = { low = 0.3, high = 6.0, log = true }
+"control.conditioning.averaging_time" = { low = 0.02, high = 0.5, log = true }
+"control.gait.turn_offset" = { low = 0.1, high = 0.6 }
 """,
     **{rival: tuning.SEARCHED[rival] for rival in ("timed", "schedule")},
 }
@@ -1001,10 +1001,10 @@ SEARCHED = {
 
 
 def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
-    """A search by `antennate study design` of one controller in a setting."""
+    """A search by plan `optuna` of one controller in a setting."""
     read_file(file, TunnelConfig)
     left_out = {"trials", "seed", "controllers"}
-    left_out |= {"control." + name for name in tomllib.loads(SEARCHED[controller])}
+    left_out |= {*tomllib.loads(SEARCHED[controller])}
     left_out |= {"control." + name for name in unread(controller, ControlParams())}
     fixed = [
         f"{path} = {json.dumps(value)}"
@@ -1013,10 +1013,10 @@ def tuned(file: Path, controller: str, proposals: int, trials: int) -> str:
     ]
     return "\n".join(
         [
-            f"proposals = {proposals}\nvalidated = 1\nvalidation_factor = 1\n",
-            f"[search]{SEARCHED[controller]}",
-            f'[evaluate.tunnel]\ntrials = {trials}\nminimize = ["time_s"]\n',
-            f'[evaluate.tunnel.settings]\ncontrollers = ["{controller}"]\nseed = {TUNING}',
+            f'experiment = "tunnel"\nplan = "optuna"\npoints = {proposals}\ntrials = {trials}',
+            'validated = 1\nvalidation_factor = 1\nminimize = ["time_s"]\n',
+            f"[vary]{SEARCHED[controller]}",
+            f'[settings]\ncontrollers = ["{controller}"]\nseed = {TUNING}',
             *fixed,
         ]
     )

@@ -1,6 +1,6 @@
 """Tune each controller with the same budget: `python docs/science/tuning.py [FOLDER [NAME...]]`.
 
-For each controller `antennate study design` proposes as many settings and walks each through the
+For each controller a study by plan `optuna` proposes as many settings and walks each through the
 same draws of four hard scenes. The one of the least mean time, a failure as the limit, then walks
 beside the default through fresh draws. A search that was stopped goes on. At the end the table of
 all searches that have ended is printed, and FOLDER/tuning.csv holds their trials. Without a folder
@@ -36,37 +36,37 @@ PROPOSALS, DRAWS, FRESH = 16, 8, 4
 
 SEARCHED = {
     "timed": """
-"timed.walk_time" = { low = 2.5, high = 15, log = true }
-"escape.reverse_time" = { low = 1, high = 5 }
-"escape.turn_time" = { low = 1.2, high = 6 }
+"control.timed.walk_time" = { low = 2.5, high = 15, log = true }
+"control.escape.reverse_time" = { low = 1, high = 5 }
+"control.escape.turn_time" = { low = 1.2, high = 6 }
 """,
     "schedule": """
-"schedule.walk_time" = { low = 2.5, high = 15, log = true }
-"schedule.headings" = { low = 0.5, high = 3, entries = [4, 4], rising = true }
-"schedule.reverse_times" = { low = 1, high = 6, entries = [3, 3], rising = true }
+"control.schedule.walk_time" = { low = 2.5, high = 15, log = true }
+"control.schedule.headings" = { low = 0.5, high = 3, entries = [4, 4], rising = true }
+"control.schedule.reverse_times" = { low = 1, high = 6, entries = [3, 3], rising = true }
 """,
     "closed": """
-"search.patience" = { low = 1, high = 8, log = true }
-"search.reverse_time" = { low = 1, high = 5 }
-"search.turn_time" = { low = 1.2, high = 6 }
-"search.growth" = { low = 1, high = 1.6 }
+"control.search.patience" = { low = 1, high = 8, log = true }
+"control.search.reverse_time" = { low = 1, high = 5 }
+"control.search.turn_time" = { low = 1.2, high = 6 }
+"control.search.growth" = { low = 1, high = 1.6 }
 """,
     "geometric": """
-"search.patience" = { low = 1, high = 8, log = true }
-"geometric.reverse_distance" = { low = 0.2, high = 1.1 }
-"geometric.turn_angle" = { low = 0.5, high = 2.5 }
-"search.growth" = { low = 1, high = 1.6 }
+"control.search.patience" = { low = 1, high = 8, log = true }
+"control.geometric.reverse_distance" = { low = 0.2, high = 1.1 }
+"control.geometric.turn_angle" = { low = 0.5, high = 2.5 }
+"control.search.growth" = { low = 1, high = 1.6 }
 """,
     "follow": """
-"follow.bend" = { low = 0.05, high = 0.5 }
-"follow.gain" = { low = 0.3, high = 5, log = true }
-"follow.rate_gain" = { low = 0, high = 2 }
-"follow.smoothing_time" = { low = 0.1, high = 2, log = true }
+"control.follow.bend" = { low = 0.05, high = 0.5 }
+"control.follow.gain" = { low = 0.3, high = 5, log = true }
+"control.follow.rate_gain" = { low = 0, high = 2 }
+"control.follow.smoothing_time" = { low = 0.1, high = 2, log = true }
 """,
     "centre": """
-"centre.gain" = { low = 0.3, high = 5, log = true }
-"centre.rate_gain" = { low = 0, high = 2 }
-"centre.smoothing_time" = { low = 0.1, high = 2, log = true }
+"control.centre.gain" = { low = 0.3, high = 5, log = true }
+"control.centre.rate_gain" = { low = 0, high = 2 }
+"control.centre.smoothing_time" = { low = 0.1, high = 2, log = true }
 """,
 }
 
@@ -84,29 +84,29 @@ def search(name: str, folder: Path) -> None:
     """Run the search of one controller, or go on with it."""
     file = folder / f"{name}.toml"
     file.write_text(
-        f"proposals = {PROPOSALS}\nvalidated = 1\nvalidation_factor = {FRESH}\n\n"
-        f"[search]{SEARCHED[name]}\n[reference]\ndefault = {{}}\n\n"
-        f'[evaluate.tunnel]\ntrials = {DRAWS}\nminimize = ["time_s"]\n'
-        f'settings = {{ scene = "{Path(__file__).relative_to(ROOT)}:Mixed", '
-        f'controllers = ["{name}"], seed = {SEED} }}\n'
+        f'experiment = "tunnel"\nplan = "optuna"\npoints = {PROPOSALS}\ntrials = {DRAWS}\n'
+        f'validated = 1\nvalidation_factor = {FRESH}\nminimize = ["time_s"]\n\n'
+        f"[vary]{SEARCHED[name]}\n[reference]\ndefault = {{}}\n\n[settings]\n"
+        f'scene = "{Path(__file__).relative_to(ROOT)}:Mixed"\n'
+        f'controllers = ["{name}"]\nseed = {SEED}\n'
     )
-    command = [sys.executable, "-m", "antennate", "study", "design", file, "--out", folder / name]
+    command = [sys.executable, "-m", "antennate", "study", file, "--out", folder / name]
     subprocess.run([*command, "--resume", "--trust-code", "--no-figures"], cwd=ROOT, check=True)
 
 
 def rows_of(name: str, folder: Path) -> list[dict[str, str]]:
     """The trials of a search, each with its setting."""
-    designs = json.loads((folder / "result.json").read_text())["designs"]
+    designs = json.loads((folder / "result.json").read_text())["search"]["designs"]
     settings = {
-        str(design["design"]): " ".join(
-            f"{key}={' '.join(map(str, np.atleast_1d(value)))}"
+        str(design["point"]): " ".join(
+            f"{key.removeprefix('control.')}={' '.join(map(str, np.atleast_1d(value)))}"
             for key, value in design["values"].items()
         )
         for design in designs
     }
     with (folder / "trials.csv").open(newline="", encoding="utf-8") as file:
         return [
-            {"controller": name, "setting": settings[row["design"]]}
+            {"controller": name, "design": row["point"], "setting": settings[row["point"]]}
             | {key: row[key] for key in COLUMNS if key in row and key != "controller"}
             for row in csv.DictReader(file)
         ]

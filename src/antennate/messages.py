@@ -36,7 +36,7 @@ def ended_by(status: int) -> str:
 
 COMMAND_GROUPS = {
     "bench": ("wall", "touch", "sweep", "force"),
-    "study": ("design", "merge"),
+    "study": ("merge",),
     "setup": ("zero", "jog"),
     "drive": ("teleop",),
     "log": ("replay", "view"),
@@ -47,7 +47,10 @@ FORMER = {
     f"{group}{part}": "`{antenna}` now, which does springs, taper, sensor and ring-down at once"
     for group in ("", "antenna ")
     for part in _OF_ANTENNA
-}
+} | dict.fromkeys(
+    ("design", "study design"),
+    'a plan of `{study}` now: plan = "optuna" in its file (docs/studies.md)',
+)
 """Former commands, by what was typed, and what does their work now."""
 _GROUP_OF = {name: group for group, names in COMMAND_GROUPS.items() for name in names}
 
@@ -82,7 +85,9 @@ def former(words: Sequence[str]) -> str:
     """What is said of a command that another one does now; empty of any other words."""
     for name in (" ".join(words[:2]), " ".join(words[:1])):
         if name in FORMER:
-            return f"{name} is {FORMER[name].format(antenna=typed('antenna'))}"
+            return (
+                f"{name} is {FORMER[name].format(antenna=typed('antenna'), study=typed('study'))}"
+            )
     return ""
 
 

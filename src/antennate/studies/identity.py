@@ -45,7 +45,7 @@ def packages_used(command: str, config: Params) -> tuple[str, ...]:
     return (
         *(("onnxruntime",) if any(text.endswith(".onnx") for text in values) else ()),
         *(("mujoco-warp", "warp-lang") if "warp" in words else ()),
-        *(("optuna",) if "design" in words else ()),
+        *(("optuna",) if getattr(config, "plan", "") == "optuna" else ()),
     )
 
 

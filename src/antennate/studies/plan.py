@@ -16,11 +16,12 @@ from antennate.errors import ConfigError
 from antennate.params.base import Strict
 from antennate.types import Floats, Ints
 
-Kind = Literal["grid", "list", "random", "sobol", "morris"]
+Kind = Literal["grid", "list", "random", "sobol", "morris", "optuna"]
 Point = dict[str, Any]
 """Values of the parameters that vary, by dotted name."""
 MOST_POINTS = 100_000
 """Most points of a plan."""
+_MOST_ENTRIES = 100
 LEVELS = 4
 """Levels of each parameter in a Morris plan, as Morris proposes."""
 STEP = LEVELS / (2 * (LEVELS - 1))
@@ -28,19 +29,23 @@ STEP = LEVELS / (2 * (LEVELS - 1))
 
 
 class Range(Strict):
-    """A range of one parameter.
+    """A range of one parameter, or of each entry of a list.
 
     Attributes:
         low: Its lower end.
         high: Its upper end.
         log: Whether values are spread evenly by their logarithm.
         whole: Whether only whole numbers are values.
+        entries: Fewest and most entries of a list, for optuna; None if it is one number.
+        rising: Whether the entries are put into rising order.
     """
 
     low: float
     high: float
     log: bool = False
     whole: bool = False
+    entries: tuple[int, int] | None = None
+    rising: bool = False
 
     @model_validator(mode="after")
     def _in_order(self) -> Range:
@@ -52,6 +57,13 @@ class Range(Strict):
         width = self.high / self.low if self.log else self.high - self.low
         if not math.isfinite(width):
             raise ValueError(f"expected ends less far apart, found {self.low:g} and {self.high:g}")
+        if self.rising and self.entries is None:
+            raise ValueError("expected entries beside rising, found none")
+        if self.entries and not 1 <= self.entries[0] <= self.entries[1] <= _MOST_ENTRIES:
+            raise ValueError(
+                f"expected the fewest and the most entries, 1 to {_MOST_ENTRIES}, found "
+                f"{self.entries[0]} and {self.entries[1]}"
+            )
         return self
 
     def at(self, share: float) -> float | int:
@@ -96,7 +108,7 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
     Args:
         kind: grid takes every combination of lists, list their first values, their second and so
             on. random and sobol draw points from ranges; of a list they draw one value. morris
-            makes trajectories for elementary effects.
+            makes trajectories for elementary effects. Points of optuna follow from results.
         axes: What varies.
         count: Points of random and sobol, trajectories of morris.
         seed: Seed of what is drawn.
@@ -105,11 +117,7 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
         ConfigError: Nothing varies, a value is not finite or given twice, or lists and ranges do
             not fit the kind.
     """
-    if not axes or not all(axes.values()):
-        empty = [f"vary.{name}" for name, axis in axes.items() if not axis] or ["vary"]
-        raise ConfigError(f"{empty[0]}: expected values, found none: the {kind} is empty")
-    for name, axis in axes.items():
-        _require_finite(name, axis)
+    require_values(kind, axes)
     if kind in ("grid", "list"):
         return _of_lists(kind, axes)
     rng = np.random.default_rng(seed)
@@ -127,6 +135,21 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
         {name: _value(axis, share) for (name, axis), share in zip(axes.items(), row, strict=True)}
         for row in shares.tolist()
     ]
+
+
+def require_values(kind: Kind, axes: Axes) -> None:
+    """Check that something varies, over finite values, and over lists of ranges only in optuna.
+
+    Raises:
+        ConfigError: It does not.
+    """
+    if not axes or not all(axes.values()):
+        empty = [f"vary.{name}" for name, axis in axes.items() if not axis] or ["vary"]
+        raise ConfigError(f"{empty[0]}: expected values, found none: the {kind} is empty")
+    for name, axis in axes.items():
+        _require_finite(name, axis)
+        if kind != "optuna" and isinstance(axis, Range) and axis.entries:
+            raise ConfigError(f"vary.{name}: expected plan optuna beside entries, found {kind}")
 
 
 def _of_lists(kind: Kind, axes: Axes) -> list[Point]:

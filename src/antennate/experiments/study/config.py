@@ -14,6 +14,11 @@ from antennate.messages import nearest, shortened, without_group
 from antennate.params.base import Params, number
 from antennate.studies.plan import RANGE_OR_CHOICES, Axes, Kind, Point, Range, make_points
 
+OF_SEARCH = (
+    *("maximize", "minimize", "batch", "least_ok", "validated", "validation_factor", "reference"),
+)
+"""Parameters that only plan optuna reads."""
+
 
 class StudyConfig(Params):
     """Everything that decides the outcome of `antennate study`."""
@@ -23,9 +28,9 @@ class StudyConfig(Params):
     )
     """Experiment that is run at each point, or a function trial(config, seed) as MODULE:NAME."""
     plan: Kind = number("grid", "1", "assumed: every combination is what a map needs")
-    """How points are chosen: grid, list, random, sobol or morris."""
+    """How points are chosen: grid, list, random, sobol, morris or optuna."""
     points: int = number(16, "1", "assumed: a power of 2, as Sobol's points need", ge=1, le=100000)
-    """Points of random and sobol, trajectories of morris."""
+    """Points of random and sobol, trajectories of morris, designs that optuna proposes."""
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of the plan; trials have that of their experiment."""
     trials: int | None = number(
@@ -51,6 +56,22 @@ class StudyConfig(Params):
     leave_out: tuple[str, ...] = number((), "1", "assumed: none is left out")
     """Assumed numbers that do not vary, or all of a group."""
 
+    maximize: tuple[str, ...] = number((), "1", "assumed: nothing is searched for")
+    """Measures that shall be large, for optuna; with @success at its end the mean of one over the
+    trials that succeeded."""
+    minimize: tuple[str, ...] = number((), "1", "assumed: nothing is searched for")
+    """Measures that shall be small, likewise."""
+    batch: int = number(8, "1", "assumed: enough to keep some cores busy", ge=1, le=10000)
+    """Designs that optuna proposes at once, before their results are known."""
+    least_ok: float = number(0.5, "1", "assumed: half of the trials say something", gt=0, le=1)
+    """Share of the trials that must be ok; with fewer a design of optuna has failed."""
+    validated: int = number(5, "1", "assumed: some along the front", ge=0, le=1000)
+    """Designs of the front that are run again on fresh seeds, with the references; 0 for none."""
+    validation_factor: int = number(4, "1", "assumed: intervals half as wide", ge=1, le=1000)
+    """How many times the trials of the search those have."""
+    reference: dict[str, dict[str, Any]] = number({}, "1", "assumed: nothing to compare with")
+    """Designs that are run beside those of optuna, by name; others are compared with the first."""
+
     @field_validator("experiment")
     @classmethod
     def _as_registered(cls, name: str) -> str:
@@ -73,7 +94,7 @@ class StudyConfig(Params):
         """
         axes: dict[str, Any] = dict(self.vary)
         if self.assumed is not None and model is not None:
-            if self.plan in ("grid", "list"):
+            if self.plan in ("grid", "list", "optuna"):
                 raise ConfigError(
                     f"assumed: expected plan random, sobol or morris beside it, found {self.plan}"
                 )

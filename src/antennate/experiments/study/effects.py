@@ -105,7 +105,7 @@ def effects(
 ) -> Sequence[Elementary | Slope]:
     """The effects of each parameter, on conditions, which are `names`, and on their differences.
 
-    Of a random and a Sobol plan they are those of `slopes`, of a grid and a list there are none.
+    Of a random and a Sobol plan they are those of `slopes`, of other plans there are none.
 
     Of a Morris plan each has `noise`: the size that the largest effect of a study stays below if
     nothing has an effect, in all but `CHANCE` of such studies over all targets (Bonferroni). Then a
@@ -116,7 +116,7 @@ def effects(
     not there. From one
     trial a point nothing can be said: `noise` and `above_noise` are None.
     """
-    if config.plan in ("grid", "list") or response is None or not by_cell:
+    if config.plan in ("grid", "list", "optuna") or response is None or not by_cell:
         return []
     values = _values(by_cell, len(points), names, response)
     if config.plan != "morris":

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import permutations
 
 from antennate.control.registry import compared
-from antennate.experiments.study import measures
+from antennate.experiments.study import measures, tradeoff
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import Elementary, Slope
 from antennate.experiments.study.result import Cell, StudyResult, Successes
@@ -36,6 +36,8 @@ _SLOPES = (
 
 def tables(result: StudyResult) -> Sequence[Table]:
     """What the response depends on, or the points one by one."""
+    if result.search:
+        return tradeoff.tables(result.search, result.axes)
     table = _effects(result) if result.tells_effects else _points(result)
     return [table] if table.rows else []
 
@@ -125,6 +127,8 @@ def _few(result: StudyResult) -> str:
 
 def sentence(result: StudyResult) -> str:
     """What came out over all points, and how many trials say nothing."""
+    if result.search:
+        return tradeoff.sentence(result.search, result.ended, result.statuses)
     points = len({cell.point for cell in result.points})
     text = f"{result.experiment} at {points} points, {_ended(result)}"
     rates = [
@@ -168,9 +172,16 @@ EXPERIMENT = Experiment.of_folder(
     failed=lambda result: measures.NO_RESULT.issuperset(result.statuses),
     continued=True,
     tasks=planned,
+    undivided=lambda config: (
+        "expected another plan than optuna, whose trials follow from others, found it"
+        if config.plan == "optuna"
+        else ""
+    ),
     captions={
         "effects": "The largest effects with their intervals, and how far noise alone would reach.",
         "map": "The response over two parameters, a map for each condition.",
+        "tradeoff": "Every design by its objectives, with the front, the references, and those run "
+        "again with their intervals.",
         "points": "The response against each parameter, with the interval of each point.",
     },
 )

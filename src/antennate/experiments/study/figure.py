@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
-from antennate.experiments.study import measures
+from antennate.experiments.study import measures, tradeoff
 from antennate.experiments.study.effects import SUCCESS, Elementary, Slope
 from antennate.experiments.study.result import Cell, CellOfSuccesses, StudyResult
 from antennate.studies.columns import NONE, Column, shown
@@ -32,6 +32,9 @@ _text = functools.partial(measures.text, digits=3)
 def figures(outcome: Done) -> dict[str, Figure]:
     """The figure that suits the plan."""
     result: StudyResult = outcome.result()
+    if result.search:
+        judged = any(design.objectives for design in result.search.designs)
+        return {"tradeoff": tradeoff.draw(result.search)} if judged else {}
     if result.tells_effects:
         return {"effects": _draw_effects(result)}
     if result.plan == "grid" and len(result.axes) > 1:

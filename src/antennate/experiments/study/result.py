@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from antennate.experiments.study.config import StudyConfig
+from antennate.experiments.study.designs import Search
 from antennate.experiments.study.effects import SUCCESS, Elementary, Slope, effects, value
 from antennate.experiments.study.measures import bounds, measure_of
 from antennate.studies import statistics
@@ -74,7 +75,7 @@ class StudyResult:
     experiment: str
     """Experiment that was run, or the function as `MODULE:NAME`."""
     plan: Kind
-    """How points were chosen: `grid`, `list`, `random`, `sobol` or `morris`."""
+    """How points were chosen: `grid`, `list`, `random`, `sobol`, `morris` or `optuna`."""
     axes: list[str]
     """Parameters that vary, by dotted name."""
     trials: int
@@ -92,7 +93,9 @@ class StudyResult:
     """Each point under each condition."""
     effects: list[Elementary | Slope]
     """Effects of each parameter on each condition, and on the difference of each two; empty for a
-    grid and a list."""
+    grid, a list and optuna."""
+    search: Search | None = None
+    """Designs that optuna proposed; `null` in other plans."""
 
     @property
     def measure(self) -> Column:

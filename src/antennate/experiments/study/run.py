@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, cast
 
-from antennate.errors import ConfigError, SceneError, SimulationError
-from antennate.experiments.study.config import StudyConfig
+from antennate.errors import ConfigError
+from antennate.experiments.study import search
+from antennate.experiments.study.config import OF_SEARCH, StudyConfig
 from antennate.experiments.study.result import summarise
 from antennate.experiments.study.subject import (
     OF_STUDY,
-    EmitRows,
     Rows,
     Subject,
     columns_in,
     configurations,
     find,
 )
+from antennate.experiments.study.tasks import (
+    STATUS,
+    Key,
+    Task,
+    aligned,
+    cells,
+    run_batched,
+    run_tasks,
+)
 from antennate.messages import shortened
 from antennate.studies.experiment import Done
 from antennate.studies.plan import Point
 from antennate.studies.pool import Workers, chunk_of, gather
-from antennate.studies.trials import OnRow, OnStep, Trial, no_row, no_step
-from antennate.studies.work import Fail, Failure
-
-STATUS, REASON = "status", "reason"
-_Key = tuple[int, str, int]
-"""What a task is, whatever the number of trials: its point, condition and trial."""
-_Emit = Callable[[int, tuple[_Key, Rows]], None]
-
-
-class _Task(NamedTuple):
-    """A trial of what is studied, which varies in some axes: at a point, with its configuration."""
-
-    experiment: str
-    axes: Sequence[str]
-    point: int
-    config: Any
-    trial: Trial
-
-    @property
-    def key(self) -> _Key:
-        return self.point, *self.trial
+from antennate.studies.trials import OnRow, OnStep, no_row, no_step
+from antennate.studies.work import Failure
 
 
 def check(config: StudyConfig) -> None:
@@ -54,7 +44,11 @@ def check(config: StudyConfig) -> None:
     """
     subject = find(config.experiment)
     _require_names(config, subject)
+    _require_read(config)
     _require_use(config, subject)
+    if config.plan == "optuna":
+        search.check(config, subject)
+        return
     (_, first), *_ = configurations(config, subject)
     try:
         subject.check(first)
@@ -72,14 +66,22 @@ def _require_names(config: StudyConfig, subject: Subject) -> None:
             raise ConfigError(f"vary.{shortened(name)}: expected another name, {why}")
 
 
-def _require_use(config: StudyConfig, subject: Subject) -> None:
-    """Check that nothing is given that another value overrides or that the plan does not read."""
+def _require_read(config: StudyConfig) -> None:
+    """Check that nothing is given that the plan does not read."""
     drawn = StudyConfig.model_fields
-    for name in ("points", "seed") if config.plan in ("grid", "list") else ():
-        if getattr(config, name) != drawn[name].default:
-            raise ConfigError(
-                f"{name}: expected plan random, sobol or morris beside it, found {config.plan}"
-            )
+    unused = {
+        "random, sobol, morris or optuna": ("points", "seed") * (config.plan in ("grid", "list")),
+        "optuna": OF_SEARCH * (config.plan != "optuna"),
+        "other than optuna": ("response",) * (config.plan == "optuna"),
+    }
+    for plan, names in unused.items():
+        for name in names:
+            if getattr(config, name) != drawn[name].default:
+                raise ConfigError(f"{name}: expected plan {plan} beside it, found {config.plan}")
+
+
+def _require_use(config: StudyConfig, subject: Subject) -> None:
+    """Check that nothing is given that another value overrides."""
     if config.assumed is None and config.leave_out:
         raise ConfigError("leave_out: expected assumed beside it, found none")
     if config.assumed is not None and subject.model is None:
@@ -115,7 +117,9 @@ def holds(settings: Mapping[str, Any], name: str) -> bool:
 
 
 def planned(config: StudyConfig) -> list[tuple[Any, ...]]:
-    """What each task is: all trials, point by point."""
+    """What each task is: all trials, point by point; none of a search, whose points follow."""
+    if config.plan == "optuna":
+        return []
     subject = find(config.experiment)
     return [
         (number, *task)
@@ -126,10 +130,10 @@ def planned(config: StudyConfig) -> list[tuple[Any, ...]]:
 
 def _tasks(
     config: StudyConfig, subject: Subject, points: Sequence[tuple[Point, Any]]
-) -> list[_Task]:
+) -> list[Task]:
     axes = list(config.axes(subject.model))
     return [
-        _Task(config.experiment, axes, number, configured, trial)
+        Task(config.experiment, axes, number, configured, trial)
         for number, (_, configured) in enumerate(points)
         for trial in subject.trials(configured)
     ]
@@ -147,21 +151,19 @@ def run(
         BadInputError: As for `check`.
         WorkerError: The workers cannot run anything.
     """
+    if config.plan == "optuna":
+        return _searched(config, workers, on_step, on_row)
     subject = find(config.experiment)
     points = configurations(config, subject)
     axes = config.axes(subject.model)
     tasks = _tasks(config, subject, points)
-    ended: dict[_Key, Rows] = {}
+    ended: dict[Key, Rows] = {}
     checked = config.response is None
 
-    def lost(place: int, failure: Failure) -> tuple[_Key, Rows]:
-        condition, trial = tasks[place].trial
-        row = {"trial": trial, STATUS: failure.status, REASON: failure.reason}
-        return tasks[place].key, [
-            ({subject.condition: condition} if subject.condition else {}) | row
-        ]
+    def lost(place: int, failure: Failure) -> tuple[Key, Rows]:
+        return tasks[place].key, [tasks[place].lost(subject.condition, failure)]
 
-    def take(item: tuple[_Key, Rows]) -> None:
+    def take(item: tuple[Key, Rows]) -> None:
         nonlocal checked
         key, rows = item
         ended[key] = rows
@@ -175,7 +177,7 @@ def run(
     interrupted = False
     try:
         gather(
-            _run,
+            run_tasks,
             tasks,
             workers,
             on_step,
@@ -183,7 +185,7 @@ def run(
             chunk=chunk,
             together=True,
             lost=lost,
-            batched=_run_batched,
+            batched=run_batched,
         )
     except KeyboardInterrupt:
         interrupted = True
@@ -207,67 +209,17 @@ def run(
     return Done(rows, found)
 
 
-def _run(tasks: Sequence[_Task], emit: _Emit) -> None:
-    """Run some trials, those of one point at once."""
-    subject = find(tasks[0].experiment, tasks[0].axes)
-    for _, config, trials, take in _by_point(tasks, emit):
-        subject.run(config, trials, take)
-
-
-def _run_batched(tasks: Sequence[_Task], emit: _Emit, fail: Fail, device: str | None) -> None:
-    """The same on a GPU, a batch for each point; a point that cannot be run fails alone."""
-    subject, ended = find(tasks[0].experiment, tasks[0].axes), set[int]()
-
-    def note(index: int, result: tuple[_Key, Rows]) -> None:
-        ended.add(index)
-        emit(index, result)
-
-    for indices, config, trials, take in _by_point(tasks, note):
-        try:
-            subject.run_on_device(config, trials, take, device)
-        except (SceneError, SimulationError) as error:
-            for index in [i for i in indices if i not in ended]:
-                fail(index, Failure("failed", str(error), error))
-
-
-def _by_point(
-    tasks: Sequence[_Task], emit: _Emit
-) -> Iterator[tuple[list[int], Any, list[Trial], EmitRows]]:
-    """For each point indices of its tasks, configuration, trials, and what takes their rows."""
-    points: dict[int, list[int]] = {}
-    for index, task in enumerate(tasks):
-        points.setdefault(task.point, []).append(index)
-    for indices in points.values():
-
-        def take(i: int, rows: Rows, indices: list[int] = indices) -> None:
-            emit(indices[i], (tasks[indices[i]].key, [with_status(row) for row in rows]))
-
-        yield indices, tasks[indices[0]].config, [tasks[index].trial for index in indices], take
-
-
-def with_status(row: Mapping[str, Any], judged: Collection[str] = ()) -> dict[str, Any]:
-    """A row that says whether its numbers may be used: ok, invalid or nan.
-
-    Args:
-        row: The row.
-        judged: Columns that are looked at, all if there are none.
-    """
-    looked = {name: v for name, v in row.items() if not judged or name in judged}
-    bad = [name for name, v in looked.items() if isinstance(v, float) and not math.isfinite(v)]
-    status = "invalid" if row.get("outcome") == "invalid" else "nan" if bad else "ok"
-    reason = row.get(REASON) or (f"not finite: {', '.join(bad)}" if status == "nan" else "")
-    return {**row, STATUS: status, REASON: reason}
-
-
-def aligned(rows: Rows) -> Rows:
-    """The same rows, each with the columns of all, status and reason last."""
-    columns = dict.fromkeys(name for row in rows for name in row if name not in (STATUS, REASON))
-    return [{n: row.get(n) for n in (*columns, STATUS, REASON)} for row in rows]
-
-
-def cells(point: Point) -> dict[str, Any]:
-    """The values of a point as cells of a table: lists as text."""
-    return {
-        name: " ".join(map(str, value)) if isinstance(value, list | tuple) else value
-        for name, value in point.items()
-    }
+def _searched(config: StudyConfig, workers: int | Workers, on_step: OnStep, on_row: OnRow) -> Done:
+    """A search in place of the points of a plan."""
+    ended = search.search(config, workers, on_step, on_row)
+    found = summarise(
+        config,
+        points=[],
+        axes=config.vary,
+        condition=ended.subject.condition,
+        rows=(rows := ended.table()),
+        total=len(rows),
+        ended=len(rows),
+        interrupted=ended.interrupted,
+    )
+    return Done(rows, replace(found, search=ended.found()))

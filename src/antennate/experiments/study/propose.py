@@ -10,16 +10,15 @@ import contextlib
 import functools
 import importlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from antennate.errors import MissingPackageError
-from antennate.experiments.design.config import Axis, Goal
 from antennate.messages import extra
-from antennate.studies.plan import Point
+from antennate.studies.plan import Axes, Point, Range
 
 _SAMPLER = {"multivariate": True, "group": True, "constant_liar": True}
 """Parameters are drawn together, lists of each length by themselves, designs of a batch apart."""
@@ -28,7 +27,7 @@ _CANDIDATES = 100
 as well."""
 Drawn = dict[str, int | float]
 """What the sampler draws: a number, the place of a choice, the entries of a list one by one."""
-Space = Mapping[str, Sequence[Any] | Axis]
+Goal = Literal["maximize", "minimize"]
 
 
 @dataclass(frozen=True)
@@ -55,16 +54,16 @@ def package() -> Any:
         if (error.name or "").partition(".")[0] != "optuna":
             raise
         raise MissingPackageError(
-            "design: expected the package optuna, which proposes, found none; install it with "
+            "plan: expected the package optuna, which proposes, found none; install it with "
             f"{extra('design')}"
         ) from None
 
 
-def point_of(space: Space, drawn: Drawn) -> Point:
+def point_of(space: Axes, drawn: Drawn) -> Point:
     """The values of the parameters that were drawn."""
     point: Point = {}
     for name, axis in space.items():
-        if not isinstance(axis, Axis):
+        if not isinstance(axis, Range):
             point[name] = axis[int(drawn[name])]
         elif axis.entries is None:
             point[name] = drawn[name]
@@ -75,7 +74,7 @@ def point_of(space: Space, drawn: Drawn) -> Point:
 
 
 def propose(
-    space: Space, past: Sequence[Proposal], goals: Sequence[Goal], count: int, seed: int
+    space: Axes, past: Sequence[Proposal], goals: Sequence[Goal], count: int, seed: int
 ) -> list[Drawn]:
     """The next proposals.
 
@@ -118,11 +117,11 @@ def _quiet(optuna: Any) -> Iterator[None]:
         optuna.logging.set_verbosity(before)
 
 
-def _walk(optuna: Any, space: Space, draw: Callable[[str, Any], int | float]) -> None:
+def _walk(optuna: Any, space: Axes, draw: Callable[[str, Any], int | float]) -> None:
     """Go through what is drawn: draw(name, distribution) -> number. How many follow may depend."""
     for name, axis in space.items():
         kind = _kind(optuna, axis)
-        if isinstance(axis, Axis) and axis.entries is not None:
+        if isinstance(axis, Range) and axis.entries is not None:
             count = draw(_count(name), optuna.distributions.IntDistribution(*axis.entries))
             for i in range(int(count)):
                 draw(_entry(name, i), kind)
@@ -130,9 +129,9 @@ def _walk(optuna: Any, space: Space, draw: Callable[[str, Any], int | float]) ->
             draw(name, kind)
 
 
-def _kind(optuna: Any, axis: Sequence[Any] | Axis) -> Any:
+def _kind(optuna: Any, axis: Sequence[Any] | Range) -> Any:
     """The distribution of one number, or of the place of a choice."""
-    if not isinstance(axis, Axis):
+    if not isinstance(axis, Range):
         return optuna.distributions.CategoricalDistribution(list(range(len(axis))))
     if axis.whole:
         return optuna.distributions.IntDistribution(int(axis.low), int(axis.high), log=axis.log)
@@ -161,7 +160,7 @@ def _worst(past: Sequence[Proposal], goals: Sequence[Goal]) -> list[float]:
     ]
 
 
-def _finished(optuna: Any, space: Space, proposal: Proposal, worst: Sequence[float]) -> Any:
+def _finished(optuna: Any, space: Axes, proposal: Proposal, worst: Sequence[float]) -> Any:
     """A proposal and its values as Optuna keeps them."""
     kinds: dict[str, Any] = {}
 

@@ -1,4 +1,4 @@
-"""The experiment `design`."""
+"""What is told and drawn of a search: the front beside the references, and both on fresh seeds."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
-from antennate.experiments.design.config import DesignConfig
-from antennate.experiments.design.designs import Aim, Design, DesignResult, Value
-from antennate.experiments.design.search import check, run
 from antennate.experiments.study import measures
+from antennate.experiments.study.designs import Aim, Design, Search, Value, Worth
 from antennate.studies.columns import NONE, shown
-from antennate.studies.experiment import Done, Experiment
 from antennate.studies.tables import Table, few
 
 if TYPE_CHECKING:
@@ -28,76 +25,65 @@ _GOOD = {"minimize": "small is good", "maximize": "large is good"}
 _MOST_PANELS = 6
 _MARKERS = "*^vDsPX<>"
 """The first reference is a star."""
-Worth = Mapping[str, Value]
-"""What a design is worth in each objective, by name."""
 
 
-def tables(result: DesignResult) -> Sequence[Table]:
+def tables(found: Search, axes: Sequence[str]) -> list[Table]:
     """The front beside the references, and both on fresh seeds."""
-    return [table for table in (_front(result), _on_fresh_seeds(result)) if table.rows]
+    return [table for table in (_front(found, axes), _on_fresh_seeds(found)) if table.rows]
 
 
-def _front(result: DesignResult) -> Table:
+def _front(found: Search, axes: Sequence[str]) -> Table:
     """The designs of the front and the references, by the trials of the search."""
     judged = [
         (design, design.objectives)
-        for design in result.designs
+        for design in found.designs
         if design.objectives and (design.reference or design.front)
     ]
-    names = [_title(aim) for aim in result.objectives]
     rows = [
         (
             f"{design.name}{' *' if design.front else ''}",
             [
-                *(measures.text(design.values.get(axis, NONE)) for axis in result.axes),
-                *(_cell(worth[aim.name], aim) for aim in result.objectives),
+                *(measures.text(design.values.get(axis, NONE)) for axis in axes),
+                *(_cell(worth[aim.name], aim) for aim in found.objectives),
             ],
         )
         for design, worth in judged[:_MOST]
     ]
-    note = "".join(
-        f"{name}: {_GOOD[aim.goal]}.\n" for name, aim in zip(names, result.objectives, strict=True)
-    )
+    note = "".join(f"{aim.title}: {_GOOD[aim.goal]}.\n" for aim in found.objectives)
     note += (
         "* is on the front: no other design is as good in all of these and better in one.\nMeans "
         "with 95 % intervals. The front was chosen by these values, so they are optimistic."
     )
     so_few = _few(worth for _, worth in judged)
-    if so_few and any(design.fresh for design in result.designs):
+    if so_few and any(design.fresh for design in found.designs):
         note += f" {so_few}"  # without fresh trials the sentence says it
     if len(judged) > _MOST:
         note += f" The first {_MOST} of {len(judged)} designs; result.json has all."
-    heads = [axis.rpartition(".")[2] for axis in result.axes]
-    return Table("The front and the references", [*heads, *names], rows, note)
+    heads = [*(axis.rpartition(".")[2] for axis in axes), *(aim.title for aim in found.objectives)]
+    return Table("The front and the references", heads, rows, note)
 
 
-def _on_fresh_seeds(result: DesignResult) -> Table:
+def _on_fresh_seeds(found: Search) -> Table:
     """The designs that were run again: in the search, and on fresh seeds."""
     rows: list[tuple[str, list[str]]] = []
-    for design in result.designs:
+    for design in found.designs:
         if design.objectives and design.fresh:
             cells = [
                 f"{shown(design.objectives[aim.name].value, '.3g', aim.scale)}, "
                 f"{_cell(design.fresh[aim.name], aim)}"
-                for aim in result.objectives
+                for aim in found.objectives
             ]
             rows.append((f"{design.name}{' *' if design.fresh_front else ''}", cells))
     note = (
         "Search, then fresh seeds by which nothing was chosen, with the 95 % interval.\n"
         "* is on the front of these designs on fresh seeds."
     )
-    return Table("On fresh seeds", [_title(aim) for aim in result.objectives], rows, note)
+    return Table("On fresh seeds", [aim.title for aim in found.objectives], rows, note)
 
 
 def _few(worths: Iterable[Worth]) -> str:
     """What is said where a design has few trials."""
     return few(value.trials for worth in worths for value in worth.values())
-
-
-def _title(aim: Aim) -> str:
-    """The label of an evaluation, and what is measured there with its unit."""
-    label = f"{aim.name.partition('.')[0]}: "
-    return label + aim.title.removeprefix(label)
 
 
 def _cell(value: Value, aim: Aim) -> str:
@@ -106,23 +92,23 @@ def _cell(value: Value, aim: Aim) -> str:
     return f"{text} ({shown(value.value95, '.3g', aim.scale)})" if value.value95 else text
 
 
-def sentence(result: DesignResult) -> str:
+def sentence(found: Search, trials: int, statuses: Mapping[str, int]) -> str:
     """How many designs were compared, and the best ones beside the first reference."""
-    designs = result.designs
+    designs = found.designs
     proposed = [design for design in designs if not design.reference]
     text = (
         f"Designs proposed: {len(proposed)}, references: {len(designs) - len(proposed)}, "
-        f"trials: {result.trials}, on the front: {sum(design.front for design in designs)}"
+        f"trials: {trials}, on the front: {sum(design.front for design in designs)}"
     )
     again = [(design, design.fresh) for design in designs if design.fresh]
     known = again or [(design, design.objectives) for design in designs if design.objectives]
     if known:
-        best = [_best(known, aim) for aim in result.objectives]
+        best = [_best(known, aim) for aim in found.objectives]
         seeds = "fresh seeds" if again else "the seeds of the search, which flatter"
         text += f". Best of each objective on {seeds} (95 % interval): {'; '.join(best)}"
     if so_few := _few(worth for _, worth in known):
         text += f". {so_few.removesuffix('.')}"
-    text += measures.silent(result.statuses)
+    text += measures.silent(statuses)
     lost = sum(design.state in ("failed", "refused") for design in designs)
     return text + (f". Designs that could not be judged: {lost}." if lost else ".")
 
@@ -132,33 +118,26 @@ def _best(known: Sequence[tuple[Design, Worth]], aim: Aim) -> str:
     values = [(design, worth[aim.name]) for design, worth in known]
     valued = [(design, value) for design, value in values if value.value is not None]
     if not valued:
-        return f"{_title(aim)}: none"
+        return f"{aim.title}: none"
     chosen = min if aim.goal == "minimize" else max
     best, value = chosen(valued, key=lambda each: each[1].value or 0.0)
     label = best.name if best.reference else f"design {best.name}"
-    text = f"{_title(aim)}: {label} {_cell(value, aim)}"
+    text = f"{aim.title}: {label} {_cell(value, aim)}"
     first = next((each for each in values if each[0].reference), None)
     if first is not None and first[0] is not best:
         text += f", {first[0].name} {_cell(first[1], aim)}"
     return text
 
 
-def figures(outcome: Done) -> dict[str, Figure]:
-    """The trade-off; nothing where no design was judged."""
-    result: DesignResult = outcome.result()
-    judged = any(design.objectives for design in result.designs)
-    return {"tradeoff": _draw_tradeoff(result)} if judged else {}
-
-
 @style.styled
-def _draw_tradeoff(result: DesignResult) -> Figure:
+def draw(found: Search) -> Figure:
     """All designs, the front, the references, and those that were run again with intervals."""
-    aims = result.objectives
+    aims = found.objectives
     pairs = list(combinations(aims, 2))[:_MOST_PANELS] or [(None, aims[0])]
     figure = style.canvas(style.WIDTH, 1.0 + 3.1 * len(pairs))
     panels = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for panel, (x, y) in zip(panels, pairs, strict=True):
-        _draw_pair(panel, result.designs, x, y)
+        _draw_pair(panel, found.designs, x, y)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
@@ -237,7 +216,7 @@ def _whiskers(fresh: Value, aim: Aim) -> Any:
 def _value(design: Design, aim: Aim | None, worth: Worth | None) -> float:
     """A value as it is drawn, NaN if there is none; without an objective the number of a design."""
     if aim is None:
-        return design.design
+        return design.point
     return _scaled(worth[aim.name], aim) if worth else math.nan
 
 
@@ -247,21 +226,3 @@ def _scaled(value: Value, aim: Aim) -> float:
 
 def _words(aim: Aim) -> str:
     return f"{aim.title}\n{_GOOD[aim.goal]}"
-
-
-EXPERIMENT = Experiment.of_folder(
-    __name__,
-    DesignConfig,
-    run,
-    tables,
-    sentence,
-    result=DesignResult,
-    check=check,
-    continued=True,
-    figures=figures,
-    captions={
-        "tradeoff": "Every design by its objectives, with the front, the references, and those run "
-        "again with their intervals.",
-    },
-    undivided=None,
-)

@@ -1,4 +1,4 @@
-"""Designs, what they are worth, which are the best trade-offs, and what came out of a search."""
+"""Designs of a search, what they are worth, and which of them are the best trade-offs."""
 
 from __future__ import annotations
 
@@ -9,18 +9,55 @@ from typing import Literal
 
 import numpy as np
 
-from antennate.experiments.design.config import DesignConfig, Goal, Objective
-from antennate.experiments.design.evaluate import Row
 from antennate.experiments.study import measures
+from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import SUCCESS
-from antennate.experiments.study.run import STATUS
-from antennate.experiments.study.subject import OUTCOME
+from antennate.experiments.study.propose import Goal
+from antennate.experiments.study.subject import OUTCOME, Rows
 from antennate.studies import statistics
 from antennate.studies.columns import Ends, column, tabular
 from antennate.studies.plan import Point
 from antennate.types import Bools, Floats
 
+OF_SUCCESSES = "@success"
+"""End of a measure of trials that succeeded."""
 State = Literal["ok", "failed", "refused", "unfinished"]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One number that a design is judged by.
+
+    Attributes:
+        name: What is measured, with `@success` over the trials that succeeded alone.
+        goal: Whether it shall be large or small.
+    """
+
+    name: str
+    goal: Goal
+
+    @property
+    def column(self) -> str:
+        """The column that it is made of."""
+        return OUTCOME if self.name == SUCCESS else self.name.removesuffix(OF_SUCCESSES)
+
+    @property
+    def of_successes(self) -> bool:
+        """Whether only trials that succeeded count."""
+        return self.name.endswith(OF_SUCCESSES)
+
+    @property
+    def sign(self) -> float:
+        """What makes it a number that shall be small."""
+        return 1.0 if self.goal == "minimize" else -1.0
+
+
+def objectives_of(config: StudyConfig) -> list[Objective]:
+    """The objectives of a study, those that shall be large first."""
+    return [
+        *(Objective(name, "maximize") for name in config.maximize),
+        *(Objective(name, "minimize") for name in config.minimize),
+    ]
 
 
 @tabular
@@ -35,31 +72,35 @@ class Value:
     """Trials behind it."""
 
 
+Worth = Mapping[str, Value]
+"""What a design is worth in each objective, by name."""
+
+
 @dataclass(kw_only=True)
 class Design:
     """A design: a reference, or one that was proposed."""
 
-    design: int
+    point: int
     """Number in the order of the run."""
     name: str
     """Name of a reference, else the number."""
     reference: bool
     """Whether it is a reference."""
-    state: State
+    state: State = "unfinished"
     """`ok` if it was judged, `failed` with too few trials that are ok, `refused` if it could not be
     configured, `unfinished` if the run was interrupted."""
-    reason: str
+    reason: str = ""
     """Why it was refused."""
     values: Point
-    """Value of each parameter that is searched, by dotted name; of a reference those it states."""
-    front: bool
+    """Value of each parameter that varies, by dotted name; of a reference those it states."""
+    front: bool = False
     """Whether no other design is better, by the trials of the search."""
-    objectives: dict[str, Value] | None
+    objectives: dict[str, Value] | None = None
     """Each objective in the search, by name; `null` if the design was not judged."""
-    fresh: dict[str, Value] | None
-    """Each objective on fresh seeds; `null` if the design was not validated."""
-    fresh_front: bool
-    """Whether none of those that were validated is better on fresh seeds."""
+    fresh: dict[str, Value] | None = None
+    """Each objective on fresh seeds; `null` if the design was not run again."""
+    fresh_front: bool = False
+    """Whether none of those that were run again is better on fresh seeds."""
 
 
 @tabular
@@ -67,7 +108,7 @@ class Aim:
     """An objective, with its unit."""
 
     name: str
-    """Label of the evaluation and measure, as `wall.success_share`."""
+    """What is measured, as `success_share`."""
     goal: Goal
     """`maximize` or `minimize`."""
     title: str
@@ -75,72 +116,36 @@ class Aim:
     scale: float
     """Factor from the values of the designs to that unit."""
 
+    @classmethod
+    def of(cls, objective: Objective, experiment: str) -> Aim:
+        """An objective of an experiment, with the label and the unit of what is measured there."""
+        name = objective.name.removesuffix(OF_SUCCESSES)
+        measure = measures.measure_of(experiment, name)
+        if objective.of_successes:
+            measure = replace(measure, label=f"{measure.label} (successes only)")
+        return cls(
+            name=objective.name, goal=objective.goal, title=measure.title, scale=measure.scale
+        )
+
 
 @tabular
-class DesignResult:
-    """What a search comes to."""
+class Search:
+    """What a search by Optuna comes to."""
 
-    schema: int = 1
-    command: str = "design"
-    interrupted: bool
     optuna: str
     """Version of Optuna, which proposed the designs."""
     objectives: list[Aim]
     """What designs are judged by."""
-    axes: list[str]
-    """Parameters that are searched, by dotted name."""
     proposed: int
     """Designs that were proposed, those that came again among them."""
     repeated: int
     """Designs among these that came again and were not run again."""
-    trials: int
-    """Trials that have ended."""
-    statuses: dict[str, int]
     designs: list[Design]
     """The references, then the proposals."""
 
 
-def summarise(
-    config: DesignConfig,
-    designs: Sequence[Design],
-    rows: Sequence[Row],
-    proposed: int,
-    repeated: int,
-    optuna: str,
-    interrupted: bool,
-) -> DesignResult:
-    """What the designs and the rows of a search come to."""
-    statuses = [row[STATUS] for row in rows]
-    return DesignResult(
-        interrupted=interrupted,
-        optuna=optuna,
-        objectives=[_aim(config, objective) for objective in config.objectives()],
-        axes=list(config.search),
-        proposed=proposed,
-        repeated=repeated,
-        trials=len(rows),
-        statuses={name: statuses.count(name) for name in sorted(set(statuses))},
-        designs=[*designs],
-    )
-
-
-def _aim(config: DesignConfig, objective: Objective) -> Aim:
-    """An objective with what it is called, and its unit."""
-    experiment = config.evaluate[objective.label].experiment or objective.label
-    measure = measures.measure_of(experiment, objective.column)
-    if objective.of_successes:
-        measure = replace(measure, label=f"{measure.label} (successes only)")
-    several = len(config.evaluate) > 1
-    return Aim(
-        name=objective.name,
-        goal=objective.goal,
-        title=f"{objective.label}: {measure.title}" if several else measure.title,
-        scale=measure.scale,
-    )
-
-
 def worth_of(
-    rows: Sequence[Row],
+    rows: Rows,
     objectives: Sequence[Objective],
     least_ok: float,
     bounds: Mapping[str, tuple[float, float, bool]] | None = None,
@@ -148,19 +153,18 @@ def worth_of(
     """The value of each objective, by name; None if too few trials are ok.
 
     Args:
-        rows: Rows of all trials of a design, each with its `evaluation`.
+        rows: Rows of all trials of a design.
         objectives: What the design is judged by.
-        least_ok: Least share of the trials of each evaluation that must be ok.
+        least_ok: Least share of the trials that must be ok.
         bounds: Between which values those of an objective lie, and whether the upper one stands
             for a failure, by its name; any if not given.
     """
     values_by_name: dict[str, Value] = {}
     for objective in objectives:
-        name = OUTCOME if objective.measure == SUCCESS else objective.column
-        trials = [row for row in rows if row["evaluation"] == objective.label]
+        name = objective.column
         needed = OUTCOME if objective.of_successes else name
-        known = [r for r in trials if r[STATUS] == "ok" and r.get(needed) is not None]
-        if not known or len(known) < least_ok * len(trials) - 1e-9:
+        known = [r for r in rows if r["status"] == "ok" and r.get(needed) is not None]
+        if not known or len(known) < least_ok * len(rows) - 1e-9:
             return None
         if objective.of_successes:
             known = [r for r in known if r[OUTCOME] == "success" and r.get(name) is not None]
@@ -177,13 +181,13 @@ def worth_of(
     return values_by_name
 
 
-def small(worth: Mapping[str, Value], objectives: Sequence[Objective]) -> list[float]:
+def small(worth: Worth, objectives: Sequence[Objective]) -> list[float]:
     """Objectives as numbers that shall be small; infinity where there is no value."""
     values = [(worth[objective.name].value, objective.sign) for objective in objectives]
     return [math.inf if value is None else sign * value for value, sign in values]
 
 
-def front_of(worths: Sequence[Mapping[str, Value]], objectives: Sequence[Objective]) -> list[bool]:
+def front_of(worths: Sequence[Worth], objectives: Sequence[Objective]) -> list[bool]:
     """Which of some designs are Pareto-optimal, from the values of their objectives."""
     values = np.array([small(worth, objectives) for worth in worths])
     return front(values.reshape(len(worths), len(objectives))).tolist()
