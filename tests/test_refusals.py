@@ -17,7 +17,7 @@ import pytest
 
 NAMES = """
 tunel :: antennate: error: :: did you mean tunnel? :: found tunel
-study desgin :: did you mean design? :: found desgin
+study megre :: did you mean merge? :: found megre
 setup zreo :: did you mean zero? :: found zreo
 log veiw a.mcap :: did you mean view? :: found veiw
 '' :: expected a command :: found ''

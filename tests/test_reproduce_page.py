@@ -120,7 +120,7 @@ def test_runs_with_fitted_numbers_stand_beside(pages: Path, tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
     done = run(pages, str(tmp_path / "other"))
     assert "expected a run of `antennate bench wall --seed 7` or `antennate bench " in done.stderr
-    assert "missing: antennate antenna;" in run(pages, str(tmp_path / "default")).stderr
+    assert "missing: antennate antenna --seed 7;" in run(pages, str(tmp_path / "default")).stderr
     done = run_with_the_wall_alone(pages, str(tmp_path / "fitted"))
     assert done.returncode == 0, done.stderr
     page, index = ((pages / name).read_text() for name in ("reproduce.md", "index.md"))

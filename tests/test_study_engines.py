@@ -260,11 +260,11 @@ def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
 def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Path) -> None:
     """Optuna proposes designs, and does nothing else."""
     pytest.importorskip("optuna")
-    config = StudyConfig()
-    assert packages_used("design", config) == ("optuna",)
-    assert identity("design", config)["versions"]["optuna"] == metadata.version("optuna")
-    assert "optuna" not in identity("study", config)["versions"]
-    theirs = environment("design", config)
+    config = StudyConfig(plan="optuna")
+    assert packages_used("study", config) == ("optuna",)
+    assert identity("study", config)["versions"]["optuna"] == metadata.version("optuna")
+    assert "optuna" not in identity("study", StudyConfig())["versions"]
+    theirs = environment("study", config)
     theirs["versions"]["optuna"] = "0.1"
     with pytest.raises(WorkerError, match=r'optuna "0\.1", now'):
         job_of(tmp_path / "job.jsonl", Work(trial, {}, False, 9.0), theirs).carry_out()
