@@ -1,4 +1,4 @@
-"""An experiment at many points: grid, random, Sobol, Morris, Optuna.
+"""An experiment at points: grid, list, random, Sobol, Morris, Optuna.
 
 FILE is a TOML file that names the experiment, what is varied and how; `studies/` holds ours. The
 folder of a study is continued without being asked: a study that was killed goes on where it was
