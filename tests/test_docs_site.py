@@ -84,11 +84,13 @@ def test_no_line_of_code_is_wider_than_a_page(page: str) -> None:
     assert wide == []
 
 
+@pytest.mark.ci
 def test_no_line_of_code_is_wider_than_a_page_that_is_made() -> None:
     for path in made_pages().values():
         test_no_line_of_code_is_wider_than_a_page(str(path))
 
 
+@pytest.mark.ci
 def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_reference() -> None:
     site = tomllib.loads((DOCS.parent / "zensical.toml").read_text())
 
@@ -112,6 +114,7 @@ def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_ref
     assert dict(menu) == {page: titles[page] for page in dict(menu)}
 
 
+@pytest.mark.ci
 def test_every_command_is_linked_where_the_list_of_commands_begins() -> None:
     begin, *sections = made_pages()["options.md"].read_text().split("\n## ")
     linked = re.findall(r"\[`([\w ]+)`\]\(#antennate-([\w-]+)\)", begin)

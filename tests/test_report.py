@@ -257,7 +257,7 @@ def test_points_of_two_studies_stand_together_by_what_varies() -> None:
 def test_a_run_that_was_stopped_has_a_page() -> None:
     Path("run").mkdir()
     Path("run/command.txt").write_text("antennate bench wall --trials 9\n")
-    lines = [line({"row": i, "values": {"trial": i}}) for i in range(3)]
+    lines = [line({"key": f"row.{i}", "rows": [{"trial": i}]}) for i in range(3)]
     lines[1] = lines[1].replace(b'"trial":1', b'"trial":2')
     Path("run/trials.jsonl").write_bytes(b"".join(lines) + lines[2][:20])
     assert main(["report", "run"]) == 0
