@@ -69,7 +69,7 @@ _BEGINNINGS = ("subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "o
 
 
 def _note_beginning(event: str, args: tuple[Any, ...]) -> None:
-    if event in _BEGINNINGS:
+    if event in _BEGINNINGS and "glfwGetVersion" not in str(args):  # the first import of mujoco
         BEGUN.append(f"{event}{args[1:2] or args}")
 
 
