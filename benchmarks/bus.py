@@ -31,12 +31,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from antennate.dxl.answers import POSITION, Answer, Timing, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.models import XC430_W240, XL330_M288
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
-from antennate.hardware.ports.serial_line import SerialPort
+from dynamixel_bus.answers import POSITION, Answer, Timing, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.faults import Fault, Trouble
+from dynamixel_bus.models import XC430_W240, XL330_M288
+from dynamixel_bus.ports import SerialPort
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import ServoBus
 
 IDS = tuple(range(1, 20))
 BAUD = 1_000_000
@@ -106,7 +107,7 @@ class Master(Protocol):
 
 
 class Ours:
-    """`antennate.dxl`."""
+    """`dynamixel_bus`."""
 
     def __init__(self, path: str) -> None:
         self._line = SerialPort(path, BAUD)

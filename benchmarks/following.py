@@ -18,7 +18,6 @@ import numpy as np
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
-from antennate.dxl.model import FULL_DRIVE
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.following import Following
@@ -26,6 +25,7 @@ from antennate.params.safety import FollowingParams
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, scene_of
 from antennate.types import AntennaFrame, Controller, JointCommand
+from dynamixel_bus.model import FULL_DRIVE
 
 
 class Holding:

@@ -123,8 +123,8 @@ def take(received: dict[int, bytearray], open_ports: set[int], patience: float =
 
 def packets_of(tick: int) -> bytes:
     """What the robot is told in a tick: legs and yaw that swing; each tenth, where they are."""
-    from antennate.dxl import packets
     from antennate.robots.spec import RobotSpec
+    from dynamixel_bus import packets
 
     robot = RobotSpec()
     swing = round(150 * math.sin(2 * math.pi * 0.006 * tick))

@@ -8,15 +8,15 @@ from __future__ import annotations
 import threading
 import time
 
-from antennate.dxl.answers import POSITION, Timing, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.endpoints import TcpEndpoint
-from antennate.dxl.faults import Fault, Trouble
-from antennate.dxl.models import servo_model
-from antennate.dxl.server import Server
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import ServoBus
-from antennate.hardware.ports.network import TcpPort
+from dynamixel_bus.answers import POSITION, Timing, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.endpoints import TcpEndpoint
+from dynamixel_bus.faults import Fault, Trouble
+from dynamixel_bus.models import servo_model
+from dynamixel_bus.ports import TcpPort
+from dynamixel_bus.server import Server
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import ServoBus
 
 IDS = (1, 2, 3)
 MODEL = servo_model("xl430-w250")

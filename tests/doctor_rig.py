@@ -12,11 +12,11 @@ from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Row
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import apply, plan
-from antennate.port import Port
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
+from dynamixel_bus.port import Port
 
 ROBOT = DoctorConfig(robot=stated())
 

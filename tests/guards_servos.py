@@ -9,6 +9,7 @@ from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import serial
 import test_dynamixel_bus as test_bus
 import test_dynamixel_packets as test_packets
 import test_following
@@ -18,15 +19,10 @@ import test_servo_hours
 import test_session
 import test_settings
 import test_turns
-import test_twin_bus
 import test_twin_robot
+import test_virtual_servos
 from guard_tools import Guard, after, around, constant, given, put
-from lockstep import SimulatedWire
 
-from antennate.dxl import bus, inquiry, packets, parser
-from antennate.dxl.answers import PendingRequests, Timing, Value
-from antennate.dxl.model import FULL_DRIVE
-from antennate.dxl.models import XC430_W240
 from antennate.hardware import joints
 from antennate.hardware.driving import connect
 from antennate.hardware.driving import drive as dry_run
@@ -34,11 +30,15 @@ from antennate.hardware.dynamixel import actuators, bringup
 from antennate.hardware.dynamixel import leg_turns as turns
 from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.dynamixel.leg_turns import LegTurns
-from antennate.hardware.ports import serial_line as serial_port
 from antennate.hardware.safety import session, torque
 from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus import bus, inquiry, packets, parser, ports
+from dynamixel_bus.answers import PendingRequests, Timing, Value
+from dynamixel_bus.model import FULL_DRIVE
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 does_wrong = (
     test_following.test_B20_B21_B22_B23_what_a_joint_does_wrong_is_a_fault_in_time_that_names_it
@@ -266,13 +266,13 @@ BUS = [
     ),
     Guard(
         "second program on a port",
-        around(serial_port.serial, "Serial", shared),
+        around(serial, "Serial", shared),
         test_session.test_L15_B16_a_second_program_on_a_port_is_refused,
     ),
     Guard(
         "line that goes away",
-        put(serial_port, "port_errors", constant(contextlib.nullcontext())),
-        test_twin_bus.test_L12_a_line_that_goes_away_is_a_port_error,
+        put(ports, "port_errors", constant(contextlib.nullcontext())),
+        test_virtual_servos.test_L12_a_line_that_goes_away_is_a_port_error,
         by=(OSError,),
     ),
 ]
@@ -476,7 +476,7 @@ SERVOS = [
     ),
     Guard(
         "no torque after half an arming",
-        put(actuators, "AntennateError", ()),
+        put(actuators, "FAILURES", ()),
         partial(
             test_session.test_B10_arming_that_fails_half_way_leaves_no_servo_with_torque, "servo"
         ),

@@ -33,8 +33,8 @@ from antennate.hardware.safety.controller import StepResult, SupervisedControlle
 from antennate.hardware.safety.supervisor import Outputs, Supervisor
 from antennate.hardware.setup.jog import Jog
 from antennate.host import StopOnce
-from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.port import PortError
 
 controller_fails = test_session.test_B8_servos_stop_within_120_ms_when_only_the_controller_fails
 

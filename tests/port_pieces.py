@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 
 class Pieces:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import antennate
-from antennate.dxl.model import POSITION_UNIT
-from antennate.dxl.models import MODELS_BY_NUMBER
-from antennate.dxl.servo import Servo
 from antennate.experiments.servo.result import ServoResult
+from dynamixel_bus.model import POSITION_UNIT
+from dynamixel_bus.models import MODELS_BY_NUMBER
+from dynamixel_bus.servo import Servo
 
 RATE = 250.0
 """Samples a second."""

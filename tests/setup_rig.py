@@ -7,15 +7,14 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from lockstep import SimulatedWire
-
-from antennate.dxl.model import BAUD_RATES
-from antennate.dxl.models import MODELS_BY_NUMBER
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import BadInputError
-from antennate.port import Port
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.model import BAUD_RATES
+from dynamixel_bus.models import MODELS_BY_NUMBER
+from dynamixel_bus.port import Port
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import ServoBus
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 ROBOT = RobotSpec()
 

@@ -9,17 +9,16 @@ import sys
 from collections.abc import Callable
 
 import pytest
+from driven_bench import DRIVEN, DrivenBench
 from manual_tables import BAUD_RATES, NO_LOAD_SPEED, PAGES, STALL_CURRENT, Page
 from servo_bench import (
     ACCESS,
-    DRIVEN,
     INSTRUCTION,
     LIMIT,
     NONE,
     RANGE,
     RESULT_FAIL,
     Bench,
-    DrivenBench,
 )
 
 TURN = 4096

@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from doctor_rig import ROBOT, Patient, wrong
 
-from antennate.dxl.packets import StatusError
-from antennate.dxl.servo import Servo
 from antennate.hardware.doctor import board as board_checks
 from antennate.hardware.doctor.board import BoardSurvey
 from antennate.hardware.doctor.check import grouped, ids_text, latency_row
@@ -18,6 +16,8 @@ from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.ports.errors import OpenError
 from antennate.params.hardware import DoctorParams
+from dynamixel_bus.packets import StatusError
+from dynamixel_bus.servo import Servo
 
 
 def memory(patient: Patient) -> list[dict[str, int]]:

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from antennate.dxl.driven import DrivenServo
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
+from dynamixel_bus.driven import DrivenServo
 
 PWM, CURRENT_POSITION = 16, 5
 BIAS = 70

@@ -11,10 +11,10 @@ import pytest
 from pages import Block, blocks
 from test_servo_clients import served
 
-from antennate.dxl.answers import SILENT, Span, Value
-from antennate.dxl.inquiry import read_some
-from antennate.dxl.models import XL330_M288, XL430_W250, servo_model
 from antennate.twin.servos import read_list
+from dynamixel_bus.answers import SILENT, Span, Value
+from dynamixel_bus.inquiry import read_some
+from dynamixel_bus.models import XL330_M288, XL430_W250, servo_model
 
 BLOCKS: dict[str, list[Block]] = {}
 for _block in blocks("dxl.md"):

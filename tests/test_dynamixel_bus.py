@@ -7,11 +7,14 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from lockstep import SimulatedWire
 from servo_rig import IDS, MODELS, Rig, positions
 
-from antennate.dxl import packets
-from antennate.dxl.answers import (
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.dynamixel.actuators import ServoMonitor
+from antennate.hardware.dynamixel.bringup import BringUpError
+from antennate.hardware.safety import torque
+from dynamixel_bus import packets
+from dynamixel_bus.answers import (
     MOTION,
     POSITION,
     SILENT,
@@ -21,16 +24,13 @@ from antennate.dxl.answers import (
     Timing,
     Value,
 )
-from antennate.dxl.bus import Bus
-from antennate.dxl.models import XL330_M288
-from antennate.dxl.packets import Status, StatusError
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
-from antennate.hardware.dynamixel import bringup
-from antennate.hardware.dynamixel.actuators import ServoMonitor
-from antennate.hardware.dynamixel.bringup import BringUpError
-from antennate.hardware.safety import torque
-from antennate.port import PortError
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.models import XL330_M288
+from dynamixel_bus.packets import Status, StatusError
+from dynamixel_bus.port import PortError
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import Fault, ServoBus, Trouble
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 LIMIT = 0.010 + 1e-9
 TRUE = {i: 100 * i for i in IDS}

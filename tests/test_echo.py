@@ -6,15 +6,15 @@ import pytest
 from doctor_rig import Patient, wrong
 from hypothesis import given
 from hypothesis import strategies as st
-from lockstep import SimulatedWire
 
-from antennate.dxl import packets
-from antennate.dxl.answers import MOTION, SILENT, Echo, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.packets import Status
-from antennate.dxl.servo_bus import ServoBus
 from antennate.robots.spec import RobotSpec
 from antennate.twin.servos import servos_of
+from dynamixel_bus import packets
+from dynamixel_bus.answers import MOTION, SILENT, Echo, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.packets import Status
+from dynamixel_bus.servo_bus import ServoBus
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 IDS = RobotSpec().ids
 GOAL = 116

@@ -24,13 +24,13 @@ from antennate.errors import LogError, reason
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.safety.session import Session
-from antennate.port import PortError
 from antennate.telemetry.reader import LogReader, count
 from antennate.telemetry.simulated import TickLog
 from antennate.telemetry.twin_log import LogQueue
 from antennate.telemetry.writer import LogWriter
 from antennate.twin.config import TwinConfig, watched
 from antennate.types import JointCommand
+from dynamixel_bus.port import PortError
 
 ROOM = 70_000
 """Largest file [byte]: as a disk that is full once the log is as long; the result is shorter."""

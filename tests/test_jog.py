@@ -8,11 +8,11 @@ from itertools import pairwise
 import pytest
 from setup_rig import ROBOT, Box
 
-from antennate.dxl.bus import Bus
 from antennate.hardware.setup.jog import Jog
 from antennate.hardware.setup.person import SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.params.hardware import JogParams
+from dynamixel_bus.bus import Bus
 
 YAW1, LEG = joints_of(ROBOT)[0], joints_of(ROBOT)[5]
 TICK = 2 * math.pi / 4096

@@ -14,7 +14,7 @@ from test_jog import Ready
 from antennate.cli import main, setup
 from antennate.hardware.setup.jog import Jog
 from antennate.hardware.setup.servos import ServoSetup, joints_of
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 Typed = Callable[[], list[str]]
 

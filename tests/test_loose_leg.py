@@ -10,8 +10,6 @@ import pytest
 import servo_rig
 from test_turns import Walk
 
-from antennate.dxl.packets import StatusError
-from antennate.dxl.servo import Servo
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.dynamixel.leg_turns import LegTurns
 from antennate.hardware.joints import Joints
@@ -19,6 +17,8 @@ from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, State
+from dynamixel_bus.packets import StatusError
+from dynamixel_bus.servo import Servo
 
 LEG = 6
 AT = LEG - 1

@@ -18,15 +18,27 @@ from pages import made_pages
 from antennate.errors import MissingPackageError
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "src" / "antennate"
+PACKAGES = [ROOT / "src" / "antennate", *ROOT.glob("packages/*/src/*")]
+OURS = [package.name for package in PACKAGES]
 PAGES = [
     *(p for p in sorted((ROOT / "docs").rglob("*.md")) if p.name != "changelog.md"),
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
+    *ROOT.glob("packages/*/README.md"),
 ]
 """Pages that tell how things are; the changelog tells how they were."""
-FOLDERS = ("src", "docs", "tests", "firmware", "examples", "entries", "studies", "benchmarks")
-BASES = (ROOT, PACKAGE, ROOT / "docs", ROOT / "docs" / "science")
+FOLDERS = (
+    "src",
+    "packages",
+    "docs",
+    "tests",
+    "firmware",
+    "examples",
+    "entries",
+    "studies",
+    "benchmarks",
+)
+BASES = (ROOT, *PACKAGES, ROOT / "docs", ROOT / "docs" / "science")
 """Where the path of a file may begin."""
 FOREIGN = ("cloudpickle", "concurrent", "gc", "gymnasium", "numpy", "scipy", "sys", "websockets")
 """Packages of others that are named with their attributes."""
@@ -61,7 +73,7 @@ CLASS = re.compile(r"[A-Z]\w*[a-z][A-Z]\w*")
 
 
 def trees() -> Iterator[tuple[Path, ast.Module]]:
-    for path in PACKAGE.rglob("*.py"):
+    for path in [p for package in PACKAGES for p in package.rglob("*.py")]:
         yield path, ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -96,7 +108,11 @@ class Index:
         self.types: dict[str, set[str]] = defaultdict(set)
         self.words: set[str] = set()
         for path, tree in trees():
-            parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+            parts = (
+                path.relative_to(next(p for p in path.parents if p.name == "src"))
+                .with_suffix("")
+                .parts
+            )
             *above, name = parts[:-1] if parts[-1] == "__init__" else parts
             self.own[above[-1] if above else ""].add(name)
             self.own[name].update(*map(defined, tree.body))
@@ -132,7 +148,7 @@ class Index:
         """Whether a dotted name is that of something."""
         first, *rest = dotted.split(".")
         first = SHORT.get(first, first)
-        if first == "antennate" or first in FOREIGN:
+        if first in OURS or first in FOREIGN:
             return imported([first, *rest])
         pairs = zip([first, *rest], rest, strict=False)
         return dotted in self.words or all(name in self.under(owner) for owner, name in pairs)
@@ -174,7 +190,7 @@ def files() -> set[str]:
 @functools.cache
 def source() -> str:
     """All that the package says, docstrings too: commands write files by names in it."""
-    return "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    return "\n".join(path.read_text(encoding="utf-8") for path, _ in trees())
 
 
 def is_file(name: str, beside: str) -> bool:

@@ -18,14 +18,14 @@ from esp32_streams import encoded, hello, made
 from stated import STATED
 
 from antennate.cli import main
-from antennate.dxl.endpoints import TcpEndpoint
 from antennate.errors import BadInputError
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample
 from antennate.hardware.ports.finder import finder, read_key
 from antennate.hardware.ports.network import UdpPort
 from antennate.params.hardware import NetworkParams
-from antennate.port import Port, PortError
 from antennate.twin.board import UdpEndpoint
+from dynamixel_bus.endpoints import TcpEndpoint
+from dynamixel_bus.port import Port, PortError
 
 KEY = bytes(range(32))
 

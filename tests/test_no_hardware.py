@@ -35,11 +35,15 @@ COMMANDS = [
     "geometry --help",
     "study merge --help",
 ]
-DATA = {f"antennate.dxl{name}" for name in ("", ".model", ".model_file", ".models")}
+DATA = {
+    "dynamixel_bus",
+    *(f"dynamixel_bus.{name}" for name in ("errors", "files", "messages")),
+    *(f"dynamixel_bus.{name}" for name in ("model", "model_file", "models")),
+}
 """Ratings and registers of servo models; a description of a robot names them."""
 WATCHED = """
 def hardware():
-    rooms = ("antennate.hardware", "antennate.twin", "antennate.port", "antennate.dxl", "serial")
+    rooms = ("antennate.hardware", "antennate.twin", "dynamixel_bus", "serial")
     return [name for name in sys.modules if name.startswith(rooms)]
 """
 

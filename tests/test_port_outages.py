@@ -10,8 +10,6 @@ from lockstep import BoardPort
 from twin_rig import rig
 
 from antennate.control.loop import run_loop
-from antennate.dxl.answers import Timing
-from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare, require_servos
@@ -20,10 +18,12 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.esp32.frame import SAMPLE_FRAME_SIZE
 from antennate.hardware.safety.deadlines import ANSWER
 from antennate.hardware.safety.session import Session
-from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.types import State
+from dynamixel_bus.answers import Timing
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.port import Port, PortError
 
 ARM, OUT, BACK, AGAIN = 0.5, 1.2, 1.7, 2.2
 """When torque comes on, a cable is pulled and put back, and an arm event comes [s]."""

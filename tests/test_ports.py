@@ -24,7 +24,7 @@ from antennate.hardware.esp32.board import Board
 from antennate.hardware.esp32.frame import encode_request
 from antennate.hardware.ports import finder as reconnecting
 from antennate.hardware.ports.finder import RETRY, Reconnecting
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 pytest.importorskip("serial")
 

@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
+PACKAGES = [TESTS.parent / "src" / "antennate", *TESTS.parent.glob("packages/*/src/*")]
+OURS = tuple(package.name for package in PACKAGES)
 PRIVATE = re.compile(r"_[A-Za-z]\w*(?<!_)")
 """Names that end with an underscore, too, are those that notebooks ask for."""
 
 
 def of_the_package() -> set[str]:
     """Private names that occur in the package, or are modules of it."""
-    paths = list((TESTS.parent / "src").rglob("*.py"))
+    paths = [path for package in PACKAGES for path in package.rglob("*.py")]
     words = (re.findall(r"\b_\w+", path.read_text(encoding="utf-8")) for path in paths)
     names = {word for found in words for word in found} | {path.stem for path in paths}
     return {name for name in names if PRIVATE.fullmatch(name)}
@@ -28,7 +30,7 @@ def known_names(tree: ast.Module) -> tuple[set[str], set[str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = {alias.asname or alias.name for alias in node.names}
-            from_us = "antennate" in ast.unparse(node)
+            from_us = any(name in ast.unparse(node) for name in OURS)
             (ours if from_us else modules).update(names)
     return modules, ours
 
@@ -46,7 +48,7 @@ def own_attributes(tree: ast.Module, package: set[str], ours: set[str]) -> Itera
 
 def words_of(node: ast.AST, package: set[str]) -> list[str]:
     """Names in an import, and in a text that may name an attribute to be set."""
-    if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("antennate"):
+    if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(OURS):
         return [*str(node.module).split("."), *(alias.name for alias in node.names)]
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         words = [node.value, *re.findall(r"\w\.(_[A-Za-z]\w*)", node.value)]
@@ -99,6 +101,6 @@ def test_tests_use_no_private_name_of_the_package() -> None:
     package = of_the_package()
     assert [
         f"{path.name}:{node.lineno}: {ast.unparse(node)}"
-        for path in TESTS.glob("*.py")
+        for path in [*TESTS.glob("*.py"), *TESTS.parent.glob("packages/*/tests/*.py")]
         for node in used(ast.parse(path.read_text(encoding="utf-8")), package)
     ] == []

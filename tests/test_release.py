@@ -12,10 +12,6 @@ from servo_rig import Rig as Servos
 from twin_rig import Rig, rig
 
 from antennate.control.loop import run_loop
-from antennate.dxl.answers import SILENT, Answer, Span
-from antennate.dxl.packets import Instruction, StatusError
-from antennate.dxl.parser import Parser
-from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.dynamixel.actuators import ServoMonitor
@@ -23,9 +19,13 @@ from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.causes import Cause
 from antennate.hardware.safety.session import Session
-from antennate.port import PortError
 from antennate.twin.config import TwinConfig
 from antennate.types import State
+from dynamixel_bus.answers import SILENT, Answer, Span
+from dynamixel_bus.packets import Instruction, StatusError
+from dynamixel_bus.parser import Parser
+from dynamixel_bus.port import PortError
+from dynamixel_bus.servo_bus import Fault, Trouble
 
 CONFIG = DriveConfig(dry_run=0.5, duration=0.5)
 TORQUE, GOAL = b"\x40\0", b"\x74\0"

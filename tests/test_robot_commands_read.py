@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from doctor_rig import Patient
-from lockstep import BoardPort, LockstepClock, SimulatedWire
+from lockstep import BoardPort, LockstepClock
 from log_ticks import HEADER
 from recorded import act, leaves, meet_ground, recorded
 from setup_rig import Box, Script
@@ -49,6 +49,7 @@ from antennate.telemetry.feed import Feed
 from antennate.telemetry.replay import ReplayConfig
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 Patch = pytest.MonkeyPatch
 PORTS = {"bus": "the bus", "esp32": "the board"}

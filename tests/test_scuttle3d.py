@@ -21,7 +21,6 @@ from antennate import simulate
 from antennate.cli import main
 from antennate.control.loop import run_loop
 from antennate.control.registry import CONTROLLERS
-from antennate.dxl.bus import Bus
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -39,6 +38,7 @@ from antennate.telemetry.view.player import LogScene
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
 from antennate.types import AntennaFrame, JointCommand, State
+from dynamixel_bus.bus import Bus
 
 ROBOT = RobotSpec.named("scuttle3d")
 PITCH, ELEVATION = ROBOT.places("pitch"), ROBOT.places("elevation")

@@ -11,14 +11,14 @@ from recorded import leaves
 from servo_process import Served, served
 
 from antennate.cli.twin import command
-from antennate.dxl import packets
-from antennate.dxl.parser import Parser
 from antennate.errors import BadInputError, ConfigError
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servos import ServoBox, read_list
+from dynamixel_bus import packets
+from dynamixel_bus.parser import Parser
 
 
 def models(text: str) -> list[tuple[int, int, int]]:

@@ -10,19 +10,19 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from hardware_rig import Ticker
-from lockstep import SimulatedWire
 from servo_rig import IDS, Rig, positions, servos
 
-from antennate.dxl import packets
-from antennate.dxl.answers import POSITION, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.packets import LONGEST, Packet
-from antennate.dxl.parser import Parser
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import ServoBus
 from antennate.hardware.dynamixel.actuators import ServoMonitor
 from antennate.hardware.safety.causes import Cause
 from antennate.types import State
+from dynamixel_bus import packets
+from dynamixel_bus.answers import POSITION, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.packets import LONGEST, Packet
+from dynamixel_bus.parser import Parser
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import ServoBus
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 GOAL = 116
 

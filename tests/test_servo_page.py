@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from test_servo_clients import Moving, served, stub
 
-from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
+from dynamixel_bus.models import XC430_W240, XL330_M288, XL430_W250
 
 PAGE = Path(__file__).parents[1] / "docs" / "twin.md"
 SECTION = PAGE.read_text().partition("\n## Servos without a robot\n")[2]

@@ -12,10 +12,6 @@ from pty_server import PtyServer
 from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
-from antennate.dxl.packets import Instruction, StatusError
-from antennate.dxl.parser import Parser
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import await_board, require_quick, require_servos
@@ -27,7 +23,6 @@ from antennate.hardware.safety.session import Session
 from antennate.host import STOPS
 from antennate.params.control import ControlParams
 from antennate.params.safety import TouchCheckParams
-from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.header import Header
 from antennate.telemetry.replay import replay
@@ -35,6 +30,11 @@ from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
 from antennate.types import AntennaFrame, JointCommand, Maneuver, State
+from dynamixel_bus.packets import Instruction, StatusError
+from dynamixel_bus.parser import Parser
+from dynamixel_bus.port import PortError
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import Fault, Trouble
 
 DRY = 0.3
 """Dry run [s]; long enough for readings to be believed, and torque comes on right after it."""

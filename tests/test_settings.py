@@ -8,10 +8,6 @@ from collections.abc import Callable
 import pytest
 from twin_rig import rig
 
-from antennate.dxl.driven import DrivenServo
-from antennate.dxl.models import XC430_W240
-from antennate.dxl.packets import StatusError
-from antennate.dxl.servo import Servo
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import require_servos
 from antennate.hardware.driving.drive import drive
@@ -20,6 +16,10 @@ from antennate.hardware.safety.session import Session
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
 from antennate.types import State
+from dynamixel_bus.driven import DrivenServo
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.packets import StatusError
+from dynamixel_bus.servo import Servo
 
 COUNTS = math.ceil(1.25 * 4.5 / (0.229 * 2 * math.pi / 60))
 """A quarter more than the 4.5 rad/s of goals, in units of 0.229 rev/min: 235."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from setup_rig import ROBOT, Box, Script, new_servo
 
-from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.doctor.fix import Change
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.setup.person import Quit, SetupError
 from antennate.hardware.setup.servos import Assembly, ServoSetup, joints_of
+from dynamixel_bus.bus import Bus
 
 YAW1, YAW2 = joints_of(ROBOT)[:2]
 LEG = joints_of(ROBOT)[5]

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from setup_rig import ROBOT, Box, Script
 
-from antennate.dxl.bus import Bus
 from antennate.errors import BadInputError
 from antennate.hardware.setup.person import Quit, SetupError
 from antennate.hardware.setup.servos import ServoSetup, joints_of
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group
 from antennate.params.hardware import SetupParams
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.bus import Bus
 
 NAMES = ROBOT.joint_names
 ZEROS = [2048 + 3 * (-1) ** i * i for i in range(19)]

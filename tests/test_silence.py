@@ -15,8 +15,6 @@ from pty_server import PtyServer
 from servo_rig import servos
 from stated import stated
 
-from antennate.dxl.model import EXTENDED_MODE
-from antennate.dxl.servo_bus import ServoBus
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive
@@ -27,6 +25,8 @@ from antennate.hardware.safety.session import Session
 from antennate.host import HostClock, claim, urgent
 from antennate.params.safety import SupervisorParams
 from antennate.twin.serve import Terminal
+from dynamixel_bus.model import EXTENDED_MODE
+from dynamixel_bus.servo_bus import ServoBus
 
 LIMIT = 0.1
 """Time from the last valid sample to the HOLD on the bus [s], as the row says."""

@@ -23,7 +23,6 @@ from log_ticks import HEADER, tick
 
 import antennate
 from antennate.cli import main
-from antennate.dxl import packets
 from antennate.errors import AntennateError, LogError
 from antennate.experiments.gait.experiment import GaitStudyConfig, run
 from antennate.experiments.tunnel.experiment import EXPERIMENT
@@ -41,6 +40,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.telemetry.twin_log import LogQueue
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
+from dynamixel_bus import packets
 
 TICKS = 60
 TURN = 4096

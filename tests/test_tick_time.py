@@ -15,9 +15,9 @@ from antennate.hardware.doctor import bus_checks
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding
 from antennate.hardware.dynamixel.tick_time import ADAPTER, tick_time
-from antennate.port import Port
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig
+from dynamixel_bus.port import Port
 
 ROBOTS = {19: RobotSpec(), 26: RobotSpec.named("scuttle3d")}
 

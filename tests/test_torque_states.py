@@ -10,14 +10,10 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
-from lockstep import SimulatedWire
 from servo_rig import servos
 from soak_rig import SHORTEST, Source
 from torque_writes import GOAL, Written, watch
 
-from antennate.dxl.answers import Timing
-from antennate.dxl.bus import Bus
-from antennate.dxl.servo_bus import Fault, ServoBus, Trouble
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.esp32.board import Board
 from antennate.hardware.joints import Joints
@@ -26,9 +22,13 @@ from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Outputs
 from antennate.params.control import ConditioningParams
-from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver, State
+from dynamixel_bus.answers import Timing
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.port import PortError
+from dynamixel_bus.servo_bus import Fault, ServoBus, Trouble
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 PERIOD = 0.01
 ROBOT = RobotSpec()

@@ -12,9 +12,9 @@ from test_robot_commands_read import RUNS, SHORT, driven
 from test_turns import Walk
 from torque_writes import GOAL, TORQUE, Written, watch
 
-from antennate.dxl.bus import Bus
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.safety import torque
+from dynamixel_bus.bus import Bus
 
 PWM, PROFILE, DOG = 100, 108, 98
 EXPECTED = {

@@ -10,7 +10,6 @@ import pytest
 from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
-from antennate.dxl.servo_bus import Fault, Trouble
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.safety.session import Session
@@ -20,6 +19,7 @@ from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
 from antennate.types import AntennaFrame, JointCommand, State
+from dynamixel_bus.servo_bus import Fault, Trouble
 
 LEGS = slice(5, 17)
 REACH = math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))

@@ -8,10 +8,6 @@ import numpy as np
 import pytest
 from twin_rig import Rig, rig
 
-from antennate.dxl import packets
-from antennate.dxl.faults import Noise
-from antennate.dxl.packets import Instruction
-from antennate.dxl.parser import Parser
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -24,6 +20,10 @@ from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 from antennate.types import State
+from dynamixel_bus import packets
+from dynamixel_bus.faults import Noise
+from dynamixel_bus.packets import Instruction
+from dynamixel_bus.parser import Parser
 
 IDS = RobotSpec().ids
 

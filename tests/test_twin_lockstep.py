@@ -11,14 +11,14 @@ import tty
 import numpy as np
 from lockstep import BoardPort, LockstepClock
 
-from antennate.dxl import packets
-from antennate.dxl.parser import Parser
 from antennate.hardware.esp32.wire import FrameDecoder, Sample
 from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.faults import Faults, read
 from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import TwinServer
+from dynamixel_bus import packets
+from dynamixel_bus.parser import Parser
 
 IDS = RobotSpec().ids
 PERIOD = 0.01

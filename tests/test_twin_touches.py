@@ -13,7 +13,6 @@ from test_drive_processes import ANTENNATE
 from twin_rig import rig
 
 from antennate.antenna.sensor import counts
-from antennate.dxl import packets
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import drive
@@ -21,6 +20,7 @@ from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.board import TouchStimulus
 from antennate.twin.config import TwinConfig
+from dynamixel_bus import packets
 
 ANTENNA = AntennaSpec()
 REST = float(counts(ANTENNA.sensor, np.array(0.0)))

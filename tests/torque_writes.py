@@ -7,13 +7,14 @@ from types import FrameType
 from typing import NamedTuple
 
 import pytest
-from lockstep import SimulatedWire
+
+from dynamixel_bus.simulated_wire import SimulatedWire
 
 WATCHED = {64, 98, *range(100, 120)}
 """Torque enable, bus watchdog, and all goals and profiles (e-manual of the XC430-W240)."""
 TORQUE, GOAL = 64, 116
 _WRITE, _REG_WRITE, _SYNC_WRITE, _BULK_WRITE = 0x03, 0x04, 0x83, 0x93
-_BELOW = {"torque_writes", "lockstep", "antennate.dxl.bus"}
+_BELOW = {"torque_writes", "lockstep", "dynamixel_bus.bus"}
 """Modules below the one that decides what is written."""
 
 

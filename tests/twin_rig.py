@@ -15,8 +15,6 @@ from lockstep import BoardPort, LockstepClock
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
-from antennate.dxl.answers import Timing
-from antennate.dxl.bus import Bus
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
@@ -28,12 +26,14 @@ from antennate.hardware.safety.session import Session
 from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.params.control import ControlParams
 from antennate.params.safety import SupervisorParams, TouchCheckParams
-from antennate.port import Port
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, scene_of
 from antennate.twin.config import TwinConfig, watched
 from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, Robot
+from dynamixel_bus.answers import Timing
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.port import Port
 
 AT_ONCE = SupervisorParams(approach=20.0)
 """Walks as soon as it may, without a slow approach to where its gait begins."""

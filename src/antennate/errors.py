@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import traceback
+from collections.abc import Iterator
 from pathlib import Path
+
+import dynamixel_bus.errors
 
 
 class AntennateError(Exception):
@@ -61,6 +65,21 @@ class MissingPackageError(AntennateError, ImportError):
     """An optional package is needed for this and not installed; the text says how to get it."""
 
 
+FAILURES = (AntennateError, dynamixel_bus.errors.BusError)
+"""What this package and those below it raise on purpose, to be caught together."""
+
+
+@contextlib.contextmanager
+def own_errors() -> Iterator[None]:
+    """Bad input that `dynamixel_bus` refuses, as an error of this package."""
+    try:
+        yield
+    except dynamixel_bus.errors.ConfigError as error:
+        raise ConfigError(str(error)) from None
+    except dynamixel_bus.errors.BadInputError as error:
+        raise BadInputError(str(error)) from None
+
+
 def is_ctrl_c(error: BaseException) -> bool:
     """Whether it may come of Ctrl-C: a worker process ignores that, so there it is of some code."""
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
@@ -97,7 +116,8 @@ def raised(error: BaseException) -> str:
     return f"{in_one_line(error)}{_where(error)}"
 
 
-_OURS, _PYTHON = Path(__file__).parent, Path(traceback.__file__).parent
+_OURS = [Path(module).parent for module in (__file__, dynamixel_bus.errors.__file__)]
+_PYTHON = Path(traceback.__file__).parent
 
 
 def _where(error: BaseException) -> str:
@@ -106,7 +126,8 @@ def _where(error: BaseException) -> str:
     It is the last place outside this package, and outside installed packages if there is one.
     """
     places = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
-    outside = [at for at in places if at[0].is_file() and not at[0].is_relative_to(_OURS)]
+    files = [at for at in places if at[0].is_file()]
+    outside = [at for at in files if not any(map(at[0].is_relative_to, _OURS))]
     installed = [at for at in outside if "site-packages" in at[0].parts]
     own = [at for at in outside if at not in installed and not at[0].is_relative_to(_PYTHON)]
     own = own or installed

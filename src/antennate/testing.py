@@ -12,7 +12,7 @@ import numpy as np
 from antennate.control.gait import targets
 from antennate.control.loop import CheckedController, Wrapped
 from antennate.control.registry import ControllerFactory, make_controller
-from antennate.errors import AntennateError, raised
+from antennate.errors import FAILURES, raised
 from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GRAVITY, PhysicsParams
@@ -142,7 +142,7 @@ class _Runs:
                     getattr(commands[-1], part)[...] = math.nan
                 for name, values in decisions.items():
                     values.append(np.array(getattr(controller, name), float))
-        except AntennateError as error:
+        except FAILURES as error:
             raise AssertionError(f"{error} (with {batch} rows)") from error
         for tick, (command, copies) in enumerate(zip(commands, copies_of, strict=True)):
             if spoil:
@@ -372,7 +372,7 @@ def _checked_model(drawn: SceneInstance, robot: RobotSpec) -> bytes:
         require_room(world)
         world.command(world.drives().copy())
         world.step(_STANDING)
-    except AntennateError as error:
+    except FAILURES as error:
         raise AssertionError(f"expected the robot to stand at the start, found: {error}") from error
     except Exception as error:
         raise AssertionError(f"expected build to work, found: {raised(error)}") from error
@@ -421,7 +421,7 @@ def _ended(drawn: SceneInstance, *heads: Floats) -> str | None:
     try:
         episode = Episode(drawn)
         return [episode.judge.look(head.copy()) for head in heads][-1]
-    except AntennateError as error:
+    except FAILURES as error:
         raise AssertionError(f"expected to be told how a trial ends, found: {error}") from error
 
 

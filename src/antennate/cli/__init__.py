@@ -175,7 +175,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         return BAD_INPUT
     from antennate.cli.arguments import HelpRequest
     from antennate.cli.terminal import write_result
-    from antennate.errors import AntennateError, reason
+    from antennate.errors import FAILURES, reason
     from antennate.messages import one_line, shortened
 
     try:
@@ -190,7 +190,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
     except HelpRequest as page:
         write_result(str(page))
         return OK
-    except AntennateError as error:
+    except FAILURES as error:
         sys.stderr.write(f"{title}: error: {one_line(reason(error))}\n")
         return BAD_INPUT
     except OSError as error:

@@ -19,7 +19,7 @@ from antennate.cli.pages import ViewOptions, say_by_hand, view_of
 from antennate.cli.results import ResultOptions, drawn_table, folder_for, show_result
 from antennate.cli.terminal import progress, stop_signals
 from antennate.errors import (
-    AntennateError,
+    FAILURES,
     BadInputError,
     ConfigError,
     OutputError,
@@ -365,7 +365,7 @@ def _end(
     try:
         keep(experiment, outcome, result, run, figures=not options.no_figures)
     except OutputError:
-        with contextlib.suppress(AntennateError):
+        with contextlib.suppress(*FAILURES):
             show_result(result, options, *_shown(experiment, found), experiment.explained)
         raise
     show_result(result, options, *_shown(experiment, found), experiment.explained)

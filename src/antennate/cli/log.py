@@ -22,7 +22,7 @@ from antennate.cli.pages import MODULE, FoxgloveOptions
 from antennate.cli.results import ResultOptions, log_of, show_result
 from antennate.cli.terminal import progress, stop_signals
 from antennate.control.readings import condition
-from antennate.errors import AntennateError, ConfigError, OutputError
+from antennate.errors import FAILURES, ConfigError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import command_words, one_line, typed
 from antennate.params.base import Params, from_values
@@ -369,7 +369,7 @@ def arena_of(path: Path, header: Header) -> World | None:
         seed = config.seed if header.seed is None else header.seed
         config = config.model_copy(update={"seed": seed})
         return draw_trial(config, scene_of(config), header.trial, gait, period).world
-    except AntennateError:
+    except FAILURES:
         return None  # the log is shown all the same, on a bare floor
 
 

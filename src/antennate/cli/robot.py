@@ -19,7 +19,6 @@ from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.terminal import write
-from antennate.dxl.model import EXTENDED_MODE
 from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.check import same
@@ -34,6 +33,7 @@ from antennate.studies.columns import NONE, Column
 from antennate.studies.formats import to_csv
 from antennate.studies.report import View
 from antennate.studies.tables import Table
+from dynamixel_bus.model import EXTENDED_MODE
 
 USUAL = Path("robot.toml")
 """The robot's file if --config names no other."""

@@ -15,8 +15,6 @@ from antennate.cli.options import option
 from antennate.cli.results import print_table
 from antennate.cli.robot import USUAL, BusOptions, parse_robot, parse_writer, require_bus
 from antennate.cli.terminal import StatusLine, stop_signals, today, write
-from antennate.dxl.bus import Bus
-from antennate.dxl.models import model_name
 from antennate.errors import ConfigError
 from antennate.hardware.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master
@@ -35,6 +33,8 @@ from antennate.host import HostClock, StopOnce
 from antennate.messages import nearest, shortened, typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.tables import Table
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.models import model_name
 
 DESCRIPTION = """\
 Set up the servos of a new robot. First the two ports are found by unplugging one adapter after the

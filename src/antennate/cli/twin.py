@@ -24,7 +24,6 @@ from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import PageOptions, page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
 from antennate.cli.terminal import progress, stop_signals, today, write
-from antennate.dxl.endpoints import Endpoint, TcpEndpoint
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
@@ -46,6 +45,7 @@ from antennate.twin.robot import TwinRobot
 from antennate.twin.serve import ServoServer, TwinServer
 from antennate.twin.servos import ServoBox, ServoEntry, read_list
 from antennate.types import AntennaFrame
+from dynamixel_bus.endpoints import Endpoint, TcpEndpoint
 
 if TYPE_CHECKING:
     from antennate.telemetry.twin_film import TwinFilm

@@ -1,4 +1,4 @@
 """The real world: bytes from the antenna board, bytes to and from the servos.
 
-The only place for `serial`.
+With `dynamixel_bus` the only place for `serial`.
 """

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from antennate.dxl.bus import Tally
 from antennate.errors import AntennateError
 from antennate.hardware.safety.controller import Tracebacks
 from antennate.robots.spec import RobotSpec
 from antennate.types import JointCommand
+from dynamixel_bus.bus import Tally
 
 
 class ActuatorError(AntennateError):

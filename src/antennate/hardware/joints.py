@@ -15,7 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antennate.dxl.model import (
+from antennate.errors import AntennateError
+from antennate.messages import typed
+from antennate.params.hardware import ZerosParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats, Ints, JointCommand
+from dynamixel_bus.model import (
     MOST_TICKS,
     POSITION_UNIT,
     TICKS_A_TURN,
@@ -23,12 +28,7 @@ from antennate.dxl.model import (
     angle_at,
     position_at,
 )
-from antennate.dxl.models import MODELS_BY_NUMBER
-from antennate.errors import AntennateError
-from antennate.messages import typed
-from antennate.params.hardware import ZerosParams
-from antennate.robots.spec import RobotSpec
-from antennate.types import Floats, Ints, JointCommand
+from dynamixel_bus.models import MODELS_BY_NUMBER
 
 _ROOM = 1.25
 """Profile velocity by the fastest that goals move, so that a joint that lags catches up

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from antennate.dxl.model import MOST_TICKS, TICKS_A_TURN
 from antennate.params.base import Params, number
 from antennate.robots.servos import ServoName
+from dynamixel_bus.model import MOST_TICKS, TICKS_A_TURN
 
 STRAIGHT = TICKS_A_TURN // 2
 """Zero of a joint whose zeros are not given: the middle of a turn [ticks]."""

@@ -11,9 +11,9 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-from antennate.dxl.model import Rating, ServoModel
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.model import Rating, ServoModel
 
 PLUG = 3.0
 """Rated current of a contact of the servos' plugs, JST EH [A] (datasheet JST eEH)."""

@@ -1,6 +1,6 @@
 """Servo models: the numbers of a description and how such a servo moves a load.
 
-The numbers and their sources are those of the model files (`dxl.models`), and so are the meanings
+The numbers and their sources are those of the model files (`dynamixel_bus.models`), and so are the meanings
 of a model's fields those of `ServoParams`. In position mode
 
     drive    u = clip(gain (goal - q), -1, 1),   gain = P / divisor · 4096 / 2π / 885
@@ -19,10 +19,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from antennate.dxl.model import ServoModel, position_gain
-from antennate.dxl.models import XC430_W240, XL330_M288, XL430_W250
 from antennate.params.base import Params, number
 from antennate.types import Bools, Floats
+from dynamixel_bus.model import ServoModel, position_gain
+from dynamixel_bus.models import XC430_W240, XL330_M288, XL430_W250
 
 ServoName = Literal["xc430_w240", "xl330_m288", "xl430_w250"]
 

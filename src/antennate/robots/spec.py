@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from antennate import checks
-from antennate.dxl.model import EXTENDED_MODE, POSITION_MODE
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number, read_file
@@ -32,6 +31,7 @@ from antennate.robots.joints import (
 )
 from antennate.robots.servos import ServoName, ServosParams
 from antennate.types import SIDES
+from dynamixel_bus.model import EXTENDED_MODE, POSITION_MODE
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch", "elevation"]
 ROBOTS = ("scuttle", "scuttle3d", "hexapod")

@@ -12,7 +12,7 @@ from pydantic import field_validator, model_validator
 
 from antennate.control.gait import targets
 from antennate.control.readers import unused
-from antennate.errors import AntennateError, ConfigError, SceneError, raised
+from antennate.errors import FAILURES, ConfigError, SceneError, raised
 from antennate.params.base import Params, changes, from_values, number, paths_of
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
@@ -245,7 +245,7 @@ def _errors_of(name: str) -> Iterator[None]:
     """Name the scene in whatever its code raises."""
     try:
         yield
-    except (AntennateError, KeyboardInterrupt):
+    except (*FAILURES, KeyboardInterrupt):
         raise
     except BaseException as error:  # SystemExit too
         raise SceneError(f"scene {name!r} failed: {raised(error)}") from error

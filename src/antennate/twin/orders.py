@@ -20,8 +20,8 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from antennate.dxl.servo import Servo
 from antennate.errors import BadInputError
+from dynamixel_bus.servo import Servo
 
 _CHUNK = 4096
 _WORDS = (

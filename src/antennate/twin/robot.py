@@ -12,9 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from antennate.dxl.faults import Noise
-from antennate.dxl.model import POSITION_UNIT
-from antennate.dxl.servo_bus import ServoBus
 from antennate.errors import SimulationError
 from antennate.hardware.esp32 import frame
 from antennate.hardware.joints import Joints
@@ -27,6 +24,9 @@ from antennate.twin.board import Converter, ImuReadings, TouchStimulus
 from antennate.twin.orders import Plugging, Pushes
 from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
 from antennate.types import AntennaFrame, Floats
+from dynamixel_bus.faults import Noise
+from dynamixel_bus.model import POSITION_UNIT
+from dynamixel_bus.servo_bus import ServoBus
 
 GREETING_PERIOD = 1.0
 """Time between greetings of the board [s], as firmware/main.py."""

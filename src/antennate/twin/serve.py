@@ -8,15 +8,15 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from antennate.dxl.endpoints import Endpoint, Terminal
-from antennate.dxl.server import LONGEST_WAIT, Server
-from antennate.dxl.servo_bus import ServoBus
 from antennate.host import claim
 from antennate.twin.faults import Faults
 from antennate.twin.orders import Orders
 from antennate.twin.robot import TwinRobot
 from antennate.twin.servos import ServoBox
 from antennate.types import Floats
+from dynamixel_bus.endpoints import Endpoint, Terminal
+from dynamixel_bus.server import LONGEST_WAIT, Server
+from dynamixel_bus.servo_bus import ServoBus
 
 _SWITCH = 0.00005
 """Longest time that one thread keeps the other from Python [s]; the physics itself does not."""

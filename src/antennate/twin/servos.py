@@ -6,22 +6,21 @@ A list without a robot is `1:xl330-m288 2:xl430-w250`.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-from antennate.dxl.driven import DrivenServo
-from antennate.dxl.model import BAUD_RATES, POSITION_UNIT
-from antennate.dxl.models import MODELS, servo_model
-from antennate.dxl.servo import Servo
-from antennate.dxl.servo_bus import ServoBus
-from antennate.errors import ConfigError
+from antennate.errors import own_errors
 from antennate.params.base import Params, from_values, number, read_file
 from antennate.params.hardware import BatteryParams
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import RobotSpec
 from antennate.twin.orders import Plugging, Pushes
+from dynamixel_bus import servo_list
+from dynamixel_bus.driven import DrivenServo
+from dynamixel_bus.model import BAUD_RATES, POSITION_UNIT
+from dynamixel_bus.servo import Servo
+from dynamixel_bus.servo_bus import ServoBus
+from dynamixel_bus.servo_list import FACTORY_BAUD, MIDDLE, ListedServo, make_servo
 
 _UNITS_A_VOLT = 10
 QUIET = 0.5
@@ -111,10 +110,9 @@ class Visit:
         return begins
 
 
-MIDDLE = 2048
-"""Position at the angle 0 [ticks]."""
-_FORM = re.compile(
-    r"(?P<id>\d{1,3}):(?P<model>[a-z0-9-]+?|.+?\.toml)(@(?P<baud>\d+))?(x(?P<count>\d{1,3}))?"
+_EXPECTED = (
+    f"--servos: expected {servo_list.FORM}, such as 1:xl330-m288, or a file alone that ends in "
+    ".toml"
 )
 _FACTORY = "datasheet: as delivered"
 
@@ -125,25 +123,20 @@ class ServoEntry(Params):
     model: str = number("xc430-w240", "1", "assumed: the robot's")
     """Model of the servo, or a file with one."""
     id: int = number(1, "1", _FACTORY, ge=0, le=252)
-    """Id of the servo."""
-    baud: int = number(57_600, "bit/s", _FACTORY, gt=0)
-    """Speed of the servo on the bus."""
-    position: float = number(
-        float(MIDDLE), "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575
-    )
-    """Position of the shaft."""
+    """Its id."""
+    baud: int = number(FACTORY_BAUD, "bit/s", _FACTORY, gt=0)
+    """Its speed on the bus."""
+    position: float = number(MIDDLE, "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575)
+    """Where its shaft is."""
     name: str = number("", "1", "assumed: its place in the list")
     """Name of the servo in orders."""
 
     def make(self) -> Servo:
         """The servo."""
-        own = self.model.endswith(".toml")
-        model = servo_model(self.model) if own else _known(self.model, MODELS, "model")
-        most = model["baud_rate"].high or 0
-        codes = {baud: code for code, baud in enumerate(BAUD_RATES[: most + 1])}
-        servo = Servo(model, self.id, self.position)
-        servo.set("baud_rate", _known(self.baud, codes, f"speed of {self.model}"))
-        return servo
+        with own_errors():
+            return make_servo(
+                ListedServo(self.id, self.model, self.baud), self.position, "--servos: "
+            )
 
 
 class ServoList(Params):
@@ -153,17 +146,9 @@ class ServoList(Params):
     """The servos."""
 
 
-def _known(value: Any, known: Mapping[Any, Any], what: str) -> Any:
-    if value not in known:
-        raise ConfigError(
-            f"--servos: expected as {what} one of {', '.join(map(str, known))}, found {value}"
-        )
-    return known[value]
-
-
 def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
     """Servos from `ID:MODEL[@BAUD][xCOUNT]` each, or from one TOML file."""
-    if len(words) == 1 and words[0].endswith(".toml") and not _FORM.fullmatch(words[0]):
+    if len(words) == 1 and words[0].endswith(".toml") and not servo_list.is_listed(words[0]):
         file = Path(words[0])
         return tuple(
             entry.model_copy(update={"model": str(file.parent / entry.model)})
@@ -171,22 +156,9 @@ def read_list(words: Sequence[str]) -> tuple[ServoEntry, ...]:
             else entry
             for entry in read_file(file, ServoList).servo
         )
-    entries: list[dict[str, Any]] = []
-    for word in words:
-        match = _FORM.fullmatch(word)
-        if match is None:
-            raise ConfigError(
-                "--servos: expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, or a file alone "
-                f"that ends in .toml, found {word!r}"
-            )
-        model, count = match["model"], match["count"]
-        if count and not match["baud"] and model not in MODELS and not model.endswith(".toml"):
-            model, count = f"{model}x{count}", None  # the x is part of its name
-        entry: dict[str, Any] = {"id": int(match["id"]), "model": model}
-        if match["baud"]:
-            entry["baud"] = int(match["baud"])
-        entries += [entry] * int(count or 1)
-    return from_values(ServoList, {"servo": entries}).servo
+    with own_errors():
+        listed = servo_list.read_list(words, _EXPECTED)
+    return from_values(ServoList, {"servo": [servo._asdict() for servo in listed]}).servo
 
 
 class ServoBox:

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from antennate.control.knowledge import Kind, Knowing, Knowledge
-from antennate.errors import AntennateError, ConfigError, ControllerError, raised
+from antennate.errors import FAILURES, ConfigError, ControllerError, raised
 from antennate.types import AntennaFrame, Bools, Controller, Floats, Ints, JointCommand
 
 WAITING = 20.0
@@ -342,7 +342,7 @@ def _serve(pipe: socket.socket, make: Callable[[], Controller]) -> None:
                 void = getattr(made, "void_decisions", None)
                 answer = answer, made.maneuver, made.contact, made.level, void
         except BaseException as error:  # noqa: BLE001  (it may raise anything)
-            ours = isinstance(error, AntennateError)
+            ours = isinstance(error, FAILURES)
             wrong = type(error).__name__
             answer = str(error) if ours else f"{name} raised {raised(error)}"
         ended = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -16,13 +16,13 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT
 from antennate.errors import BadInputError
 from antennate.files import decoded, read_limited
 from antennate.messages import shown
 from antennate.params.base import Params, number, require_default
 from antennate.robots.servos import ServoName, ServoParams, ServosParams
 from antennate.types import Bools, Floats
+from dynamixel_bus.model import FULL_DRIVE, POSITION_UNIT
 
 GRAVITY = 9.80665
 FEWEST = 50

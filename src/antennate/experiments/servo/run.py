@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from antennate.dxl.model import FULL_DRIVE
 from antennate.errors import BadInputError
 from antennate.experiments.servo import drive_log, fitting
 from antennate.experiments.servo.recording import (
@@ -36,6 +35,7 @@ from antennate.robots import servos
 from antennate.robots.servos import MODEL_NUMBERS, STEP
 from antennate.studies.trials import OnStep, no_step
 from antennate.types import Bools, Floats
+from dynamixel_bus.model import FULL_DRIVE
 
 _JUDGED = 2
 """The last models of a fit, with both frictions, get intervals; the first of them is shown."""

@@ -6,9 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from statistics import median
 from typing import NamedTuple, get_args
 
-from antennate.dxl.inquiry import FOUND, State
-from antennate.dxl.model import RETURN_DELAY_UNIT, WATCHDOG_UNIT, hardware_errors
-from antennate.dxl.models import MODELS_BY_NUMBER, XC430_W240, model_name
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.bus_survey import BusSurvey
 from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, worst
@@ -16,6 +13,9 @@ from antennate.hardware.dynamixel.bringup import CURE
 from antennate.hardware.dynamixel.tick_time import ADAPTER, tick_time
 from antennate.hardware.joints import settings
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.inquiry import FOUND, State
+from dynamixel_bus.model import RETURN_DELAY_UNIT, WATCHDOG_UNIT, hardware_errors
+from dynamixel_bus.models import MODELS_BY_NUMBER, XC430_W240, model_name
 
 FIX = "run doctor with --fix"
 OFF_AND_ON = "switch the supply of the servos off and on"

@@ -8,18 +8,18 @@ from dataclasses import asdict, dataclass, field
 from statistics import median
 from typing import Any
 
-from antennate.dxl import inquiry, packets
-from antennate.dxl.answers import MOTION, Timing, Value
-from antennate.dxl.bus import PING_DATA, Bus
-from antennate.dxl.inquiry import PINGS, Present
-from antennate.dxl.model import RETURN_DELAY_UNIT
-from antennate.dxl.models import XC430_W240
-from antennate.dxl.packets import OVERHEAD
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.esp32.wire import FrameDecoder
 from antennate.params.hardware import DoctorParams
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus import inquiry, packets
+from dynamixel_bus.answers import MOTION, Timing, Value
+from dynamixel_bus.bus import PING_DATA, Bus
+from dynamixel_bus.inquiry import PINGS, Present
+from dynamixel_bus.model import RETURN_DELAY_UNIT
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.packets import OVERHEAD
 
 _BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 """Bits per second at which servos are usually found."""

@@ -15,7 +15,7 @@ from antennate.hardware.esp32.board import BOARD_BAUD
 from antennate.hardware.ports.errors import OpenError, holders
 from antennate.hardware.ports.finder import finder
 from antennate.params.hardware import DoctorParams, NetworkParams
-from antennate.port import Port
+from dynamixel_bus.port import Port
 
 Grade = Literal["ok", "note", "warn", "bad"]
 Opener = Callable[[int], AbstractContextManager[Port]]

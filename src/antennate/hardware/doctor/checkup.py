@@ -13,7 +13,7 @@ from antennate.hardware.doctor.board import BoardSurvey, survey_board
 from antennate.hardware.doctor.bus_survey import BusSurvey, survey_bus
 from antennate.hardware.doctor.check import Grade, Opener, Row, latency_row, port_row, worst
 from antennate.hardware.esp32.board import BOARD_BAUD
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 
 @dataclass(slots=True)

@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antennate.dxl.bus import Bus
-from antennate.dxl.inquiry import look, read_some
-from antennate.dxl.model import BAUD_RATES
-from antennate.dxl.models import XC430_W240
 from antennate.hardware.doctor.bus_survey import BusSurvey, master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.joints import all_settings, settings_of
 from antennate.hardware.safety import torque
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.inquiry import look, read_some
+from dynamixel_bus.model import BAUD_RATES
+from dynamixel_bus.models import XC430_W240
 
 _ID, _BAUD = "id", "baud_rate"
 _MOVED = (_ID, _BAUD)

@@ -10,10 +10,6 @@ from typing import Any
 
 from antennate.control.knowledge import require_own_senses
 from antennate.control.registry import make_controller
-from antennate.dxl.answers import Timing, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.model import hardware_errors
-from antennate.dxl.models import XC430_W240
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.doctor.check import latency_row
@@ -30,9 +26,13 @@ from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.host import HostClock
 from antennate.messages import typed
 from antennate.params.hardware import DoctorParams
-from antennate.port import Port, PortError
 from antennate.robots.spec import RobotSpec
 from antennate.types import Controller
+from dynamixel_bus.answers import Timing, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.model import hardware_errors
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.port import Port, PortError
 
 _PINGS = 5
 """Number of pings that are timed: two late ones do not move their median (assumed)."""

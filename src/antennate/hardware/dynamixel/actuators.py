@@ -8,11 +8,7 @@ from itertools import cycle
 
 import numpy as np
 
-from antennate.dxl.answers import DRIVE, POSITION, Answer, Span, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.model import hardware_errors
-from antennate.dxl.models import XC430_W240
-from antennate.errors import AntennateError, reason
+from antennate.errors import FAILURES, reason
 from antennate.hardware.actuators import ActuatorState, JointFaults
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.leg_turns import LegTurns
@@ -21,8 +17,12 @@ from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import READ_ALL, READ_ONE, SUPPLY_AGE, WATCHDOG_COUNTS
 from antennate.hardware.safety.following import Following
 from antennate.params.safety import FollowingParams
-from antennate.port import PortError
 from antennate.types import Floats, JointCommand
+from dynamixel_bus.answers import DRIVE, POSITION, Answer, Span, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.model import hardware_errors
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.port import PortError
 
 _ERRORS = Span(XC430_W240["hardware_error_status"].address, 1)
 _WATCHDOG = XC430_W240["bus_watchdog"]
@@ -259,7 +259,7 @@ class DynamixelActuators:
         """
         try:
             self._goals = self._enable(command)
-        except AntennateError:
+        except FAILURES:
             self.disable()
             raise
         self.left_on = []

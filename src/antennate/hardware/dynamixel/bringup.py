@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from antennate.dxl import inquiry
-from antennate.dxl.bus import Bus
-from antennate.dxl.inquiry import Present, State
-from antennate.dxl.model import Register
-from antennate.dxl.models import XC430_W240, model_name
 from antennate.hardware.actuators import ActuatorError
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
+from dynamixel_bus import inquiry
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.inquiry import Present, State
+from dynamixel_bus.model import Register
+from dynamixel_bus.models import XC430_W240, model_name
 
 _READS = 10
 """Tries until a servo is given up that is asked: 1 s, so that a computer which stands still for a

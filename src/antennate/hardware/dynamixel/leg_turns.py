@@ -15,15 +15,15 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
-from antennate.dxl.bus import Bus
-from antennate.dxl.inquiry import read_once
-from antennate.dxl.model import TICKS_A_TURN, Register
-from antennate.dxl.models import XC430_W240
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety import torque
 from antennate.hardware.safety.deadlines import READ_LEG
 from antennate.types import Floats
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.inquiry import read_once
+from dynamixel_bus.model import TICKS_A_TURN, Register
+from dynamixel_bus.models import XC430_W240
 
 _TORQUE = XC430_W240["torque_enable"]
 _PRESENT = XC430_W240["present_position"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antennate.dxl import packets
-from antennate.dxl.answers import DRIVE, POSITION, Span, Timing
-from antennate.dxl.models import XC430_W240
-from antennate.dxl.packets import OVERHEAD
+from dynamixel_bus import packets
+from dynamixel_bus.answers import DRIVE, POSITION, Span, Timing
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.packets import OVERHEAD
 
 ADAPTER = Timing().gap
 """Time of a tick that is left to adapter and computer [s]."""

@@ -16,8 +16,8 @@ from antennate.hardware.esp32.frame import (
     encode_request,
 )
 from antennate.hardware.esp32.wire import FrameDecoder, Hello, Sample, objections
-from antennate.port import Port, PortError
 from antennate.types import Clock, Floats
+from dynamixel_bus.port import Port, PortError
 
 BOARD_BAUD = 115_200
 """Bits per second of the board's port: MicroPython on an ESP32, UART 0."""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 _PROC = Path("/proc")
 _MASTER = "/dev/ptmx"
@@ -67,7 +67,7 @@ class OpenError(PortError):
         self.found, self.cure = found, cure
 
 
-def explain(flag: str, path: str, baud: int, error: Exception) -> OpenError:
+def explain(flag: str, path: str, baud: int, error: BaseException) -> OpenError:
     """The error to raise when a port did not open at so many bits per second.
 
     `flag` is the one that named it, "--esp32" or "--bus", or empty; `error` is what the system or
@@ -76,7 +76,7 @@ def explain(flag: str, path: str, baud: int, error: Exception) -> OpenError:
     return OpenError(flag, path, *_why(path, baud, error))
 
 
-def _why(path: str, baud: int, error: Exception) -> tuple[str, str]:
+def _why(path: str, baud: int, error: BaseException) -> tuple[str, str]:
     number = getattr(error, "errno", None)
     if not Path(path).exists():
         if path.startswith("/dev/pts/"):

@@ -22,7 +22,7 @@ from antennate.errors import BadInputError, ConfigError, reason
 from antennate.files import open_regular
 from antennate.messages import extra
 from antennate.params.hardware import NetworkParams
-from antennate.port import Line, Port, PortError
+from dynamixel_bus.port import Line, Port, PortError
 
 KEY_SIZE = 32
 """As many bytes as SHA-256 gives; more would add nothing."""
@@ -91,7 +91,7 @@ def finder(
         return _serial(address, baud, flag)
     host, port = _place(address, flag)
     if scheme == "tcp":
-        from antennate.hardware.ports.network import TcpPort
+        from dynamixel_bus.ports import TcpPort
 
         return lambda: TcpPort(host, port)
     if scheme != "udp":

@@ -18,23 +18,18 @@ reset the board; wanting both on changes nothing more. Both on it is, said befor
 
 from __future__ import annotations
 
-import termios
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import serial
 from serial.tools import list_ports
 
 from antennate.hardware.ports.errors import explain
-from antennate.port import Port, PortError, port_errors
-
-_FAILURES = (OSError, TypeError, ValueError, termios.error)
-"""What pyserial raises; it lets some through as they are."""
+from dynamixel_bus import ports
+from dynamixel_bus.port import PortError
 
 
-class SerialPort(Port):
+class SerialPort(ports.SerialPort):
     """A serial line, by its device file and bits per second; `flag` named it, for errors.
 
     Raises:
@@ -42,40 +37,11 @@ class SerialPort(Port):
     """
 
     def __init__(self, path: str, baud: int, flag: str = "") -> None:
-        self._path = path
         try:
-            line = serial.Serial(baudrate=baud, timeout=0, write_timeout=0.1, exclusive=True)
-            line.dtr = line.rts = True
-            line.port = path
-            line.open()
-            self._line = line
-        except _FAILURES as error:
-            raise explain(flag, path, baud, error) from error
-
-    def write(self, data: bytes) -> None:
-        """Send all of it."""
-        with self._mapped("write to"):
-            sent = self._line.write(data)
-        if sent != len(data):
-            raise PortError(f"{self._path}: expected to send {len(data)} bytes, sent {sent}")
-
-    def read(self, most: int, timeout: float) -> bytes:
-        """What has come, empty if nothing comes within `timeout` [s]."""
-        with self._mapped("read from"):
-            self._line.timeout = max(timeout, 0.0)
-            first = self._line.read(1)
-            if not first or most == 1:
-                return first
-            self._line.timeout = 0
-            return first + self._line.read(most - 1)
-
-    def close(self) -> None:
-        """Let it go."""
-        with self._mapped("close"):
-            self._line.close()
-
-    def _mapped(self, what: str) -> AbstractContextManager[None]:
-        return port_errors(f"{what} {self._path}", *_FAILURES)
+            super().__init__(path, baud)
+        except PortError as error:
+            cause = error.__cause__ or error
+            raise explain(flag, path, baud, cause) from cause
 
 
 @dataclass(frozen=True, slots=True)

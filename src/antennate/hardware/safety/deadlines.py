@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
-from antennate.dxl.model import WATCHDOG_UNIT
 from antennate.errors import ConfigError
 from antennate.params.safety import SupervisorParams
+from dynamixel_bus.model import WATCHDOG_UNIT
 
 READ_ONE = 0.003
 """Time for one servo asked alone [s]: the rest of the tick (assumed)."""

@@ -23,12 +23,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from antennate.dxl.model import FULL_DRIVE, POSITION_UNIT
 from antennate.hardware.actuators import JointFaults, Margins
 from antennate.hardware.joints import Joints
 from antennate.hardware.safety.deadlines import WATCHDOG
 from antennate.params.safety import FollowingParams
 from antennate.types import Floats
+from dynamixel_bus.model import FULL_DRIVE, POSITION_UNIT
 
 _GOALS = 3
 """Last ticks whose nearest goal counts: one on its way, one lost (assumed)."""

@@ -33,8 +33,8 @@ from antennate.hardware.safety.signal_quality import SignalQuality
 from antennate.hardware.safety.supervisor import Inputs, Outputs, Supervisor
 from antennate.hardware.timing import LoopTiming
 from antennate.params.safety import SupervisorParams
-from antennate.port import PortError
 from antennate.types import AntennaFrame, Clock, Controller, JointCommand, State
+from dynamixel_bus.port import PortError
 
 
 @dataclass(slots=True)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 
-from antennate.dxl import inquiry
-from antennate.dxl.answers import Answer, Span, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.model import EXTENDED_MODE, Register
-from antennate.dxl.models import XC430_W240
 from antennate.hardware.dynamixel.bringup import BringUpError, read_register
 from antennate.hardware.safety.deadlines import READ_LEG, READ_OUTSIDE, WATCHDOG_COUNTS
-from antennate.port import PortError
+from dynamixel_bus import inquiry
+from dynamixel_bus.answers import Answer, Span, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.model import EXTENDED_MODE, Register
+from dynamixel_bus.models import XC430_W240
+from dynamixel_bus.port import PortError
 
 _TRIES = 5
 """Tries to take torque off: at 1 % loss five in a row are one in 10^10 (assumed)."""

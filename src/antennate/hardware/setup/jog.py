@@ -11,10 +11,18 @@ import contextlib
 import math
 from typing import NamedTuple
 
-from antennate.dxl import inquiry
-from antennate.dxl.answers import Answer, Refused, Span, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.model import (
+from antennate.hardware.dynamixel import bringup
+from antennate.hardware.joints import settings, settings_of
+from antennate.hardware.safety import torque
+from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
+from antennate.hardware.setup.person import SetupError
+from antennate.hardware.setup.servos import Joint
+from antennate.params.hardware import JogParams
+from antennate.robots.spec import RobotSpec
+from dynamixel_bus import inquiry
+from dynamixel_bus.answers import Answer, Refused, Span, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.model import (
     TICKS_A_TURN,
     VELOCITY_UNIT,
     WATCHDOG_UNIT,
@@ -23,16 +31,8 @@ from antennate.dxl.model import (
     hardware_errors,
     position_at,
 )
-from antennate.dxl.models import MODELS_BY_NUMBER
-from antennate.hardware.dynamixel import bringup
-from antennate.hardware.joints import settings, settings_of
-from antennate.hardware.safety import torque
-from antennate.hardware.safety.deadlines import JOG_WATCHDOG_COUNTS
-from antennate.hardware.setup.person import SetupError
-from antennate.hardware.setup.servos import Joint
-from antennate.params.hardware import JogParams
-from antennate.port import PortError
-from antennate.robots.spec import RobotSpec
+from dynamixel_bus.models import MODELS_BY_NUMBER
+from dynamixel_bus.port import PortError
 
 _LOST = 10
 """Readings in a row that may fail (assumed)."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from antennate.errors import AntennateError
-from antennate.port import PortError
+from dynamixel_bus.port import PortError
 
 
 class SetupError(AntennateError):

@@ -11,18 +11,18 @@ from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from typing import Literal, NamedTuple
 
-from antennate.dxl.bus import Bus
-from antennate.dxl.inquiry import FOUND, Present, look, read_some
-from antennate.dxl.model import BAUD_RATES
-from antennate.dxl.models import XC430_W240, model_name
 from antennate.hardware.doctor.bus_survey import master
 from antennate.hardware.doctor.check import Opener
 from antennate.hardware.doctor.fix import Change, apply
 from antennate.hardware.dynamixel.bringup import BringUpError
 from antennate.hardware.joints import all_settings, settings_of
 from antennate.hardware.setup.person import Person, SetupError, agrees, confirm
-from antennate.port import PortError
 from antennate.robots.spec import RobotSpec
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.inquiry import FOUND, Present, look, read_some
+from dynamixel_bus.model import BAUD_RATES
+from dynamixel_bus.models import XC430_W240, model_name
+from dynamixel_bus.port import PortError
 
 FACTORY_BAUD = 57_600
 """Speed of a new servo [bit/s]: the manual's default of `baud_rate` in both models."""

@@ -14,10 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from antennate.dxl.answers import POSITION, Value
-from antennate.dxl.bus import Bus
-from antennate.dxl.model import POSITION_UNIT, TICKS_A_TURN
-from antennate.dxl.models import XC430_W240
 from antennate.hardware.safety.deadlines import READ_OUTSIDE
 from antennate.hardware.setup.person import Person, Quit, SetupError
 from antennate.hardware.setup.robot_toml import change
@@ -25,6 +21,10 @@ from antennate.params.hardware import SetupParams, ZerosParams
 from antennate.robots.joints import QUARTER, STRAIGHT
 from antennate.robots.spec import GroupName, RobotSpec
 from antennate.types import Ints
+from dynamixel_bus.answers import POSITION, Value
+from dynamixel_bus.bus import Bus
+from dynamixel_bus.model import POSITION_UNIT, TICKS_A_TURN
+from dynamixel_bus.models import XC430_W240
 
 POSE = (
     "hold the robot straight: links in one line, every leg at mid-stance (ring lowest), both "

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from multiprocessing import parent_process
 from pathlib import Path
 
-from antennate.errors import AntennateError, ConfigError, SceneError, raised
+from antennate.errors import FAILURES, ConfigError, SceneError, raised
 from antennate.lookup import Registry
 from antennate.params.scene import CorridorsParams, CylinderParams, GroundParams, TunnelParams
 from antennate.sim.scenes.corridors import CorridorsScene
@@ -99,7 +99,7 @@ def make_scene(
         return SCENES.find(name)()
     except ConfigError as error:
         raise ConfigError(f"--scene: {error}") from error
-    except AntennateError:
+    except FAILURES:
         raise
     except Exception as error:
         raise SceneError(f"--scene: expected to make {name!r}, found {raised(error)}") from error

@@ -1,0 +1,162 @@
+"""`dynamixel-bus`: virtual DYNAMIXEL servos on a pseudo-terminal or a TCP port."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+from dynamixel_bus import __version__, demands, servo_list
+from dynamixel_bus.demands import Demand
+from dynamixel_bus.endpoints import Endpoint, TcpEndpoint
+from dynamixel_bus.errors import BadInputError, BusError, ConfigError
+from dynamixel_bus.messages import one_line
+from dynamixel_bus.models import MODELS
+from dynamixel_bus.server import Server
+from dynamixel_bus.servo_bus import ServoBus
+
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+"""Exit codes."""
+_LAST_PORT = 65_535
+_DESCRIPTION = f"""\
+Serve virtual DYNAMIXEL servos, which answer any program that speaks Protocol 2.0. Prints one JSON
+line with the path that the program opens, when ready. Ctrl-C ends it.
+
+models: {", ".join(MODELS)}, or a file that ends in .toml
+faults, each with @Ts for its time:
+  servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage,
+    overheat, encoder, shock, overload, reboot, frozen or jump:TICKS (Present Position), none,
+    or REGISTER:VALUE
+  bus=silent, echo, loss:SHARE, latency:SECONDS or ber:SHARE
+"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Words of the command; what is wrong with them is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadInputError(message)
+
+
+class FaultyServer(Server):
+    """A server whose servos fail on demand.
+
+    Args:
+        bus: The servos; only the server touches them.
+        endpoint: The server's end of their wire, a pseudo-terminal by default.
+        faults: What goes wrong, and when.
+
+    Raises:
+        BadInputError: A fault is for a servo that is not there.
+    """
+
+    def __init__(
+        self, bus: ServoBus, endpoint: Endpoint | None = None, faults: Sequence[Demand] = ()
+    ) -> None:
+        self._servos = {servo.get("id"): servo for servo in reversed(bus.servos)}
+        for demand in faults:
+            if demand.target == "servo" and demand.servo not in self._servos:
+                known = ", ".join(map(str, sorted(self._servos)))
+                raise BadInputError(f"--fault: expected a servo of {known}, found {demand.servo}")
+        super().__init__(bus, endpoint)
+        self._waiting = sorted(faults, key=lambda demand: demand.t)
+
+    def _advance(self, now: float) -> None:
+        while self._waiting and self._waiting[0].t <= now:
+            demand = self._waiting.pop(0)
+            if demand.target == "servo":
+                demands.break_servo(self._servos[demand.servo], demand, now)
+            else:
+                demands.break_bus(self._wire, demand)
+        super()._advance(now)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Args:
+        argv: Words after the program's name; those of this process by default.
+
+    Returns:
+        The exit code: 0, 2 after bad input, 130 if interrupted.
+    """
+    try:
+        _serve(_parser().parse_args(argv))
+    except BusError as error:
+        sys.stderr.write(f"dynamixel-bus: error: {one_line(str(error))}\n")
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return OK
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="dynamixel-bus",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "servos", nargs="+", metavar=servo_list.FORM, help="as 1:xl330-m288 2:xl430-w250@1000000"
+    )
+    parser.add_argument("--tcp", metavar="[HOST:]PORT", help="a TCP port, 0 for any that is free")
+    parser.add_argument("--duration", metavar="SECONDS", help="end by itself")
+    parser.add_argument("--fault", metavar="FAULT", nargs="+", default=[], help="what goes wrong")
+    parser.add_argument("--version", action="version", version=__version__)
+    return parser
+
+
+def _serve(given: argparse.Namespace) -> None:
+    duration = _seconds(given.duration)
+    faults = [demands.read(text) for text in given.fault]
+    servos = [servo_list.make_servo(listed) for listed in servo_list.read_list(given.servos)]
+    if not servos:
+        raise ConfigError(f"expected servos, found none in {' '.join(given.servos)}")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with FaultyServer(ServoBus(servos), _endpoint(given.tcp), faults) as server:
+        server.run(_until(duration, server.paths))
+
+
+def _seconds(text: str | None) -> float:
+    """Seconds until the end, inf without one."""
+    if text is None:
+        return math.inf
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise ConfigError(f"--duration: expected seconds above 0, found {text!r}")
+    return seconds
+
+
+def _endpoint(text: str | None) -> Endpoint | None:
+    """The end of the wire, None for a pseudo-terminal."""
+    if text is None:
+        return None
+    host, _, port = text.rpartition(":")
+    if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) > _LAST_PORT:
+        raise ConfigError(
+            f"--tcp: expected [HOST:]PORT with a port of 0 to {_LAST_PORT}, found {text!r}"
+        )
+    return TcpEndpoint(host or "127.0.0.1", int(port))
+
+
+def _until(duration: float, paths: dict[str, str]) -> Callable[[float], bool]:
+    """Whether to go on at a time [s]; the first time it also prints the paths."""
+    ready = False
+
+    def go_on(t: float) -> bool:
+        nonlocal ready
+        if not ready:
+            ready = True
+            sys.stdout.write(json.dumps(paths) + "\n")
+            sys.stdout.flush()
+        return t < duration
+
+    return go_on
