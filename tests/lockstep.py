@@ -16,22 +16,16 @@ class LockstepClock(SimulatedWire):
     """
 
     def __init__(self, robot: TwinRobot, faults: Faults | None = None) -> None:
-        super().__init__(robot.bus)
-        self._robot, self._t = robot, robot.t
-        self._faults = faults or Faults([], ())
+        super().__init__(robot.bus, t=robot.t)
+        self.robot = robot
+        self.faults = faults or Faults([], ())
 
-    def sleep_until(self, t: float) -> None:
-        """Let time pass until t [s], if it has not yet."""
-        if t > self.now():
-            self._until(t)
-
-    def _until(self, t: float) -> None:
-        while self._robot.due <= t + ROUNDING:
-            self._faults.apply(self._robot, self._robot.due)
-            self._robot.advance(self._robot.due)
-        self._robot.advance(t)  # servos move with the physics, not from one byte to the next
-        self._t = t
-        self._collect()
+    def move(self, t: float) -> None:
+        """Servos move with the physics, not from one byte to the next."""
+        while self.robot.due <= t + ROUNDING:
+            self.faults.apply(self.robot, self.robot.due)
+            self.robot.advance(self.robot.due)
+        self.robot.advance(t)
 
 
 class BoardPort:

@@ -1,7 +1,7 @@
 """Servo models: the numbers of a description and how such a servo moves a load.
 
-The numbers and their sources are those of the model files (`dynamixel_bus.models`), and so are the meanings
-of a model's fields those of `ServoParams`. In position mode
+The numbers and their sources are those of the model files (`dynamixel_bus.models`), and so are the
+meanings of a model's fields those of `ServoParams`. In position mode
 
     drive    u = clip(gain (goal - q), -1, 1),   gain = P / divisor · 4096 / 2π / 885
     motor    τ = stall · v · u - stall / no_load_speed · ω

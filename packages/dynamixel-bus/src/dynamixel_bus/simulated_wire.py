@@ -15,12 +15,13 @@ class SimulatedWire(Port):
     Args:
         bus: The servos.
         latency: Time by which the adapter delivers late [s].
+        t: The time at first [s].
     """
 
-    def __init__(self, bus: ServoBus, latency: float = 0.0) -> None:
+    def __init__(self, bus: ServoBus, latency: float = 0.0, t: float = 0.0) -> None:
         self.bus = bus
         self.latency = latency
-        self._t = 0.0
+        self._t = t
         self._came = b""
 
     def now(self) -> float:
@@ -30,6 +31,11 @@ class SimulatedWire(Port):
     def sleep(self, seconds: float) -> None:
         """Let time pass."""
         self._until(self._t + seconds)
+
+    def sleep_until(self, t: float) -> None:
+        """Let time pass until t [s], if it has not yet."""
+        if t > self._t:
+            self._until(t)
 
     def write(self, data: bytes) -> None:
         """Send; takes no time, the wire does."""
@@ -51,9 +57,13 @@ class SimulatedWire(Port):
         count, self._came = len(self._came), b""
         return count
 
-    def _until(self, t: float) -> None:
-        self._t = t
+    def move(self, t: float) -> None:
+        """Let the servos move until t [s]; a subclass may move what hangs on them."""
         self.bus.advance(t)
+
+    def _until(self, t: float) -> None:
+        self.move(t)
+        self._t = t
         self._collect()
 
     def _collect(self) -> None:
