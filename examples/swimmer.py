@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from antennate.mechanics.chain import PlanarChain, purcell
-from antennate.mechanics.coordinates import minimum_perturbation, square
-from antennate.mechanics.curvature import corrected_integral, curvature
-from antennate.mechanics.friction import coulomb_twist
-from antennate.mechanics.optimal import best_stroke, distance, efficiency, small_stroke
-from antennate.mechanics.stroke import displacement, ellipse, path
+from geometric_locomotion.chain import PlanarChain, purcell
+from geometric_locomotion.coordinates import minimum_perturbation, square
+from geometric_locomotion.curvature import corrected_integral, curvature
+from geometric_locomotion.friction import coulomb_twist
+from geometric_locomotion.optimal import best_stroke, distance, efficiency, small_stroke
+from geometric_locomotion.stroke import displacement, ellipse, path
 
 if __name__ == "__main__":
     swimmer = purcell()  # three equal links, 1 long together, drag ratio 2

@@ -21,10 +21,10 @@ from antennate.experiments.geometry.physics import (
 )
 from antennate.experiments.geometry.result import BestLead, Walked
 from antennate.experiments.geometry.torus import Torus
-from antennate.mechanics.twist import Wave
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.robots.mechanics import cycles, peaks, wave_of
 from antennate.robots.spec import RobotSpec
+from geometric_locomotion.twist import Wave
 
 LEADS = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 TINY = [

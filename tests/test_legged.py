@@ -7,8 +7,6 @@ import pytest
 from scipy.optimize import minimize
 
 from antennate.errors import ConfigError
-from antennate.mechanics.legged import Body, Feet, cycle, rolling_feet, twists
-from antennate.mechanics.twist import Wave
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import (
     body_of,
@@ -18,6 +16,8 @@ from antennate.robots.mechanics import (
     wave_of,
 )
 from antennate.robots.spec import RobotSpec
+from geometric_locomotion.legged import Body, Feet, cycle, rolling_feet, twists
+from geometric_locomotion.twist import Wave
 
 ROBOT, GAIT = RobotSpec(), GaitParams()
 

@@ -8,11 +8,12 @@ import pytest
 
 from antennate.control.gait import targets
 from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE, TwistGait
-from antennate.errors import BadInputError, ConfigError
-from antennate.mechanics.twist import TwistMap, Wave
+from antennate.errors import ConfigError
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles, twist_map
 from antennate.robots.spec import RobotSpec
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.twist import TwistMap, Wave
 
 GAIT = GaitParams()
 

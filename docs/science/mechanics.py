@@ -13,15 +13,15 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.experiments.swimmers import swimmer_figure
 from antennate.figures import render
-from antennate.mechanics.chain import PlanarChain, purcell
-from antennate.mechanics.coordinates import minimum_perturbation, square
-from antennate.mechanics.curvature import corrected_integral, velocity_integral
-from antennate.mechanics.friction import coulomb_twist
-from antennate.mechanics.lie import se2_inverse
-from antennate.mechanics.maps import curvature_map
-from antennate.mechanics.optimal import best_stroke, distance, efficiency, small_stroke
-from antennate.mechanics.stroke import Connection, FourierStroke, displacement, ellipse, path
 from antennate.types import Floats
+from geometric_locomotion.chain import PlanarChain, purcell
+from geometric_locomotion.coordinates import minimum_perturbation, square
+from geometric_locomotion.curvature import corrected_integral, velocity_integral
+from geometric_locomotion.friction import coulomb_twist
+from geometric_locomotion.lie import se2_inverse
+from geometric_locomotion.maps import curvature_map
+from geometric_locomotion.optimal import best_stroke, distance, efficiency, small_stroke
+from geometric_locomotion.stroke import Connection, FourierStroke, displacement, ellipse, path
 
 HERE = Path(__file__).parent
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import dynamixel_bus.errors
+import geometric_locomotion.errors
 
 
 class AntennateError(Exception):
@@ -65,7 +66,11 @@ class MissingPackageError(AntennateError, ImportError):
     """An optional package is needed for this and not installed; the text says how to get it."""
 
 
-FAILURES = (AntennateError, dynamixel_bus.errors.BusError)
+FAILURES = (
+    AntennateError,
+    dynamixel_bus.errors.BusError,
+    geometric_locomotion.errors.LocomotionError,
+)
 """What this package and those below it raise on purpose, to be caught together."""
 
 
@@ -116,7 +121,8 @@ def raised(error: BaseException) -> str:
     return f"{in_one_line(error)}{_where(error)}"
 
 
-_OURS = [Path(module).parent for module in (__file__, dynamixel_bus.errors.__file__)]
+_MODULES = (__file__, dynamixel_bus.errors.__file__, geometric_locomotion.errors.__file__)
+_OURS = [Path(file).parent for file in _MODULES]
 _PYTHON = Path(traceback.__file__).parent
 
 

@@ -29,7 +29,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand, Maneuver
 
 if TYPE_CHECKING:
-    from antennate.mechanics.twist import Wave
+    from geometric_locomotion.twist import Wave
 
 NUMBER_RATE = 0.25
 """Largest change of the wave number [1/s]; a second to the other gait, so that legs keep up."""
@@ -43,8 +43,8 @@ _SIZES = ("reverse_time", "reverse_most", "turn_time", "lost_turn", "return_time
 @lru_cache
 def _speeds(robot: str, frequency: float, *waves: Wave) -> tuple[Floats, Floats]:
     """Speed [m/s] and rate of yaw [rad/s] of body waves on a robot, which is given as JSON."""
-    from antennate.mechanics.twist import Wave  # only where the model is asked
     from antennate.robots.mechanics import cycles
+    from geometric_locomotion.twist import Wave  # only where the model is asked
 
     columns = (np.array(part, float) for part in zip(*waves, strict=True))
     gait = GaitParams(frequency=frequency)
@@ -70,7 +70,7 @@ class TwoGaits:
     """
 
     def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
-        from antennate.mechanics.twist import Wave  # only where the model is asked
+        from geometric_locomotion.twist import Wave  # only where the model is asked
 
         if robot.legs.kind != "rolling":
             raise ConfigError("expected a robot with rolling legs, found lifting ones")

@@ -18,7 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats, Ints, JointCommand
 
 if TYPE_CHECKING:
-    from antennate.mechanics.twist import TwistMap
+    from geometric_locomotion.twist import TwistMap
 
 AMPLITUDE_RATE = 0.5
 """Largest change of the amplitude [rad/s]; a second from legs alone to the largest wave."""

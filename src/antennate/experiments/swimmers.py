@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from antennate import figures as style
-from antennate.mechanics.maps import CurvatureMap
-from antennate.mechanics.optimal import Objective
 from antennate.types import Floats
+from geometric_locomotion.maps import CurvatureMap
+from geometric_locomotion.optimal import Objective
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.mechanics.legged import (
+from antennate.params.gaits import GaitParams, LiftParams
+from antennate.params.scene import GRAVITY
+from antennate.robots.servos import ServoParams
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats
+from geometric_locomotion.legged import (
     Body,
     Cycle,
     Feet,
@@ -21,12 +26,7 @@ from antennate.mechanics.legged import (
     rolling_feet,
     twists,
 )
-from antennate.mechanics.twist import TwistMap, Wave
-from antennate.params.gaits import GaitParams, LiftParams
-from antennate.params.scene import GRAVITY
-from antennate.robots.servos import ServoParams
-from antennate.robots.spec import RobotSpec
-from antennate.types import Floats
+from geometric_locomotion.twist import TwistMap, Wave
 
 PHASES = 48
 """Steps of a cycle; 96 change speeds by less than 2 %."""

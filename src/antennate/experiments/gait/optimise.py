@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from antennate.errors import ConfigError
-from antennate.mechanics.twist import Wave
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles, require_wave, wave_of
 from antennate.robots.spec import RobotSpec
 from antennate.types import Bools, Floats
+from geometric_locomotion.twist import Wave
 
 if TYPE_CHECKING:
-    from antennate.mechanics.legged import Cycle
+    from geometric_locomotion.legged import Cycle
 
 Goal = Literal["speed", "cost", "turning"]
 _WAVES = (0.4, 1.5)

@@ -24,7 +24,6 @@ from antennate.experiments.geometry.result import (
     Walked,
 )
 from antennate.experiments.geometry.torus import Torus
-from antennate.mechanics.twist import TwistMap, Wave
 from antennate.robots.mechanics import cycles, peaks, phase_law, wave_of
 from antennate.studies.columns import Frame, shown
 from antennate.studies.experiment import Done, Experiment
@@ -34,6 +33,7 @@ from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.types import Floats
+from geometric_locomotion.twist import TwistMap, Wave
 
 SPEED_R, SPEED_RMSE, YAW_R, LEAD_DEG = 0.96, 0.02, 0.95, 15.0
 """What the model has to reach, set before the first run: correlations, m/s, and degrees."""

@@ -23,11 +23,11 @@ from antennate.experiments.geometry.result import (
 )
 from antennate.experiments.geometry.torus import Torus
 from antennate.experiments.swimmers import swimmer_figure
-from antennate.mechanics.chain import purcell
-from antennate.mechanics.maps import curvature_map
-from antennate.mechanics.twist import TwistMap
 from antennate.studies.columns import Frame, column_of
 from antennate.studies.pooling import frame
+from geometric_locomotion.chain import purcell
+from geometric_locomotion.maps import curvature_map
+from geometric_locomotion.twist import TwistMap
 
 _DASHED = (0, (4, 2))
 

@@ -14,13 +14,13 @@ from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.gait.physics import measure, walk_flat
 from antennate.experiments.geometry.result import Walked
-from antennate.mechanics.twist import TwistMap, Wave
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.mechanics import best_lead, cycles, require_wave, twist_map
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Maneuver
+from geometric_locomotion.twist import TwistMap, Wave
 
 SEED = 2611
 """Seed of the random gaits, written here before their first run."""

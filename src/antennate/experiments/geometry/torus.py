@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.mechanics.twist import Wave
 from antennate.robots.mechanics import phase_twists
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
+from geometric_locomotion.twist import Wave
 
 _NUDGE = 0.05
 """Change of a rate for its slope."""

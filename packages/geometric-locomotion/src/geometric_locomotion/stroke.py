@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import alike, called, numbers, sampled, whole
-from antennate.mechanics.lie import se2_bracket, se2_exp, se2_pose
-from antennate.types import Floats
+from geometric_locomotion.arguments import alike, called, numbers, sampled, whole
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.lie import se2_bracket, se2_exp, se2_pose
+from geometric_locomotion.types import Floats
 
 Stroke = Callable[[Floats], tuple[Floats, Floats]]
 Connection = Callable[[Floats], Floats]

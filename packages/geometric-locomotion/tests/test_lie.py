@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
-from antennate.mechanics import lie
-from antennate.types import Floats
+from geometric_locomotion import lie
+from geometric_locomotion.types import Floats
 
 ANGLES = (0.0, 1e-12, 1e-8, 1e-4, 0.0199, 0.0201, 0.5, 2.0, 3.0, np.pi - 1e-4, np.pi - 1e-9)
 """Turns [rad]: near zero, on both sides of the place where the series ends, near pi."""

@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-import antennate.mechanics
-from antennate.errors import BadInputError
-from antennate.mechanics import lie
-from antennate.mechanics.chain import PlanarChain, purcell
-from antennate.mechanics.coordinates import minimum_perturbation, square
-from antennate.mechanics.curvature import (
+import geometric_locomotion
+from geometric_locomotion import lie
+from geometric_locomotion.chain import PlanarChain, purcell
+from geometric_locomotion.coordinates import minimum_perturbation, square
+from geometric_locomotion.curvature import (
     corrected_integral,
     curvature,
     exterior_derivative,
     gradient,
     velocity_integral,
 )
-from antennate.mechanics.friction import coulomb_power, coulomb_twist
-from antennate.mechanics.maps import curvature_map
-from antennate.mechanics.optimal import best_stroke, distance, efficiency, effort, small_stroke
-from antennate.mechanics.stroke import FourierStroke, displacement, ellipse, path, polygon
-from antennate.mechanics.twist import TwistMap
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.friction import coulomb_power, coulomb_twist
+from geometric_locomotion.maps import curvature_map
+from geometric_locomotion.optimal import best_stroke, distance, efficiency, effort, small_stroke
+from geometric_locomotion.stroke import FourierStroke, displacement, ellipse, path, polygon
+from geometric_locomotion.twist import TwistMap
 
 CHAIN, LOOP = purcell(), ellipse([0.3, 0.0], [0.0, 0.3])
 A, V, NAN = CHAIN.connection, CHAIN.twist, math.nan
@@ -153,10 +153,10 @@ def test_a_bad_argument_is_refused_by_its_name_in_one_line(what: str, name: str,
 
 def test_every_public_name_is_asked() -> None:
     source = Path(__file__).read_text().partition("HELD_BY_OTHERS")[0].partition("ROWS = [")[2]
-    for file in Path(antennate.mechanics.__file__).parent.glob("[a-z]*.py"):
-        if file.stem in HELD_BY_OTHERS:
+    for file in Path(geometric_locomotion.__file__).parent.glob("[a-z]*.py"):
+        if file.stem in (*HELD_BY_OTHERS, "errors"):
             continue
-        module = importlib.import_module(f"antennate.mechanics.{file.stem}")
+        module = importlib.import_module(f"geometric_locomotion.{file.stem}")
         own = [
             name
             for name, each in vars(module).items()

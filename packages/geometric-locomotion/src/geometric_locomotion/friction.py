@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.mechanics.arguments import alike, numbers, whole
-from antennate.mechanics.chain import PlanarChain
-from antennate.types import Floats
+from geometric_locomotion.arguments import alike, numbers, whole
+from geometric_locomotion.chain import PlanarChain
+from geometric_locomotion.types import Floats
 
 _SMOOTHING = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Speeds s, one after the other, of the chain's length times its joint rates."""

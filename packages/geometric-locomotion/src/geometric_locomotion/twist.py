@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import numbers, scalar, whole
-from antennate.types import Floats
+from geometric_locomotion.arguments import numbers, scalar, whole
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.types import Floats
 
 
 class Wave(NamedTuple):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from antennate.mechanics import lie
-from antennate.mechanics.chain import PlanarChain
-from antennate.mechanics.friction import coulomb_power, coulomb_twist
-from antennate.mechanics.stroke import FourierStroke, displacement, path
-from antennate.types import Floats
+from geometric_locomotion import lie
+from geometric_locomotion.chain import PlanarChain
+from geometric_locomotion.friction import coulomb_power, coulomb_twist
+from geometric_locomotion.stroke import FourierStroke, displacement, path
+from geometric_locomotion.types import Floats
 
 
 def shapes_and_rates(chain: PlanarChain, count: int, seed: int) -> tuple[Floats, Floats]:

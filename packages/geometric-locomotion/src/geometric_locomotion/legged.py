@@ -24,8 +24,8 @@ from typing import Protocol
 
 import numpy as np
 
-from antennate.mechanics.lie import se2_exp
-from antennate.types import Floats, Ints
+from geometric_locomotion.lie import se2_exp
+from geometric_locomotion.types import Floats, Ints
 
 GIVE = 2e-5
 """How far one foot that bears the whole weight sinks in [m]: as good as rigid."""

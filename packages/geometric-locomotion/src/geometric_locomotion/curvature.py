@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.mechanics.arguments import called, numbers, sampled, whole
-from antennate.mechanics.lie import se2_bracket
-from antennate.mechanics.stroke import Connection, Stroke
-from antennate.types import Floats
+from geometric_locomotion.arguments import called, numbers, sampled, whole
+from geometric_locomotion.lie import se2_bracket
+from geometric_locomotion.stroke import Connection, Stroke
+from geometric_locomotion.types import Floats
 
 _STEP = 2e-3
 """Step [rad] of the differences; their error falls with its fourth power."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.errors import BadInputError
-from antennate.types import Floats
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.types import Floats
 
 
 def numbers(name: str, value: Any, *last: int | None, above: float = -np.inf) -> Floats:

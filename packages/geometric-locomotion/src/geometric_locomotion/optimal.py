@@ -14,12 +14,12 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import minimize
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import sampled, scalar, whole
-from antennate.mechanics.chain import PlanarChain
-from antennate.mechanics.curvature import curvature
-from antennate.mechanics.stroke import FourierStroke, Stroke, displacement
-from antennate.types import Floats
+from geometric_locomotion.arguments import sampled, scalar, whole
+from geometric_locomotion.chain import PlanarChain
+from geometric_locomotion.curvature import curvature
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.stroke import FourierStroke, Stroke, displacement
+from geometric_locomotion.types import Floats
 
 Objective = Literal["distance", "efficiency"]
 Goal = Callable[[PlanarChain, Stroke], float]

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import scalar, whole
-from antennate.mechanics.chain import PlanarChain
-from antennate.mechanics.coordinates import minimum_perturbation, square
-from antennate.mechanics.curvature import corrected_integral, curvature
-from antennate.mechanics.optimal import (
+from geometric_locomotion.arguments import scalar, whole
+from geometric_locomotion.chain import PlanarChain
+from geometric_locomotion.coordinates import minimum_perturbation, square
+from geometric_locomotion.curvature import corrected_integral, curvature
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.optimal import (
     Objective,
     best_stroke,
     distance,
     efficiency,
 )
-from antennate.mechanics.stroke import FourierStroke, ellipse
-from antennate.types import Floats
+from geometric_locomotion.stroke import FourierStroke, ellipse
+from geometric_locomotion.types import Floats
 
 _REGION = 2.2
 """Half-width of the square in which the body frame is fitted [rad]: that of the best strokes."""

@@ -10,35 +10,33 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from antennate.errors import BadInputError
-from antennate.experiments.swimmers import swimmer_figure
-from antennate.figures import render
-from antennate.mechanics import lie
-from antennate.mechanics.chain import PlanarChain, purcell
-from antennate.mechanics.coordinates import minimum_perturbation, square
-from antennate.mechanics.curvature import (
+from geometric_locomotion import lie
+from geometric_locomotion.chain import PlanarChain, purcell
+from geometric_locomotion.coordinates import minimum_perturbation, square
+from geometric_locomotion.curvature import (
     corrected_integral,
     curvature,
     exterior_derivative,
     gradient,
     velocity_integral,
 )
-from antennate.mechanics.maps import CurvatureMap, curvature_map
-from antennate.mechanics.optimal import (
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.maps import CurvatureMap, curvature_map
+from geometric_locomotion.optimal import (
     best_stroke,
     distance,
     efficiency,
     effort,
     small_stroke,
 )
-from antennate.mechanics.stroke import (
+from geometric_locomotion.stroke import (
     FourierStroke,
     displacement,
     ellipse,
     path,
     polygon,
 )
-from antennate.types import Floats
+from geometric_locomotion.types import Floats
 
 ARC, ZIGZAG = np.array([1.0, 1.0]) / math.sqrt(2), np.array([1.0, -1.0]) / math.sqrt(2)
 PUBLISHED = FourierStroke(
@@ -354,15 +352,6 @@ def test_the_farthest_stroke_follows_the_line_of_no_curvature(maps: CurvatureMap
     values = curvature(frame.change(purcell().connection), loop)[:, 0, 0, 1]
     assert np.abs(values).max() < 0.15 * 5 / 243
     assert np.abs(curvature(purcell().connection, loop)[:, 0, 0, 1]).max() > 0.5 * 5 / 243
-
-
-def test_the_figure_shows_both_frames_and_both_strokes(maps: CurvatureMap) -> None:
-    figure = swimmer_figure(maps)
-    first, second, sizes, bar = figure.axes[0], figure.axes[1], figure.axes[-1], figure.axes[2]
-    assert [len(panel.lines) for panel in (first, second)] == [2, 2]
-    assert len(sizes.lines) == 3
-    assert "rad²" in bar.get_xlabel()
-    assert render(figure)["png"].startswith(b"\x89PNG")
 
 
 @functools.cache

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import called, numbers, scalar, whole
-from antennate.mechanics.lie import se2_adjoint, se2_inverse, se2_pose
-from antennate.mechanics.stroke import Connection
-from antennate.types import Floats, Ints
+from geometric_locomotion.arguments import called, numbers, scalar, whole
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.lie import se2_adjoint, se2_inverse, se2_pose
+from geometric_locomotion.stroke import Connection
+from geometric_locomotion.types import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.errors import BadInputError
-from antennate.mechanics.arguments import alike, numbers, scalar, whole
-from antennate.types import Floats
+from geometric_locomotion.arguments import alike, numbers, scalar, whole
+from geometric_locomotion.errors import BadInputError
+from geometric_locomotion.types import Floats
 
 
 @dataclass(frozen=True)

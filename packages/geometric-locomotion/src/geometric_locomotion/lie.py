@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from antennate.mechanics.arguments import alike, numbers
-from antennate.types import Floats
+from geometric_locomotion.arguments import alike, numbers
+from geometric_locomotion.types import Floats
 
 _SERIES = 0.02
 """Below this angle [rad] a series is used where the closed form loses digits."""

@@ -1,0 +1,148 @@
+"""Each distribution alone: one version for all; each builds, installs and runs its example."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import antennate
+import dynamixel_bus
+import geometric_locomotion
+
+ROOT = Path(__file__).parents[1]
+ROOMS = {
+    "dynamixel-bus": {"numpy"},
+    "geometric-locomotion": {"numpy", "scipy"},
+}
+"""Distributions in the folder `packages`, and all that is in an environment with one of them."""
+EXAMPLE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SDK = """
+import json, subprocess, sys
+from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler, port_handler
+
+port_handler.LATENCY_TIMER = 500  # a busy computer
+words = [f"{i}:xc430-w240" if i < 18 else f"{i}:xl330-m288" for i in range(1, 20)]
+with subprocess.Popen([sys.argv[1], *words, "--duration", "60"], stdout=subprocess.PIPE) as bus:
+    port = PortHandler(json.loads(bus.stdout.readline())["bus"])
+    assert port.openPort() and port.setBaudRate(57_600)
+    found, result = PacketHandler(2.0).broadcastPing(port)
+    assert result == COMM_SUCCESS, result
+    print(sorted((i, model) for i, (model, _) in found.items()))
+    port.closePort()
+    bus.kill()
+"""
+
+
+def project(room: str) -> dict[str, object]:
+    folder = ROOT / "packages" / room if room else ROOT
+    return tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+
+
+def first_example(room: str) -> str:
+    text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
+    return EXAMPLE.findall(text)[0]
+
+
+def done(*words: object, folder: Path | None = None) -> str:
+    """What a program prints."""
+    ran = subprocess.run(
+        [str(word) for word in words], capture_output=True, text=True, cwd=folder, timeout=600
+    )
+    assert ran.returncode == 0, f"{words}: {ran.stdout[-1000:]}{ran.stderr[-2000:]}"
+    return ran.stdout
+
+
+@pytest.fixture(scope="module")
+def uv() -> str:
+    found = os.environ.get("UV") or shutil.which("uv")
+    if not found:
+        pytest.skip("uv builds and installs here")
+    return found
+
+
+def environment(uv: str, folder: Path, *installed: object) -> Path:
+    """The folder of programs of a new environment with these."""
+    done(uv, "venv", "--python", sys.executable, folder)
+    done(uv, "pip", "install", "--python", folder / "bin" / "python", *installed, folder=folder)
+    return folder / "bin"
+
+
+def packages_of(uv: str, programs: Path) -> set[str]:
+    listed = done(uv, "pip", "freeze", "--python", programs / "python", folder=programs)
+    return {re.split(r"==| @ ", line)[0] for line in listed.splitlines()}
+
+
+def test_all_have_one_version() -> None:
+    """The version of `antennate` is that of the others, which it asks for."""
+    version = antennate.__version__
+    assert dynamixel_bus.__version__ == geometric_locomotion.__version__ == version
+    needed = project("")["dependencies"]
+    assert isinstance(needed, list)
+    assert {f"{room}=={version}" for room in ROOMS} <= set(needed)
+    assert {path.name for path in (ROOT / "packages").iterdir()} == set(ROOMS)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_readme_says_in_ten_lines_what_it_is(room: str) -> None:
+    text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
+    assert text.startswith(f"# {room}\n")
+    head = text.partition("```python")[0].strip().splitlines()
+    assert len([line for line in head[1:] if line]) <= 10
+
+
+def test_purcells_swimmer_takes_eight_lines() -> None:
+    lines = [line for line in first_example("geometric-locomotion").splitlines() if line]
+    assert len(lines) == 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["whl", "tar.gz"])
+@pytest.mark.parametrize("room", ROOMS)
+def test_one_alone_runs_its_first_example(room: str, kind: str, uv: str, tmp_path: Path) -> None:
+    """From the sdist, too, a wheel is made, and nothing of the others is there."""
+    built = tmp_path / "built"
+    form = "--wheel" if kind == "whl" else "--sdist"
+    done(uv, "build", form, ROOT / "packages" / room, "--out-dir", built)
+    (file,) = built.glob(f"*.{kind}")
+    programs = environment(uv, tmp_path / "alone", file)
+    assert packages_of(uv, programs) == {room, *ROOMS[room]}
+    script = tmp_path / "example.py"
+    script.write_text(first_example(room), encoding="utf-8")
+    said = done(programs / "python", "-W", "error", script, folder=tmp_path)
+    expected = {"dynamixel-bus": "{1: 2500, 2: 2048}\n", "geometric-locomotion": "farthest: 0.1035"}
+    assert expected[room] in said
+    if room == "dynamixel-bus":
+        assert done(programs / room, "--version") == f"{antennate.__version__}\n"
+
+
+@pytest.mark.slow
+def test_the_official_sdk_finds_nineteen_servos_of_the_bus_alone(uv: str, tmp_path: Path) -> None:
+    """Model numbers are those of the manual: 1080 of the XC430-W240, 1200 of the XL330-M288."""
+    programs = environment(
+        uv, tmp_path / "alone", ROOT / "packages" / "dynamixel-bus", "dynamixel-sdk"
+    )
+    assert packages_of(uv, programs) == {"dynamixel-bus", "dynamixel-sdk", "numpy", "pyserial"}
+    said = done(programs / "python", "-c", SDK, programs / "dynamixel-bus", folder=tmp_path)
+    models = [(i, 1080 if i <= 17 else 1200) for i in range(1, 20)]
+    assert said == f"{models}\n"
+
+
+@pytest.mark.slow
+def test_pip_installs_all_of_them(tmp_path: Path) -> None:
+    """As docs/install.md says it, without uv."""
+    done(sys.executable, "-m", "venv", tmp_path / "all")
+    programs = tmp_path / "all" / "bin"
+    rooms = sorted((ROOT / "packages").iterdir())
+    done(programs / "pip", "install", "--quiet", *rooms, ROOT, folder=tmp_path)
+    said = done(programs / "antennate", "tunnel", "--help", folder=tmp_path)
+    assert said.startswith("usage: antennate tunnel")
+    for word in ("dynamixel_bus", "geometric_locomotion", "antennate"):
+        place = f"import {word}; print({word}.__file__)"
+        assert str(tmp_path) in done(programs / "python", "-c", place, folder=tmp_path)
