@@ -19,21 +19,22 @@ What breaks, what must happen then, what happened, and which test shows it. Noth
 measured on a real servo or board: faults are injected into the bytes of the [twin](twin.md), or
 into invented time. A row without a test is not shown yet. `tests/test_guards.py` lists every guard
 between bytes and motion, switches each off alone, and sees a test fail. The last column counts the
-tests that have the row in their name; `grep -rnE 'test_(\\w+_)?L1_' tests` finds those of L1. The
-column `measured` is written by hand from their runs and those of `benchmarks/`.
+tests that have the row in their name; `grep -rnE 'test_(\\w+_)?L1_' tests packages` finds those of
+L1. The column `measured` is written by hand from their runs and those of `benchmarks/`.
 
 {count}
 
 | row | fault | required | measured | tests |
 |---|---|---|---|---|
 """
+FOLDERS = (ROOT.parent / "tests", *ROOT.parent.glob("packages/*/tests"))
 _TEST = re.compile(r"^(?:def )?test_((?:[LESTBGKMWX]\d+_)+)", re.MULTILINE)
 
 
 def shown() -> dict[str, dict[str, int]]:
     """How many tests of which file show a row."""
     found: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
-    for path in sorted((ROOT.parent / "tests").glob("test_*.py")):
+    for path in [p for tests in FOLDERS for p in sorted(tests.glob("test_*.py"))]:
         for match in _TEST.finditer(path.read_text()):
             for row in match[1].strip("_").split("_"):
                 found[row][path.name] += 1

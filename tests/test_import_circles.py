@@ -5,18 +5,23 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import antennate
+import dynamixel_bus
+import geometric_locomotion
 
-ROOT = Path(antennate.__file__).parent
+ROOTS = [
+    Path(str(room.__file__)).parent for room in (antennate, dynamixel_bus, geometric_locomotion)
+]
 SOURCES = {
-    ".".join(("antennate", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(
+    ".".join((root.name, *path.relative_to(root).with_suffix("").parts)).removesuffix(
         ".__init__"
     ): path
-    for path in ROOT.rglob("*.py")
+    for root in ROOTS
+    for path in root.rglob("*.py")
 }
 
 
 def imported(path: Path) -> set[str]:
-    """Modules of this package that a file imports anywhere."""
+    """Modules of our packages that a file imports anywhere."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
