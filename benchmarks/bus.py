@@ -56,7 +56,7 @@ def serve(pipe: Connection) -> None:
     servos = [Servo(XC430_W240 if i <= 17 else XL330_M288, i, 100.0 * i) for i in IDS]
     for servo in servos:
         servo.set("return_delay_time", 0)
-    sys.path.append(str(Path(__file__).parents[1] / "tests"))
+    sys.path.append(str(Path(__file__).parents[1] / "packages" / "dynamixel-bus" / "tests"))
     server_of = import_module("pty_server").PtyServer
     with server_of(ServoBus(servos)) as server:
         pipe.send(server.path)

@@ -1,6 +1,6 @@
 """How many files a reader passes through: `python benchmarks/walks.py [--files]`.
 
-Three walks through `src/`, by what Python really enters (`sys.setprofile`):
+Three walks through our packages, by what Python really enters (`sys.setprofile`):
 
 - *tick*: one tick of `drive` before the twin in lock-step, from a reading to the goals of all
   servos; what stands behind the two ports is left out;
@@ -24,8 +24,9 @@ from types import FrameType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-SOURCE = str(ROOT / "src" / "antennate") + "/"
-WIRES = str(ROOT / "tests" / "lockstep.py")
+PACKAGES = [ROOT / "src" / "antennate", *ROOT.glob("packages/*/src/*")]
+SOURCES = tuple(f"{package}/" for package in PACKAGES)
+WIRES = ("lockstep.py", "simulated_wire.py")
 TICK = 150
 """The tick that is looked at: the robot walks."""
 SHORT = ("--trials", "1", "--seed", "5", "--time-limit", "3", "--workers", "1", "--no-figures")
@@ -47,8 +48,8 @@ class Walk:
         if event == "call":
             if self._below or self._skip(frame):
                 self._below += 1
-            elif frame.f_code.co_filename.startswith(SOURCE):
-                self.files.append(frame.f_code.co_filename.removeprefix(SOURCE))
+            elif frame.f_code.co_filename.startswith(SOURCES):
+                self.files.append(frame.f_code.co_filename.rpartition("/src/")[2])
         elif event == "return" and self._below:
             self._below -= 1
 
@@ -92,7 +93,7 @@ def tick() -> Walk:
     orders = DriveConfig(
         controller="closed", dry_run=0.5, touch_check=False, robot=known, duration=5.0
     )
-    walk = Walk(lambda frame: frame.f_code.co_filename == WIRES)
+    walk = Walk(lambda frame: Path(frame.f_code.co_filename).name in WIRES)
     ticks = 0
 
     def on_tick(session: Any, now: float) -> None:
