@@ -17,6 +17,8 @@ import dynamixel_bus
 import geometric_locomotion
 
 ROOT = Path(__file__).parents[1]
+OWN = ROOT
+"""Folder of `antennate` itself."""
 ROOMS = {
     "dynamixel-bus": {"numpy"},
     "geometric-locomotion": {"numpy", "scipy"},
@@ -38,11 +40,6 @@ with subprocess.Popen([sys.argv[1], *words, "--duration", "60"], stdout=subproce
     port.closePort()
     bus.kill()
 """
-
-
-def project(room: str) -> dict[str, object]:
-    folder = ROOT / "packages" / room if room else ROOT
-    return tomllib.loads((folder / "pyproject.toml").read_text())["project"]
 
 
 def first_example(room: str) -> str:
@@ -83,8 +80,7 @@ def test_all_have_one_version() -> None:
     """The version of `antennate` is that of the others, which it asks for."""
     version = antennate.__version__
     assert dynamixel_bus.__version__ == geometric_locomotion.__version__ == version
-    needed = project("")["dependencies"]
-    assert isinstance(needed, list)
+    needed = tomllib.loads((OWN / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {f"{room}=={version}" for room in ROOMS} <= set(needed)
     assert {path.name for path in (ROOT / "packages").iterdir()} == set(ROOMS)
 
@@ -120,6 +116,21 @@ def test_one_alone_runs_its_first_example(room: str, kind: str, uv: str, tmp_pat
     assert expected[room] in said
     if room == "dynamixel-bus":
         assert done(programs / room, "--version") == f"{antennate.__version__}\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["whl", "tar.gz"])
+def test_antennate_runs_its_first_example_beside_the_others(
+    kind: str, uv: str, tmp_path: Path
+) -> None:
+    built = tmp_path / "built"
+    done(uv, "build", "--wheel" if kind == "whl" else "--sdist", OWN, "--out-dir", built)
+    (file,) = built.glob(f"antennate-*.{kind}")
+    others = [ROOT / "packages" / room for room in ROOMS]
+    programs = environment(uv, tmp_path / "alone", file, *others)
+    script = tmp_path / "example.py"
+    script.write_text(EXAMPLE.findall((OWN / "README.md").read_text())[0])
+    assert "success" in done(programs / "python", script, folder=tmp_path)
 
 
 @pytest.mark.slow
