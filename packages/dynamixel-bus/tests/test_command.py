@@ -37,12 +37,14 @@ def served(*words: str) -> Iterator[Bus]:
             serving.kill()
 
 
+@pytest.mark.ci
 def test_nineteen_servos_answer_a_broadcast_ping() -> None:
     words = [f"{i}:{'xc430-w240' if i <= 17 else 'xl330-m288'}" for i in range(1, 20)]
     with served(*words) as bus:
         assert sorted(status.id for status in bus.scan()) == list(range(1, 20))
 
 
+@pytest.mark.ci
 def test_faults_begin_on_demand() -> None:
     """Overload is bit 5 of Hardware Error Status, at address 70, by the manual."""
     faults = ("servo:2=silent", "servo:3=overload", "servo:1=return_delay_time:7")
@@ -52,6 +54,7 @@ def test_faults_begin_on_demand() -> None:
         assert bus.read(1, Span(9, 1)) == Value(b"\x07", alert=False)
 
 
+@pytest.mark.ci
 def test_a_list_says_the_speed_of_a_servo() -> None:
     """57600 bit/s are 1 in the register Baud Rate, 1000000 are 3, by the manual."""
     with served("5:xl430-w250@1000000", "6:xl330-m288") as bus:
