@@ -8,7 +8,8 @@ import math
 import re
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
 from dynamixel_bus import __version__, demands, servo_list
@@ -86,13 +87,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after bad input, 130 if interrupted.
     """
     try:
-        _serve(_parser().parse_args(argv))
+        return _serve(_parser().parse_args(argv))
     except BusError as error:
         sys.stderr.write(f"dynamixel-bus: error: {one_line(str(error))}\n")
         return BAD_INPUT
     except KeyboardInterrupt:
         return INTERRUPTED
-    return OK
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -111,15 +111,33 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _serve(given: argparse.Namespace) -> None:
+def _serve(given: argparse.Namespace) -> int:
     duration = _seconds(given.duration)
     faults = [demands.read(text) for text in given.fault]
     servos = [servo_list.make_servo(listed) for listed in servo_list.read_list(given.servos)]
     if not servos:
         raise ConfigError(f"expected servos, found none in {' '.join(given.servos)}")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with FaultyServer(ServoBus(servos), _endpoint(given.tcp), faults) as server:
-        server.run(_until(duration, server.paths))
+    with (
+        FaultyServer(ServoBus(servos), _endpoint(given.tcp), faults) as server,
+        _stops() as stops,
+    ):
+        server.run(_until(duration, server.paths, stops))
+    return INTERRUPTED if stops else OK
+
+
+@contextmanager
+def _stops() -> Iterator[list[int]]:
+    """Signals that have asked for an end; the server ends between two packets."""
+    asked: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: asked.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _seconds(text: str | None) -> float:
@@ -147,7 +165,7 @@ def _endpoint(text: str | None) -> Endpoint | None:
     return TcpEndpoint(host or "127.0.0.1", int(port))
 
 
-def _until(duration: float, paths: dict[str, str]) -> Callable[[float], bool]:
+def _until(duration: float, paths: dict[str, str], stops: Sequence[int]) -> Callable[[float], bool]:
     """Whether to go on at a time [s]; the first time it also prints the paths."""
     ready = False
 
@@ -157,6 +175,6 @@ def _until(duration: float, paths: dict[str, str]) -> Callable[[float], bool]:
             ready = True
             sys.stdout.write(json.dumps(paths) + "\n")
             sys.stdout.flush()
-        return t < duration
+        return t < duration and not stops
 
     return go_on
