@@ -443,9 +443,9 @@ def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
     assert main(words) == 0
     first, second, *_ = capsys.readouterr().err.splitlines()
     assert first == "2 episodes of 100 s together at most: 3 s to 22 s, 1 worker"
-    assert second.startswith("episodes: 1 of 2")
+    assert second.startswith("compete: 1 of 2")
     board = CompeteConfig(controllers=("open", "closed"), trials=100)  # 160,000 s of walking
-    told = experiment.EXPERIMENT.foretold(board, Workers(4))
+    told = experiment.foretold(board, Workers(4))
     assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 

@@ -159,4 +159,4 @@ def test_the_shipped_searches_can_be_run() -> None:
     paths = sorted((HERE.parent / "studies").glob("design_*.toml"))
     assert len(paths) > 1
     for path in paths:
-        experiments.load("study").check(read_file(path, config))
+        experiments.load("study").settled(read_file(path, config), None)

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from antennate import experiments
 from antennate.cli import main
 from antennate.errors import BadInputError
+from antennate.studies.experiment import Experiment
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.trials import Batches, Trials
 
 PAGE = Path(__file__).parents[1] / "docs" / "experiments.md"
-DICE = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-"""The example of the documentation."""
+DICE, PROCEDURE = (
+    each.split("```")[0] for each in PAGE.read_text(encoding="utf-8").split("```python\n")[1:]
+)
+"""The example of the documentation, and the function that runs the whole."""
+TRIALS = "Trials(throw, Row, lambda found: pooled(Result, found.frame))"
+ONE = ("--workers", "1")
+WHOLE = f"""
+from antennate.studies.experiment import Done
+from antennate.studies.pooling import frame
+{PROCEDURE}
+
+EXPERIMENT ="""
 
 
 @pytest.fixture
@@ -38,7 +53,7 @@ def test_it_runs_and_leaves_a_directory_like_ours(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert sum(bool(line.strip()) for line in DICE.splitlines()) <= 40
-    assert main(["dice", "--trials", "3", "--seed", "7", "--out", "run"]) == 0
+    assert main(["dice", "--trials", "3", *ONE, "--seed", "7", "--out", "run"]) == 0
     out, err = capsys.readouterr()
     assert out.startswith("Dice show ")  # the sentence first, then the table
     assert "eyes, mean" in out
@@ -55,7 +70,7 @@ def test_a_column_is_one_line(dice: Path, capsys: pytest.CaptureFixture[str]) ->
     (dice / "site" / "dice_study.py").write_text(
         DICE.replace("    schema: int = 1\n", f"{line}\n    schema: int = 1\n")
     )
-    assert main(["dice", "--trials", "40", "--seed", "7", "--out", "run"]) == 0
+    assert main(["dice", "--trials", "40", *ONE, "--seed", "7", "--out", "run"]) == 0
     run = RunDirectory.open(dice / "run")
     thrown = sum(row["eyes"] == 6 for row in run.rows())
     assert thrown > 0
@@ -66,9 +81,40 @@ def test_a_column_is_one_line(dice: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_it_is_told_how_many_workers_are_asked_for(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (dice / "site" / "dice_study.py").write_text(DICE.replace("eyes=int(n)", "eyes=workers.count"))
+    whole = DICE.replace("EXPERIMENT =", WHOLE).replace(TRIALS, "procedure")
+    (dice / "site" / "dice_study.py").write_text(whole.replace("eyes=int(n)", "eyes=workers.count"))
     assert main(["dice", "--trials", "2", "--workers", "5", "--out", "run"]) == 0
     assert [row["eyes"] for row in RunDirectory.open(dice / "run").rows()] == [5, 5]
+
+
+@pytest.mark.ci
+def test_shards_workers_and_a_run_that_goes_on_give_the_rows_of_one_process(dice: Path) -> None:
+    """Nothing but the function of one trial is written for that."""
+    alone = ["dice", "--trials", "6", *ONE, "--out", "alone"]
+    assert main(alone) == 0
+    assert main(["dice", "--trials", "6", "--workers", "2", "--out", "two"]) == 0
+    assert main(["dice", "--trials", "4", *ONE, "--out", "more"]) == 0
+    assert main(["dice", "--trials", "6", *ONE, "--out", "more", "--resume"]) == 0
+    for k in (1, 2):
+        assert main(["dice", "--trials", "6", *ONE, "--shard", f"{k}/2", "--out", f"part{k}"]) == 0
+    assert main(["study", "merge", "part1", "part2", "--out", "merged"]) == 0
+    table = (dice / "alone" / "trials.csv").read_bytes()
+    assert table.count(b"\n") == 7
+    for name in ("two", "more", "merged"):
+        assert (dice / name / "trials.csv").read_bytes() == table
+
+
+def test_what_the_page_says_an_experiment_needs_is_what_it_has() -> None:
+    said = [set(re.findall(r"`(\w+)`", line)) for line in PAGE.read_text().splitlines()]
+    for kind, needed in ((Experiment, 7), (Trials, 3), (Batches, 0)):
+        names = {field.name for field in fields(kind)}
+        assert any(names <= line for line in said), kind
+        given = [each for each in fields(kind) if not _has_default(each)]
+        assert len(given) <= max(needed, 2)
+
+
+def _has_default(field: Field[Any]) -> bool:
+    return field.default is not MISSING or field.default_factory is not MISSING
 
 
 def test_help_and_errors_know_it(dice: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,7 +148,7 @@ TYPES = "dice: expected values of the types that Result says, found eyes: input 
         ('f"Dice show {result.eyes:.1f} eyes."', "6", f"{FORMS}list and int"),
         ("    result=Result,\n", "", "its class as `result` of the experiment, found Result"),
         ("eyes: float | None =", "eyes: str =", TYPES),
-        ("frame(rows, Row)))", "frame(rows, Row), eyes=[]))", TYPES),
+        ("found.frame)", "found.frame, eyes=[])", TYPES),
     ],
 )
 def test_tables_a_sentence_and_a_result_of_another_form_are_one_line(
@@ -111,7 +157,7 @@ def test_tables_a_sentence_and_a_result_of_another_form_are_one_line(
     """The rows are kept."""
     assert old in DICE
     (dice / "site" / "dice_study.py").write_text(DICE.replace(old, new))
-    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
+    assert main(["dice", "--trials", "2", *ONE, "--out", "run"]) == 2
     err = capsys.readouterr().err
     assert told in err
     assert "Traceback" not in err
@@ -121,20 +167,21 @@ def test_tables_a_sentence_and_a_result_of_another_form_are_one_line(
 def test_numbers_of_numpy_are_kept_and_other_objects_refused(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = DICE.replace("eyes=int(n)", "eyes=n").replace("schema: int = 1", "a: Any = 1")
-    text = text.replace("frame(rows, Row))", "frame(rows, Row), a=np.eye(1))")
+    drawn = "eyes=int(rng.integers(1, 7))"
+    text = DICE.replace(drawn, "eyes=rng.integers(1, 7)").replace("schema: int = 1", "a: Any = 1")
+    text = text.replace("found.frame)", "found.frame, a=np.eye(1))")
     (dice / "site" / "dice_study.py").write_text(
         f"{text}\n".replace("import numpy", "from typing import Any\nimport numpy", 1)
     )
-    assert main(["dice", "--trials", "2", "--out", "run"]) == 0
+    assert main(["dice", "--trials", "2", *ONE, "--out", "run"]) == 0
     run = RunDirectory.open(dice / "run")
     assert {row["eyes"] for row in run.rows()} <= set(range(1, 7))
     assert run.result()["a"] == [[1.0]]
     sys.modules.pop("dice_study")
-    (dice / "site" / "dice_study.py").write_text(DICE.replace("eyes=int(n)", "eyes={i}"))
-    assert main(["dice", "--trials", "2", "--out", "other"]) == 2
+    (dice / "site" / "dice_study.py").write_text(DICE.replace(drawn, "eyes={trial}"))
+    assert main(["dice", "--trials", "2", *ONE, "--out", "other"]) == 2
     err = capsys.readouterr().err
-    assert "in a result or row, found set" in err
+    assert err.endswith("expected a result that can be kept, found set\n")
     assert "Traceback" not in err
 
 
@@ -221,7 +268,7 @@ def test_a_disk_that_is_full_at_the_end_keeps_and_shows_what_was_measured(
         whole(self, name, content)
 
     monkeypatch.setattr(RunDirectory, "write", write)
-    assert main(["dice", "--trials", "2", "--out", "run"]) == 2
+    assert main(["dice", "--trials", "2", *ONE, "--out", "run"]) == 2
     out, err = capsys.readouterr()
     assert "eyes, mean" in out
     assert "No space left on device" in err

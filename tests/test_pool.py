@@ -18,7 +18,7 @@ from pool_tasks import beside, die, halves, trouble, trouble_together
 from antennate.errors import WorkerError
 from antennate.studies.engines import make_engine
 from antennate.studies.pool import Workers, core_count, gather
-from antennate.studies.work import Failure
+from antennate.studies.work import Failure, Together
 
 
 def no_step(done: int, total: int) -> None:
@@ -68,8 +68,7 @@ def test_one_worker_with_any_time_limit_is_a_process_of_its_own() -> None:
 @pytest.mark.ci
 def test_groups_share_no_chunk() -> None:
     tasks = [*zip("aaabb", range(5), strict=True)]
-    how: dict[str, Any] = {"chunk": 2, "together": True, "group": lambda group, number: group}
-    found = gather(beside, tasks, 2, no_step, **how)
+    found = gather(Together(beside, 2, lambda group, number: group), tasks, 1, no_step)
     assert found == [[0], [1, 2], [1, 2], [3, 4], [3, 4]]
 
 
@@ -79,23 +78,17 @@ def lost(place: int, failure: Failure) -> Any:
 
 @pytest.mark.ci
 @pytest.mark.parametrize(
-    ("chunk", "function"), [(2, trouble), (5, trouble_together)], ids=["one by one", "together"]
+    ("function", "most"),
+    [(trouble, 3), (Together(trouble_together, 5), 4)],
+    ids=["one by one", "together"],
 )
 def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
-    tmp_path: Path, chunk: int, function: Any, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, function: Any, most: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A task that kills its worker has three chances; one that never ends has one alone."""
+    """A task that kills its worker has three chances alone; one that never ends has one."""
     tasks = [(number, str(tmp_path)) for number in range(9)]
     workers = Workers(2, timeout=2.0)
-    found = gather(
-        function,
-        tasks,
-        workers,
-        no_step,
-        chunk=chunk,
-        together=function is trouble_together,
-        lost=lost,
-    )
+    found = gather(function, tasks, workers, no_step, lost=lost)
     statuses = [each[0] if isinstance(each, tuple) else each for each in found]
     assert statuses == [0, 1, 4, "crashed", 16, "hung", "failed", 49, "failed"]
     assert "ended with code 9" in found[3][1]
@@ -104,7 +97,7 @@ def test_W4_what_dies_hangs_or_raises_is_found_and_the_others_end(
     assert "RuntimeError: eight" in found[8][1]
     assert "Traceback" not in capfd.readouterr().err
     tries = {number: len((tmp_path / str(number)).read_text()) for number in range(8)}
-    assert tries[3] == 3
+    assert tries[3] == most
 
 
 @pytest.mark.ci

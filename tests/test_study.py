@@ -29,6 +29,7 @@ from antennate.errors import BadInputError, OutputError, WorkerError
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.effects import Slope
 from antennate.experiments.study.result import StudyResult, summarise
+from antennate.studies.engines import NoMore
 from antennate.studies.experiment import Done
 from antennate.studies.identity import identity
 from antennate.studies.plan import Range
@@ -402,7 +403,7 @@ def test_W9_ten_thousand_finished_trials_are_known_at_once(tmp_path: Path) -> No
         begin = time.perf_counter()
         again = TrialFile(tmp_path / TRIALS)
         tasks = [(i,) for i in range(10_000)]
-        found = gather(squares, tasks, Workers(1, trials=again, closed=True), lambda *_: None)
+        found = gather(squares, tasks, Workers(1, NoMore(), trials=again), lambda *_: None)
         best = min(best, time.perf_counter() - begin)
         again.close()
     assert len(found) == 10_000
@@ -424,7 +425,7 @@ def test_what_is_missing_is_an_error_of_ours(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="another process"):
         TrialFile(tmp_path / "s")
     with pytest.raises(WorkerError, match="expected 1 finished trials, found 0"):
-        gather(squares, [(1,)], Workers(1, trials=store, closed=True), lambda *_: None)
+        gather(squares, [(1,)], Workers(1, NoMore(), trials=store), lambda *_: None)
     store.close()
     with pytest.raises(BadInputError, match="expected a readable file"):
         read_trials(tmp_path / "no")

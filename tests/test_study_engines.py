@@ -166,7 +166,7 @@ def test_a_job_whose_driver_needs_it_no_more_runs_no_further_trial(tmp_path: Pat
     """Its driver has removed its file: before it begins, or while it runs."""
     pytest.importorskip("cloudpickle")
     removes = {place: (str(tmp_path / "job.jsonl"),) for place in range(3)}
-    job = job_of(tmp_path / "job.jsonl", Work(os.unlink, removes, together=False, timeout=60.0))
+    job = job_of(tmp_path / "job.jsonl", Work(os.unlink, removes, timeout=60.0))
     with pytest.raises(WorkerError, match="expected a driver that reads what this job finishes"):
         job.carry_out()
     assert job.carry_out() == 0
@@ -180,7 +180,7 @@ def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
     os.environ["STUDY_NOTES"] = str(notes)
     try:
         tasks = {place: ({"x": 1.0}, place) for place in range(3)}
-        part = Work(trial, tasks, together=False, timeout=60.0)
+        part = Work(trial, tasks, timeout=60.0)
         job = job_of(tmp_path / "job.jsonl", part)
         assert job.carry_out() == 3
         assert job.carry_out() == 0
@@ -193,13 +193,13 @@ def test_a_job_that_begins_again_goes_on(tmp_path: Path) -> None:
 def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path) -> None:
     pytest.importorskip("cloudpickle")
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
-    part = Work(trial, tasks, together=False, timeout=1.0)
+    part = Work(trial, tasks, timeout=1.0)
     job_of(tmp_path / "hung.jsonl", part).carry_out()
     found = read_trials(tmp_path / "hung.jsonl").records
     assert found["1"]["failure"] == ["hung", "no result within 1 s"]
     assert found["2"]["result"]
     signals = {0: (signal.SIGTERM,), 1: (signal.SIGUSR2,), 2: (signal.SIGKILL,)}
-    part = Work(signal.raise_signal, signals, together=False, timeout=60.0)
+    part = Work(signal.raise_signal, signals, timeout=60.0)
     job_of(tmp_path / "asked.jsonl", part).carry_out()
     found = read_trials(tmp_path / "asked.jsonl").records
     assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
@@ -211,7 +211,7 @@ def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> 
     from antennate.studies.dask import carry_out_apart
 
     tasks = {place: ({"x": 1.0, "mode": "hang"}, place) for place in (1, 2)}
-    part = Work(trial, tasks, together=False, timeout=1.0)
+    part = Work(trial, tasks, timeout=1.0)
     found = dict(carry_out_apart(part, environment(), {}, "one"))
     assert (found[1].status, found[2]["value"]) == ("hung", pytest.approx(1.1))
 
@@ -221,7 +221,7 @@ def test_a_process_beside_a_worker_of_dask_serves_one_run_alone() -> None:
     pytest.importorskip("distributed")
     from antennate.studies.dask import carry_out_apart
 
-    part = Work(os.getpid, {0: ()}, together=False, timeout=60.0)
+    part = Work(os.getpid, {0: ()}, timeout=60.0)
     runs = ("one", "one", "two")
     first, again, other = (dict(carry_out_apart(part, environment(), {}, run))[0] for run in runs)
     assert first == again != other
@@ -243,7 +243,7 @@ def test_an_engine_gives_work_to_workers_that_join_later() -> None:
         return joined.pop(0) if len(joined) > 1 else joined[0]
 
     found: list[int] = []
-    work = Work(trial, {0: ({}, 0), 1: ({}, 1)}, together=False, timeout=60.0)
+    work = Work(trial, {0: ({}, 0), 1: ({}, 1)}, timeout=60.0)
     engine = Submitted("later", submit, ahead=1, workers=workers)
     call = Call(work, [[0], [1]], lambda place, result: found.append(place), pytest.fail)
     engine.run(call, 1)
@@ -251,7 +251,7 @@ def test_an_engine_gives_work_to_workers_that_join_later() -> None:
 
 
 def test_a_job_of_another_version_is_refused(tmp_path: Path) -> None:
-    part = Work(trial, {}, together=False, timeout=60.0)
+    part = Work(trial, {}, timeout=60.0)
     old = {**environment(), "versions": {"numpy": "1.0"}}
     with pytest.raises(WorkerError, match=r'numpy "1\.0", now'):
         job_of(tmp_path / "job.jsonl", part, old).carry_out()
@@ -267,7 +267,7 @@ def test_versions_of_optional_packages_count_where_a_run_uses_them(tmp_path: Pat
     theirs = environment("study", config)
     theirs["versions"]["optuna"] = "0.1"
     with pytest.raises(WorkerError, match=r'optuna "0\.1", now'):
-        job_of(tmp_path / "job.jsonl", Work(trial, {}, False, 9.0), theirs).carry_out()
+        job_of(tmp_path / "job.jsonl", Work(trial, {}, 9.0), theirs).carry_out()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -464,7 +464,7 @@ def test_a_worker_with_another_copy_of_a_named_file_is_refused(tmp_path: Path) -
     file = tmp_path / "own.py"
     file.write_text("def trial(config, seed):\n    return {'value': 1}\n")
     theirs = environment("study", StudyConfig(experiment=f"{file}:trial"))
-    part = Work(trial, {}, together=False, timeout=60.0)
+    part = Work(trial, {}, timeout=60.0)
     assert job_of(tmp_path / "job.jsonl", part, theirs).carry_out() == 0
     for edit, told in ((lambda: file.write_text("x = 1\n"), "changed"), (file.unlink, "is gone")):
         edit()
@@ -480,7 +480,7 @@ def test_a_worker_in_another_folder_is_refused_or_has_the_same_file() -> None:
     file = Path("own.py")
     file.write_text("def trial(config, seed):\n    return {'value': 1.0}\n")
     theirs = environment("study", StudyConfig(experiment="own.py:trial"))
-    part = Work(trial, {0: ({"x": 1.0}, 0)}, together=False, timeout=60.0)
+    part = Work(trial, {0: ({"x": 1.0}, 0)}, timeout=60.0)
     unseen = {**theirs, "folder": "/nowhere"}
     assert dict(carry_out_apart(part, unseen, {}, "one"))[0]["outcome"] == "timeout"
     Path("away").mkdir()
@@ -540,9 +540,9 @@ def test_dask_says_what_it_waits_for_and_what_became_of_its_scheduler(
     assert [record.getMessage() for record in caplog.records] == [
         f"dask: waits for workers at tcp://{address}"
     ]
-    said = capfd.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert "found it gone; what has ended is kept, and the same command goes on" in said[0]
+    note, said = capfd.readouterr().err.strip().splitlines()
+    assert note == caplog.messages[0]
+    assert "found it gone; what has ended is kept, and the same command goes on" in said
 
 
 def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:

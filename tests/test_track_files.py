@@ -161,7 +161,7 @@ def test_locusts_have_the_angles_that_others_computed() -> None:
     result = antennate.run(
         "tracks", files=[str(path)], points=LOCUST, rate=5.0, playback_rate=30.0, wall=arena
     )
-    text = result.experiment.files(result.outcome)["frames.csv"]
+    text = result.experiment.files(result.config)["frames.csv"](result.outcome)
     ours = list(csv.DictReader(text.splitlines()))
     for side, column in (("left", "L_angle_deg"), ("right", "R_angle_deg")):
         found = {row["frame"]: row["angle_rad"] for row in ours if row["side"] == side}
@@ -262,7 +262,11 @@ def test_real_axes_of_sleap_agree_with_its_own_file() -> None:
     wanted = abs(np.arctan2(ahead_x * y - ahead_y * x, ahead_x * x + ahead_y * y))
     clean = {"likelihood": 0.0, "smoothing": 0.0, "longest_gap": 0.0, "stretch": 10.0}
     result = antennate.run("tracks", files=[str(path)], points=names, rate=30.0, cleaning=clean)
-    rows = list(csv.DictReader(result.experiment.files(result.outcome)["frames.csv"].splitlines()))
+    rows = list(
+        csv.DictReader(
+            result.experiment.files(result.config)["frames.csv"](result.outcome).splitlines()
+        )
+    )
     found = np.array([abs(float(row["angle_rad"] or "nan")) for row in rows])
     np.testing.assert_allclose(found, wanted, atol=1e-4)
 

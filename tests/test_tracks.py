@@ -344,19 +344,18 @@ def test_the_simulated_antenna_goes_through_the_same_classifier(
 ) -> None:
     """Shares of `sweep` by its own angles, and of `tracks` by the points that it saved."""
     monkeypatch.setattr(sweep, "plan", lambda config: [])  # the map alone
-    outcome = sweep.run(
-        SweepConfig(
-            points=True,
-            profiles=("descending",),
-            distances=(0.9,),
-            centres=(0.8, 1.2, 1.5),
-            amplitudes=(0.3, 0.8),
-            sweeps=1,
-            physics=BenchPhysicsParams(timestep=0.001),
-        )
+    config = SweepConfig(
+        points=True,
+        profiles=("descending",),
+        distances=(0.9,),
+        centres=(0.8, 1.2, 1.5),
+        amplitudes=(0.3, 0.8),
+        sweeps=1,
+        physics=BenchPhysicsParams(timestep=0.001),
     )
-    for name, text in EXPERIMENT.files(outcome).items():
-        (tmp_path / name).write_text(text)
+    outcome = sweep.run(config)
+    for name, make in EXPERIMENT.files(config).items():
+        (tmp_path / name).write_text(str(make(outcome)))
     cells = {f"{row.condition} {row.trial}": row for row in outcome.rows}
     result = antennate.run(
         "tracks",

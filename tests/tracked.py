@@ -81,7 +81,11 @@ def classified(path: Path, **settings) -> tuple[antennate.Result, dict[str, list
     """A run, and the shapes frame by frame of each side."""
     values = {"files": [str(path)], "points": POINTS, "y_down": False, **settings}
     result = antennate.run("tracks", **values)
-    rows = list(csv.DictReader(result.experiment.files(result.outcome)["frames.csv"].splitlines()))
+    rows = list(
+        csv.DictReader(
+            result.experiment.files(result.config)["frames.csv"](result.outcome).splitlines()
+        )
+    )
     return result, {
         side: [row["shape"] for row in rows if row["side"] == side] for side in ("left", "right")
     }

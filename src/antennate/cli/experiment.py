@@ -17,7 +17,7 @@ from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.cli.options import fields_of, flag_of, option
 from antennate.cli.pages import ViewOptions, say_by_hand, view_of
 from antennate.cli.results import ResultOptions, drawn_table, folder_for, show_result
-from antennate.cli.terminal import progress, stop_signals
+from antennate.cli.terminal import progress, stop_signals, told
 from antennate.errors import (
     FAILURES,
     BadInputError,
@@ -25,13 +25,21 @@ from antennate.errors import (
     OutputError,
     raised,
 )
-from antennate.experiments import FITTED, fitted
+from antennate.experiments import FITTED, fitted, is_ours
 from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import command_words, shortened, typed
 from antennate.params.base import Params
 from antennate.robots.spec import ROBOTS
-from antennate.studies.engines import BATCHED, EVERYWHERE, FORMS, LOCAL, WARP, make_engine
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.engines import (
+    BATCHED,
+    EVERYWHERE,
+    FORMS,
+    LOCAL,
+    WARP,
+    NoMore,
+    make_engine,
+)
+from antennate.studies.experiment import ELSEWHERE, Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
@@ -128,8 +136,8 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
     """Fields of the options that this experiment has not."""
     has = {
         OF_WORKERS: experiment.workers != "none",
-        ("engine", "slurm"): experiment.workers == "anywhere",
-        ("shard",): experiment.undivided is not None,
+        ("engine", "slurm"): experiment.workers in ELSEWHERE,
+        ("shard",): experiment.workers != "whole",
         ("video", "video_trial"): experiment.films is not None,
         ("video_view",): experiment.films is not None and "robot" in experiment.config.model_fields,
         ("video_trial",): "trials" in experiment.config.model_fields,
@@ -152,11 +160,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
             f"expected a FILE that says what varies, as `{typed(experiment.name, 'FILE.toml')}`, "
             "found none"
         )
-    undivided = experiment.undivided
-    if options.shard is not None and undivided is not None and (why := undivided(config)):
-        raise ConfigError(f"--shard: {why}")
     config = experiment.settled(config, options.out if options.resume or options.retry else None)
-    experiment.check(config)
     if options.video:
         require_films(experiment, config, options.video_trial)
     return carry_out(experiment, argv, config, options)
@@ -215,7 +219,7 @@ def carry_out(
     """
     _require_possible(options, config)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
-    workers = _workers(options, closed=shards is not None, apart=apart)
+    workers = _workers(options, apart) if shards is None else Workers(1, NoMore())
     kind = f"{experiment.name} --log" if options.log else experiment.name
     kind += " --engine warp" if options.engine.partition(":")[0] == WARP else ""
     what = identity(kind, config)
@@ -283,8 +287,13 @@ def shard_of(text: str) -> tuple[int, int] | None:
     return (number, count) if 1 <= number <= count else None
 
 
-def _workers(options: RunOptions, closed: bool, apart: bool) -> Workers:
-    """The workers that are asked for; see `Workers`. They are given the store later."""
+def _workers(options: RunOptions, apart: bool) -> Workers:
+    """The workers that are asked for; see `Workers`. They are given the file of trials later.
+
+    Args:
+        options: What is asked for.
+        apart: Whether even one worker is a process of its own, which may crash or be killed.
+    """
     shard = None if options.shard is None else shard_of(options.shard)
     if options.shard is not None and shard is None:
         raise ConfigError(
@@ -292,8 +301,11 @@ def _workers(options: RunOptions, closed: bool, apart: bool) -> Workers:
             f"{shortened(options.shard)}"
         )
     engine, count = make_engine(options.engine, options.slurm), options.workers or core_count()
-    how: dict[str, Any] = {"timeout": options.trial_timeout, "retry": options.retry}
-    return Workers(count, engine, shard=shard, closed=closed, apart=apart, **how)
+    if apart and engine is None:
+        from antennate.studies.processes import Processes  # only where there are some
+
+        engine = Processes()
+    return Workers(count, engine, shard, options.trial_timeout, options.retry)
 
 
 def _folder(
@@ -338,9 +350,7 @@ def _outcome(
         rows = interim.table()
         return None if rows is None else drawn_table(rows)
 
-    if words := experiment.foretold(config, workers):
-        sys.stderr.write(f"{words}\n")
-    with progress(experiment.parts, table) as step:
+    with progress(experiment.name, table) as step, told():
         return experiment.run(config, workers, step, on_row, **how)
 
 
@@ -354,6 +364,7 @@ def _end(
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
     found, title = outcome.result(), experiment.view.title
+    explained = "docs/results.md" if is_ours(experiment.name) else ""
     result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""
@@ -363,12 +374,12 @@ def _end(
         sys.stderr.write(again)
         raise KeyboardInterrupt
     try:
-        keep(experiment, outcome, result, run, figures=not options.no_figures)
+        keep(experiment, config, outcome, result, run, figures=not options.no_figures)
     except OutputError:
         with contextlib.suppress(*FAILURES):
-            show_result(result, options, *_shown(experiment, found), experiment.explained)
+            show_result(result, options, *_shown(experiment, found), explained)
         raise
-    show_result(result, options, *_shown(experiment, found), experiment.explained)
+    show_result(result, options, *_shown(experiment, found), explained)
     if interrupted:
         number = len(outcome.rows)
         rest = f"kept {number} trial{'s' * (number != 1)}, all that had ended"

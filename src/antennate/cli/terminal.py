@@ -11,6 +11,7 @@ import codecs
 import contextlib
 import errno
 import io
+import logging
 import math
 import os
 import shutil
@@ -316,6 +317,20 @@ def progress(
 
     with Live(console=console, transient=True, get_renderable=drawn, refresh_per_second=2):
         yield step
+
+
+@contextlib.contextmanager
+def told() -> Iterator[None]:
+    """Show on stderr what the package logs meanwhile: notes, and warnings as always."""
+    logger, handler = logging.getLogger("antennate"), logging.StreamHandler(sys.stderr)
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 class _Pace:

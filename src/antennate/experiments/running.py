@@ -15,7 +15,7 @@ from antennate.messages import one_line, shown
 from antennate.params.base import Params, from_values
 from antennate.studies.columns import content
 from antennate.studies.engines import LOCAL, Device, make_engine
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.experiment import ELSEWHERE, Experiment, Outcome
 from antennate.studies.identity import environment, identity, texts
 from antennate.studies.pool import Workers
 from antennate.studies.pooling import frame
@@ -156,8 +156,7 @@ def run(
             raise ConfigError(f"{name}: expected out beside it, found none")
     experiment, config = _configured(name_or_config, settings)
     config = experiment.settled(config, out if resume else None)
-    experiment.check(config)
-    if engine != LOCAL and experiment.workers != "anywhere":
+    if engine != LOCAL and experiment.workers not in ELSEWHERE:
         raise ConfigError(
             f"engine: expected an experiment that runs trials on workers, found {experiment.name}"
         )
@@ -181,7 +180,7 @@ def run(
         directory.describe(config)
         pool = replace(pool, trials=directory.trials)
         outcome = experiment.run(config, pool, on_step, directory.append)
-        keep(experiment, outcome, experiment.content(outcome.result()), directory)
+        keep(experiment, config, outcome, experiment.content(outcome.result()), directory)
         if video is not None:
             write_films(experiment, config, video, directory)
         write_report(directory, experiment.view)
@@ -201,7 +200,7 @@ def names_of(
     """
     drawn = experiment.view.figures if figures else []
     shot = experiment.films(config, films) if experiment.films and films is not None else {}
-    return [*experiment.names(config), *drawn, *map(_film, shot)]
+    return [*experiment.files(config), *drawn, *map(_film, shot)]
 
 
 def _film(name: str) -> str:
@@ -211,6 +210,7 @@ def _film(name: str) -> str:
 
 def keep(
     experiment: Experiment[Any, Any],
+    config: Params,
     outcome: Outcome,
     result: Mapping[str, Any],
     directory: RunDirectory,
@@ -220,6 +220,7 @@ def keep(
 
     Args:
         experiment: The experiment.
+        config: Its configuration.
         outcome: What its run returned.
         result: What result.json holds, from `Experiment.content`.
         directory: The run directory.
@@ -228,8 +229,9 @@ def keep(
     Raises:
         OutputError: Something cannot be written; what was written stays.
     """
-    for name, text in experiment.files(outcome).items():
-        directory.write(name, text)
+    for name, make in experiment.files(config).items():
+        if (content := make(outcome)) is not None:
+            directory.write(name, content)
     directory.finish(result, outcome.rows)
     if figures:
         directory.write_figures(experiment.figures(outcome))

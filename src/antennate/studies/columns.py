@@ -46,6 +46,8 @@ Frame = Any
 Pool = Callable[[Frame, str], Any]
 """pool(rows, name): the value of a column over rows."""
 _KEY = "column"
+CONDITION = {"condition": True}
+"""Metadata of the field of a row that tells the condition of its trial."""
 _UNITS = {
     "s": "s",
     "ms": "ms",
@@ -171,6 +173,12 @@ def tabular_row(kind: type[Kind]) -> type[Kind]:
     own = {name: known.pop(name) for name in get_annotations(kind) if name in known}
     made.__dataclass_fields__ = {**own, **known}
     return made
+
+
+def condition_of(row: type) -> str:
+    """Name of the field of a row that tells the condition of its trial; empty without."""
+    names = [each.name for each in fields(row) if "condition" in each.metadata]
+    return names[0] if names else ""
 
 
 def column_of(kind: type, name: str) -> Column:

@@ -22,7 +22,7 @@ from antennate.lookup import require_package
 from antennate.studies.processes import Processes
 from antennate.studies.sending import Packed
 from antennate.studies.submitted import NO_PLACE, Submitted, folder_of, require_same, work_apart
-from antennate.studies.work import Call, Processor, Work
+from antennate.studies.work import Call, Processor, Work, processor
 
 CONNECT = 10.0
 """Time within which a scheduler has to answer, or to come back [s]."""
@@ -206,17 +206,14 @@ def carry_out_apart(
     """
     folder = folder_of(theirs)
     require_same(theirs, folder)
-    answers: list[tuple[int, Any]] = []
+    answers: list[tuple[int, Any]] = [(NO_PLACE, Processor(processor()))]
 
     def take(place: int, answer: Any) -> None:
         answers.append((place, answer))
 
-    def saw(model: str) -> None:
-        take(NO_PLACE, Processor(model))
-
     work = work_apart(part, folder, added)
     with _processes(run) as processes:
-        processes.run(Call(work, [list(part.tasks)], take, take, saw), 1)
+        processes.run(Call(work, [list(part.tasks)], take, take), 1)
     return answers
 
 

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from antennate.errors import ConfigError
+from antennate.errors import ConfigError, WorkerError
 from antennate.messages import shown
-from antennate.studies.work import Call, Engine, processor
+from antennate.studies.work import Call, Engine, Together, processor
 
 LOCAL = "local"
 WARP = "warp"
@@ -58,6 +58,24 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
     return Submitted("executor", name.submit)
 
 
+class NoMore:
+    """No worker: all tasks have been finished elsewhere, by shards."""
+
+    name = "merge"
+
+    def run(self, call: Call, count: int) -> None:
+        """Refuse tasks that wait; see `Engine`.
+
+        Raises:
+            WorkerError: Always, as an engine is called for tasks that wait.
+        """
+        total = len(call.work.tasks)
+        raise WorkerError(
+            f"expected {total} finished trials, found {total - len(call.places)}: a shard is "
+            "missing"
+        )
+
+
 class Device:
     """All tasks at once, as one batch on a GPU, in this process.
 
@@ -76,12 +94,14 @@ class Device:
         Raises:
             ConfigError: This work has no batch.
         """
-        if call.batched is None:
+        function = call.work.function
+        batched = function.batched if isinstance(function, Together) else None
+        if batched is None:
             raise ConfigError(f"{NO_BATCHES}; this one has no batches on a GPU")
         call.saw(processor())
         places = call.places
         tasks = [call.work.tasks[place] for place in places]
-        call.batched(
+        batched(
             tasks,
             lambda i, result: call.emit(places[i], result),
             lambda i, failure: call.fail(places[i], failure),

@@ -23,16 +23,26 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar, cast
 
 from antennate.errors import ConfigError
 from antennate.studies.columns import Frame, content, typed
 from antennate.studies.formats import strict
+from antennate.studies.plan import Planned
 from antennate.studies.pool import Workers
 from antennate.studies.pooling import frame
 from antennate.studies.report import View
 from antennate.studies.tables import Table
-from antennate.studies.trials import Config, OnRow, OnStep, Trial, Trials, no_row, no_step
+from antennate.studies.trials import (
+    Config,
+    OnRow,
+    OnStep,
+    Trial,
+    Trials,
+    can_take,
+    no_row,
+    no_step,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,8 +76,10 @@ class Done:
 
 
 Out = TypeVar("Out", bound=Outcome)
-
-
+ELSEWHERE = ("whole", "anywhere")
+"""Where trials may run if they may on other machines."""
+Files = Mapping[str, Callable[[Any], str | bytes | None]]
+"""Names of files, and what makes the content of each of an outcome; None for no such file."""
 Result = TypeVar("Result")
 Drawn = TypeVar("Drawn")
 
@@ -82,8 +94,7 @@ class Found(Generic[Config, Result, Drawn]):
         drawn: What figures draw of a trial, by its condition and its number.
         interrupted: Whether trials are missing.
         row: Class of the rows.
-        summarise: summarise(config, frame) -> result, an object. It has a field `interrupted` if
-            the trials are `interruptible`: a person may then end the run before the last one.
+        summarise: summarise(found) -> result, an object.
     """
 
     config: Config
@@ -91,7 +102,7 @@ class Found(Generic[Config, Result, Drawn]):
     drawn: dict[Trial, Drawn]
     interrupted: bool
     row: type
-    summarise: Callable[[Config, Frame], Result]
+    summarise: Callable[[Found[Any, Any, Any]], Result]
 
     @functools.cached_property
     def frame(self) -> Frame:
@@ -100,12 +111,22 @@ class Found(Generic[Config, Result, Drawn]):
 
     @functools.cached_property
     def _result(self) -> Any:
-        found: Any = self.summarise(self.config, self.frame)
+        found: Any = self.summarise(self)
         return replace(found, interrupted=True) if self.interrupted else found
 
     def result(self) -> Result:
         """What they come to; `interrupted` is true in it if trials are missing."""
         return self._result
+
+
+def checked(check: Callable[[Config], None]) -> Callable[[Config, Path | None], Config]:
+    """What `settled` of an experiment is if its configurations are checked and left as they are."""
+
+    def settled(config: Config, folder: Path | None) -> Config:
+        check(config)
+        return config
+
+    return settled
 
 
 @dataclass(frozen=True)
@@ -115,73 +136,110 @@ class Experiment(Generic[Config, Out]):
     Attributes:
         name: Name of the command.
         description: What `--help` says; its first sentence is the summary in the list of commands.
-        config: Class of its configuration.
-        run: run(config, workers, on_step, on_row) -> outcome, which does not depend on the number
-            of worker processes. If the experiment has `logs`, run may also get a folder, `logs`; if
-            it can be `shown`, a page, `view`: then all runs in this process.
+        config: Class of its configuration. A run of a `Planned` one goes on with what its folder
+            holds, without --resume.
+        procedure: Its trials, `Trials`; or procedure(config, workers, on_step, on_row) -> outcome,
+            which does not depend on the number of worker processes. If that can take `view`, a
+            page that shows what is run, it has --view; then all runs in this process.
         tables: Tables of a result.
         sentence: One plain sentence: what came out, and how sure it is.
-        result: Class of its results, a dataclass; without one they are dictionaries.
-        row: Class of its rows, a dataclass; those of `trials` have `trial` and the condition.
+        result: Class of its results, a dataclass; without one they are dictionaries. A property
+            `failed` of it is true if a result says nothing, as all trials are invalid: exit code
+            2. With a field `interrupted = False`, Ctrl-C ends trials with those that have ended.
+        row: Class of its rows, a dataclass; that of its `Trials` if it has them.
         figures: Figures of an outcome by name.
-        files: Further files of an outcome by name.
-        names: names(config) -> the names of those files. A folder that holds one of them, not
-            listed in its files.txt, is refused before the run.
-        settled: settled(config, folder) -> the configuration with its seed drawn, if it asks for a
-            drawn one; `folder` holds the run that goes on and has drawn it, None for a new run.
-        check: Raises if a configuration cannot be run; called before anything is written.
-        failed: Whether a result says nothing, as all trials are invalid; exit code 2.
-        parts: What `on_step` counts.
-        logs: Names of the logs of a configuration; None if there are no controllers to log.
-        shown: Whether its trials can be shown on a page.
+        captions: What each figure shows, by its name, in one sentence.
+        files: files(config) -> further files: by name what makes the content of an outcome, None
+            if it has no such file. A folder that holds one of these names, not listed in its
+            files.txt, is refused before the run.
+        settled: settled(config, folder) -> the configuration that is run, before anything is
+            written. It raises if a configuration cannot be run, and draws a seed if one is asked
+            for: `folder` holds the run that goes on and has drawn it, None for a new run.
+        logs: Names of the logs of a configuration, whose folder the procedure takes as `logs`; None
+            if there are no controllers to log.
         films: films(config, trial) -> by condition a function that runs this trial once more and
             records it; None where nothing can be filmed.
         body: body(result, images) -> HTML that stands in its report in place of tables and figures.
-        trials: Its trials one by one, for studies (`antennate study`, which varies parameters);
-            without them a study runs it as a whole.
-        continued: Whether a run goes on with what its folder holds, without --resume.
-        explained: Page that says what the rows of its tables mean; empty for none.
-        captions: What each figure shows, by its name, in one sentence.
         workers: Where its trials may run: none (it has no trials on workers), here (processes of
-            this machine) or anywhere (on other machines, too).
-        foretold: foretold(config, workers) -> one line on how long it will take, said before the
-            first trial; empty for nothing.
-        tasks: tasks(config) -> an identity for each task of `run`. Tasks that stay the same with
-            more trials have the same, so a finished run can take more. None: that of `trials`.
+            this machine), whole (anywhere, but not in shards, as trials follow from others) or
+            anywhere (on other machines, and a share of them on each, a shard).
+        tasks: tasks(config) -> an identity for each task. Tasks that stay the same with more trials
+            have the same, so a finished run can take more. None: that of its `Trials`.
         of_file: of_file(path) -> the configuration of a FILE that is given without a flag; None
             where only --config takes one.
-        undivided: undivided(config) -> why several machines cannot each run a share of its trials,
-            a shard; empty if they can. None where they never can, as trials follow from others.
     """
 
     name: str
     description: str
     config: type[Config]
-    run: Callable[..., Out]
+    procedure: Callable[..., Out] | Trials[Config]
     tables: Callable[[Any], Sequence[Table]]
     sentence: Callable[[Any], str]
     result: type | None = None
     row: type | None = None
     figures: Callable[[Out], Mapping[str, Figure]] = lambda outcome: {}
-    files: Callable[[Out], Mapping[str, str | bytes]] = lambda outcome: {}
-    names: Callable[[Config], Sequence[str]] = lambda config: ()
+    captions: Mapping[str, str] = field(default_factory=dict)
+    files: Callable[[Config], Files] = lambda config: {}
     settled: Callable[[Config, Path | None], Config] = lambda config, folder: config
-    check: Callable[[Config], None] = lambda config: None
-    failed: Callable[[Any], bool] = lambda result: False
-    parts: str = "trials"
     logs: Callable[[Config], Sequence[str]] | None = None
-    shown: bool = False
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Callable[[Any, Mapping[str, str]], str] | None = None
-    trials: Trials[Config] | None = None
-    continued: bool = False
-    explained: str = ""
-    captions: Mapping[str, str] = field(default_factory=dict)
-    workers: Literal["none", "here", "anywhere"] = "anywhere"
-    undivided: Callable[[Config], str] | None = lambda config: ""
-    foretold: Callable[[Config, Workers], str] = lambda config, workers: ""
+    workers: Literal["none", "here", "whole", "anywhere"] = "anywhere"
     tasks: Callable[[Config], Sequence[Any]] | None = None
     of_file: Callable[[Path], Config] | None = None
+
+    def __post_init__(self) -> None:
+        if self.trials is not None:
+            object.__setattr__(self, "row", self.trials.row)
+
+    @property
+    def trials(self) -> Trials[Config] | None:
+        """Its trials one by one, for studies; without them a study runs it as a whole."""
+        return self.procedure if isinstance(self.procedure, Trials) else None
+
+    @property
+    def shown(self) -> bool:
+        """Whether what it runs can be shown on a page."""
+        function = self.procedure if self.trials is None else self.trials.function
+        return can_take(cast("Callable[..., Any]", function), "view")
+
+    @property
+    def continued(self) -> bool:
+        """Whether a run goes on with what its folder holds, without --resume."""
+        return issubclass(self.config, Planned)
+
+    def run(
+        self,
+        config: Config,
+        workers: int | Workers = 1,
+        on_step: OnStep = no_step,
+        on_row: OnRow = no_row,
+        **how: Any,
+    ) -> Outcome:
+        """Run a configuration.
+
+        Args:
+            config: The configuration.
+            workers: How many, or `Workers`.
+            on_step: Called with how many of how many parts are done.
+            on_row: Called with each row as it comes, in no particular order.
+            how: `logs`, a folder for logs, and `view`, a page, if the experiment has them.
+
+        Raises:
+            AntennateError: The run failed.
+            KeyboardInterrupt: Ctrl-C came, and the result cannot say that trials are missing.
+        """
+        if not isinstance(self.procedure, Trials):
+            return self.procedure(config, workers, on_step, on_row, **how)
+        trials = self.procedure
+        ended, interrupted = trials.gather(config, workers, on_step, on_row, **how)
+        if interrupted and not hasattr(self.result, "interrupted"):
+            raise KeyboardInterrupt
+        rows = [row for row, _ in ended]
+        drawn = {
+            (trials.condition_of(row), row.trial): seen for row, seen in ended if seen is not None
+        }
+        return Found(config, rows, drawn, interrupted, trials.row, trials.summarise)
 
     @property
     def view(self) -> View:
@@ -202,6 +260,10 @@ class Experiment(Generic[Config, Out]):
             ValueError: Another version wrote it.
         """
         return data if self.result is None else typed(self.result, data)
+
+    def failed(self, found: Any) -> bool:
+        """Whether a result says nothing, by its property `failed`; a column may have that name."""
+        return isinstance(getattr(type(found), "failed", None), property) and found.failed
 
     def content(self, found: Any) -> dict[str, Any]:
         """What result.json holds of a result.
@@ -244,7 +306,7 @@ class Experiment(Generic[Config, Out]):
         cls,
         module: str,
         config: type[Config],
-        run: Callable[..., Out],
+        procedure: Callable[..., Out] | Trials[Config],
         tables: Callable[[Any], Sequence[Table]],
         sentence: Callable[[Any], str],
         **more: Any,
@@ -256,7 +318,6 @@ class Experiment(Generic[Config, Out]):
         without that module there are none.
         """
         folder = module.rpartition(".")[0]
-        more.setdefault("explained", "docs/results.md")
         if "figures" not in more and importlib.util.find_spec(f"{folder}.figure"):
             more["figures"] = lambda outcome: importlib.import_module(f"{folder}.figure").figures(
                 outcome
@@ -264,52 +325,6 @@ class Experiment(Generic[Config, Out]):
         return cls(
             folder.rpartition(".")[2],
             importlib.import_module(folder).__doc__ or "",
-            *(config, run, tables, sentence),
+            *(config, procedure, tables, sentence),
             **more,
         )
-
-    @classmethod
-    def of_trials(
-        cls,
-        module: str,
-        config: type[Config],
-        trials: Trials[Config],
-        summarise: Callable[[Config, Frame], Any],
-        tables: Callable[[Any], Sequence[Table]],
-        sentence: Callable[[Any], str],
-        **more: Any,
-    ) -> Experiment[Config, Any]:
-        """An experiment with a folder whose run is its trials, which `summarise` makes a result of.
-
-        Arguments are those of `of_folder` and of `Found`. Its trials can be shown on a page unless
-        `shown=False` is given.
-
-        Raises:
-            ConfigError: A run may end early, and the result cannot say so.
-        """
-        result = more.get("result")
-        if trials.interruptible and not hasattr(result, "interrupted"):
-            raise ConfigError(
-                f"{module}: expected a class with a field `interrupted = False` as `result` beside "
-                f"interruptible trials, found {getattr(result, '__name__', result)}"
-            )
-
-        def run(
-            config: Config,
-            workers: int | Workers = 1,
-            on_step: OnStep = no_step,
-            on_row: OnRow = no_row,
-            **how: Any,
-        ) -> Found[Config, Any, Any]:
-            ended, interrupted = trials.gather(config, workers, on_step, on_row, **how)
-            rows = [row for row, _ in ended]
-            drawn = {
-                (getattr(row, trials.condition), row.trial): seen
-                for row, seen in ended
-                if seen is not None
-            }
-            return Found(config, rows, drawn, interrupted, trials.row, summarise)
-
-        more = {"trials": trials, "row": trials.row, "shown": True, **more}
-        carry_out: Callable[..., Any] = run
-        return cls.of_folder(module, config, carry_out, tables, sentence, **more)

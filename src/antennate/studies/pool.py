@@ -8,22 +8,21 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import logging
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
-from antennate.errors import WorkerError
+from antennate.errors import BadInputError, WorkerError
+from antennate.studies.engines import LOCAL
 from antennate.studies.formats import decoded
 from antennate.studies.sending import IMPORTING
 from antennate.studies.trial_file import TrialFile, key_of
-from antennate.studies.work import Call, Engine, Failure, Here, Work
+from antennate.studies.work import Call, Engine, Failure, Here, Together, Work
 
-if TYPE_CHECKING:
-    from antennate.studies.processes import Processes
-
-Result = TypeVar("Result")
+_NOTE = logging.getLogger(__name__)
 TIMEOUT = 3600.0
 """Time after which a trial that has not ended is given up, unless told otherwise [s]."""
 
@@ -55,37 +54,33 @@ class Workers:
     Attributes:
         count: How many.
         engine: Where they are; processes of this machine if not given.
-        trials: Where finished tasks are kept, None to keep none.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
         timeout: Time after which a task that has not ended is given up [s], so that even one worker
             is a process of its own; None for an hour, where one worker waits on.
         retry: Whether tasks that failed before are run again.
-        closed: Whether all tasks must have been finished before.
-        apart: Whether even one worker is a process of its own, which may crash or be killed.
+        trials: Where a run keeps finished tasks, None to keep none.
         shared: The environment that workers must share with this process.
-        calls: Numbers the calls of `gather`, by which their tasks are kept.
     """
 
     count: int
     engine: Engine | None = None
-    trials: TrialFile | None = None
     shard: tuple[int, int] | None = None
     timeout: float | None = None
     retry: bool = False
-    closed: bool = False
-    apart: bool = False
+    trials: TrialFile | None = None
     shared: Mapping[str, Any] | None = None
-    calls: Iterator[int] = field(default_factory=itertools.count)
-    _staying: Processes | None = None
 
     @contextlib.contextmanager
     def stay(self) -> Iterator[Workers]:
         """The same, whose processes of this machine serve one call after the other."""
+        if self.engine_for(self.count).name != LOCAL:
+            yield self
+            return
         from antennate.studies.processes import Processes  # only where there are some
 
         staying = Processes(stay=True)
         try:
-            yield replace(self, _staying=staying)
+            yield replace(self, engine=staying)
         finally:
             staying.end()
 
@@ -93,11 +88,11 @@ class Workers:
         """Where so many parts are carried out."""
         if self.engine is not None:
             return self.engine
-        if not self.apart and self.timeout is None and (self.count == 1 or parts <= 1):
+        if self.timeout is None and (self.count == 1 or parts <= 1):
             return Here()
         from antennate.studies.processes import Processes  # only where there are some
 
-        return self._staying or Processes()
+        return Processes()
 
     def mine(self, place: int) -> bool:
         """Whether a task belongs to this shard."""
@@ -107,11 +102,6 @@ class Workers:
 def workers_from(given: int | Workers) -> Workers:
     """Workers from their number, or as they are given."""
     return given if isinstance(given, Workers) else Workers(given)
-
-
-def chunk_of(total: int, workers: int | Workers, most: int) -> int:
-    """How many of so many tasks a worker is given at once, so that each is given some thrice."""
-    return max(1, min(most, math.ceil(total / (3 * workers_from(workers).count))))
 
 
 def places_of(records: Iterable[str]) -> set[int]:
@@ -126,13 +116,13 @@ class _Kept:
         self,
         workers: Workers,
         total: int,
-        package: str,
+        packages: Collection[str],
         take: Callable[[Any], None],
         on_step: Callable[[int, int], None],
         lost: Callable[[int, Failure], Any] | None,
     ) -> None:
-        self._workers, self._number, self._total = workers, next(workers.calls), total
-        self._packages = {"antennate", package}
+        self._workers, self._total, self._packages = workers, total, packages
+        self._number = 0 if workers.trials is None else next(workers.trials.calls)
         self._take, self._on_step, self._lost = take, on_step, lost
         self.results: dict[int, Any] = {}
 
@@ -149,7 +139,12 @@ class _Kept:
 
     def _finish(self, place: int, result: Any, **more: Any) -> None:
         trials, key = self._workers.trials, key_of(self._number, place)
-        with trials.trial(key, result, **more) if trials else contextlib.nullcontext():
+        with contextlib.ExitStack() as stack:
+            if trials is not None:
+                try:
+                    stack.enter_context(trials.trial(key, result, **more))
+                except TypeError as error:
+                    raise BadInputError(str(error)) from None
             self.results[place] = result
             self._take(result)
         self._on_step(len(self.results), self._total)
@@ -159,6 +154,7 @@ class _Kept:
         trials = self._workers.trials
         if trials is None or not trials.records:
             return
+        unread: list[str] = []
         for place in range(self._total):
             record = trials.records.pop(key_of(self._number, place), None)
             if record is None:
@@ -167,13 +163,30 @@ class _Kept:
                 continue
             try:
                 result = decoded(record["result"], self._packages)
-            except ValueError:
-                continue  # of a class that is no more: it is run again
+            except ValueError as error:
+                unread.append(str(error))
+                continue
             self.results[place] = result
             with trials.known():
                 self._take(result)
+        if unread:
+            _NOTE.warning("finished trials that are run again: %d: %s", len(unread), unread[0])
         if self.results:
             self._on_step(len(self.results), self._total)
+
+
+def _parts(work: Work, places: Sequence[int], count: int) -> list[Sequence[int]]:
+    """Places in parts, each for one of so many workers at once: each worker is given some thrice.
+
+    Groups of tasks take turns.
+    """
+    if not isinstance(work.function, Together):
+        return [[place] for place in places]
+    most = min(work.function.most, math.ceil(len(work.tasks) / (3 * count)))
+    group = work.function.group
+    groups = itertools.groupby(places, lambda i: group(*work.tasks[i]) if group else None)
+    divided = [_divided([*some], most) for _, some in groups]
+    return [part for turn in itertools.zip_longest(*divided) for part in turn if part]
 
 
 def _divided(places: Sequence[int], most: int) -> list[Sequence[int]]:
@@ -184,32 +197,23 @@ def _divided(places: Sequence[int], most: int) -> list[Sequence[int]]:
 
 
 def gather(
-    function: Callable[..., Any],
+    function: Callable[..., Any] | Together,
     tasks: Sequence[tuple[Any, ...]],
     workers: int | Workers,
     on_step: Callable[[int, int], None],
     on_result: Callable[[Any], None] = lambda result: None,
-    chunk: int = 1,
-    together: bool = False,
     lost: Callable[[int, Failure], Any] | None = None,
-    batched: Callable[..., Any] | None = None,
-    group: Callable[..., Any] | None = None,
 ) -> list[Any]:
     """What function(*task) returns for every task, in the order of the tasks.
 
     Args:
-        function: A module-level function; see `Work`.
+        function: function(*task) -> result, at the top of a module; or `Together`.
         tasks: Its arguments, picklable.
         workers: How many, or `Workers`.
         on_step: Called after each with how many of how many tasks are done.
         on_result: Called with each result as it comes, in no particular order.
-        chunk: Most tasks that a worker is given at once.
-        together: Whether the function takes a chunk at once, and emits its results.
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.
-        batched: The same for `--engine warp`; see `Work`.
-        group: group(*task) -> what neighbouring tasks have in common if one chunk may hold them.
-            Groups take turns, so that each is known in part before the first is known in full.
 
     Raises:
         WorkerError: A task failed, or its workers died.
@@ -219,25 +223,16 @@ def gather(
     workers = workers_from(workers)
     if IMPORTING:
         raise WorkerError(f'{IMPORTING[0]}: expected `if __name__ == "__main__":` around what runs')
-    package = function.__module__.partition(".")[0]
-    kept = _Kept(workers, len(tasks), package, on_result, on_step, lost)
+    timeout = TIMEOUT if workers.timeout is None else workers.timeout
+    work = Work(function, dict(enumerate(tasks)), timeout)
+    kept = _Kept(workers, len(tasks), work.packages, on_result, on_step, lost)
     kept.resume()
     todo = [
         place for place in range(len(tasks)) if place not in kept.results and workers.mine(place)
     ]
-    if todo and workers.closed:
-        raise WorkerError(
-            f"expected {len(tasks)} finished trials, found {len(kept.results)}: a shard is missing"
-        )
-    groups = itertools.groupby(todo, lambda i: group(*tasks[i]) if group else None)
-    divided = [_divided([*some], chunk) for _, some in groups]
-    parts = [part for turn in itertools.zip_longest(*divided) for part in turn if part]
+    parts = _parts(work, todo, workers.count)
     if parts:
-        timeout = TIMEOUT if workers.timeout is None else workers.timeout
-        work = Work(function, dict(enumerate(tasks)), together, timeout)
-        call = Call(work, parts, kept.emit, kept.fail, batched=batched, shared=workers.shared)
-        if workers.trials is not None:
-            call.saw, call.folder = workers.trials.saw, workers.trials.path.parent
+        call = Call(work, parts, kept.emit, kept.fail, workers.trials, workers.shared)
         workers.engine_for(len(parts)).run(call, workers.count)
     if workers.shard is not None:
         raise ShardEnd(sum(map(workers.mine, kept.results)), len(tasks))

@@ -95,7 +95,7 @@ class Resumable:
         if left:
             part = self._part.only(list(left))
             work = work_apart(part, Path.cwd(), self._added, _WARNINGS)
-            call = Call(work, [list(left)], emit, fail, trials.saw)
+            call = Call(work, [list(left)], emit, fail, trials)
             call.divide(self._at_once)
             Processes().run(call, 1)
         trials.close()
@@ -144,9 +144,9 @@ class Slurm:
 
     def run(self, call: Call, count: int) -> None:
         """Run the tasks on `count` jobs at once; see `Engine`."""
-        if call.folder is None:
+        if call.trials is None:
             raise WorkerError("slurm: expected a run directory that jobs can see, found none")
-        folder = call.folder / JOBS
+        folder = call.trials.path.parent / JOBS
         with writing(folder):
             folder.mkdir(exist_ok=True)
             for file in folder.glob("*.jsonl"):  # of jobs whose driver has ended
@@ -193,7 +193,6 @@ class _Driver:
     def __init__(self, call: Call, folder: Path, executor: Any) -> None:
         self._call, self._folder, self._executor = call, folder, executor
         self._at_once = call.at_once
-        self._packages = {"antennate", call.work.function.__module__.partition(".")[0]}
         self._failed_starts = 0  # in a row
 
     def run(self, count: int) -> None:
@@ -255,7 +254,7 @@ class _Driver:
             if "failure" in record:
                 self._call.fail(place, Failure(*record["failure"]))
             else:
-                self._call.emit(place, decoded(record["result"], self._packages))
+                self._call.emit(place, decoded(record["result"], self._call.work.packages))
         job.read += len(data)
 
     def _end(self, job: _Job) -> None:

@@ -21,7 +21,7 @@ from typing import Any
 from antennate.errors import WorkerError, in_one_line
 from antennate.studies.identity import differences, environment, environment_here
 from antennate.studies.sending import Packed, added_objects, pack_whole, take_added
-from antennate.studies.work import Call, Failure, Processor, Work, processor
+from antennate.studies.work import Call, Failure, Processor, Together, Work, processor
 
 NO_PLACE = -1
 """Place of what is no result."""
@@ -124,10 +124,9 @@ def work_apart(part: Work, folder: Path, added: Packed, ignored: Sequence[int] =
     """
     import cloudpickle  # which Dask and submitit need too; it sends what was typed at a prompt
 
-    content = cloudpickle.dumps((part, str(folder), added, ignored))
-    return replace(
-        part, function=_Carried(content), tasks={place: (place,) for place in part.tasks}
-    )
+    carried = _Carried(cloudpickle.dumps((part, str(folder), added, ignored)))
+    function = Together(carried, len(part.tasks)) if part.together else carried
+    return replace(part, function=function, tasks={place: (place,) for place in part.tasks})
 
 
 class _Carried:

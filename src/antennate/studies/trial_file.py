@@ -18,6 +18,7 @@ that process ends, however it ends.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -111,6 +112,7 @@ class TrialFile(Content):
 
     Attributes:
         holds_trials: Whether it holds any that no other file has, kept before or now.
+        calls: Numbers the calls of `gather`, by which their tasks are kept.
 
     Raises:
         OutputError: It cannot be opened, or another process appends to it.
@@ -119,7 +121,7 @@ class TrialFile(Content):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self.path = path
+        self.path, self.calls = path, itertools.count()
         with writing(path):
             self._file = locked(path, os.O_CREAT | os.O_APPEND)
         self._synced, self._seen, self._count = 0.0, list[str](), 0

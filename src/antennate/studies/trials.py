@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from antennate.errors import ConfigError
 from antennate.params.base import Params
-from antennate.studies.pool import Workers, chunk_of, gather
-from antennate.studies.work import Fail, Failure, no_failure
+from antennate.studies.columns import condition_of
+from antennate.studies.pool import Workers, gather
+from antennate.studies.work import Fail, Failure, Together, no_failure, package_of
 from antennate.telemetry.view import Restart
 
 if TYPE_CHECKING:
+    from antennate.studies.experiment import Found
     from antennate.telemetry.view.simulation import SimulationView
 
 Config = TypeVar("Config", bound=Params)
@@ -35,46 +39,135 @@ def no_row(row: Any) -> None:
     """Keep nothing."""
 
 
+def numbered(config: Any) -> list[Trial]:
+    """Trials of a configuration with `trials` of them and no conditions."""
+    return [("", number) for number in range(config.trials)]
+
+
+def can_take(function: Callable[..., Any], name: str) -> bool:
+    """Whether a function has an argument of this name."""
+    return name in inspect.signature(function).parameters
+
+
+_Task = tuple[Any, str, int, Path | None]
+"""Configuration, condition, number of the trial, folder for its log."""
+
+
+@dataclass(frozen=True)
+class Batches:
+    """Carries out some trials of one condition at once. Its functions are at the top of a module.
+
+    Attributes:
+        run: run(config, condition, numbers, emit) runs trials and emits each as it ends: its row
+            and what figures draw of it. As a function of one trial it may take `logs` and `view`.
+        most: Most trials at once.
+        gpu: gpu(config, condition, numbers, emit, device, logs) does that on a GPU; `device` is
+            a name of Warp or None, `logs` a folder or None. It raises ConfigError for what it
+            cannot do. None if nothing does.
+    """
+
+    run: Callable[..., None]
+    most: int
+    gpu: Callable[..., None] | None = None
+
+    def in_worker(self, tasks: Sequence[_Task], emit: Callable[[int, Any], None]) -> None:
+        """Carry out tasks, those of one condition at once."""
+        logs = tasks[0][3]
+        _by_condition(partial(self.run, **({"logs": logs} if logs else {})), tasks, emit)
+
+    def on_device(
+        self,
+        tasks: Sequence[_Task],
+        emit: Callable[[int, Any], None],
+        fail: Fail,
+        device: str | None,
+    ) -> None:
+        """Carry out tasks in batches; what fails is an invalid row, and nothing goes to `fail`.
+
+        Raises:
+            ConfigError: There are no batches, or none of this configuration.
+        """
+        if self.gpu is None:
+            raise ConfigError("expected trials that have batches on a GPU, found others")
+        _by_condition(partial(self.gpu, device=device, logs=tasks[0][3]), tasks, emit)
+
+
+def _by_condition(
+    carry_out: Callable[..., None], tasks: Sequence[_Task], emit: Callable[[int, Any], None]
+) -> None:
+    config = tasks[0][0]
+    places = {(name, number): i for i, (_, name, number, _) in enumerate(tasks)}
+    for name in dict.fromkeys(name for name, _ in places):
+        numbers = [number for condition, number in places if condition == name]
+
+        def take(item: tuple[Any, Any], name: str = name) -> None:
+            emit(places[name, item[0].trial], item)
+
+        carry_out(config, name, numbers, take)
+
+
+def _one_by_one(
+    trial: Callable[..., Any],
+    config: Any,
+    condition: str,
+    numbers: Sequence[int],
+    emit: OnTrial,
+    **how: Any,
+) -> None:
+    for number in numbers:
+        found = trial(config, condition, number, **how)
+        emit(found if isinstance(found, tuple) else (found, None))
+
+
+def _condition(config: Any, condition: str, number: int, logs: Path | None) -> str:
+    return condition
+
+
 @dataclass(frozen=True)
 class Trials(Generic[Config]):
     """Trials of an experiment, written once for workers, lockstep, GPU, logs, view and studies.
 
-    Any process can run any of them, in any order. What a trial comes to is a pair: its row, which
-    depends on the configuration and the trial alone, and what figures draw of it.
-
     Attributes:
-        condition: Column of a row that tells its condition.
-        every: every(config): all of them, in the order of the table.
-        carry_out: carry_out(config, condition, numbers, emit, **how): runs some of one condition,
-            and emits each as it ends; at the top of a module, or `OneByOne`. `how` may hold `logs`,
-            a folder, and what `watched` gives.
-        row: Class of the rows, a dataclass with the fields `condition` and `trial`.
-        invalid: invalid(config, condition, number, reason): row of a trial whose worker died.
-        most: How many may be run in lockstep.
-        batch: The same as `carry_out` in batches on a GPU, with the name of a `device` of Warp or
-            None in place of `how`; None if nothing does.
-        check_batch: Raises if a configuration, given with the folder for logs, has no such batches.
-        watched: watched(view): what `carry_out` is given to show its trials on a page.
-        interruptible: Whether an interrupted run ends with the trials that it has.
+        trial: trial(config, condition, number) -> its row, or a pair of its row and what figures
+            draw of it; at the top of a module. The row depends on these three alone. If it can take
+            `logs`, a folder for its log, or `view`, a page that shows it, the experiment has that
+            option. `Batches` in place of a function runs some at once.
+        row: Class of the rows, a dataclass with a field `trial`, and one with the metadata
+            `CONDITION` if there are conditions.
+        summarise: summarise(found) -> the result, from what the trials came to, see `Found`.
+        every: every(config) -> all trials, as pairs of condition and number, in the order of the
+            table; `trials` of the configuration, without conditions, if not given.
+        invalid: invalid(config, condition, number, reason) -> the row of a trial whose worker died;
+            without it such a trial ends the run.
+        drawn: Class of what figures draw of a trial. It need be given only if that is of another
+            package than row and trial, so that a run can go on with what its file says.
     """
 
-    condition: str
-    every: Callable[[Config], Sequence[Trial]]
-    carry_out: Callable[..., None]
+    trial: Callable[..., Any] | Batches
     row: type
-    invalid: Callable[[Config, str, int, str], Any]
-    most: int = 1
-    batch: Callable[..., None] | None = None
-    check_batch: Callable[[Config, Path | None], None] = lambda config, logs: None
-    watched: Callable[[SimulationView], Mapping[str, Any]] = lambda view: {}
-    interruptible: bool = False
+    summarise: Callable[[Found[Config, Any, Any]], Any]
+    every: Callable[[Config], Sequence[Trial]] = numbered
+    invalid: Callable[[Config, str, int, str], Any] | None = None
+    drawn: type | None = None
+
+    @property
+    def batches(self) -> Batches:
+        """What carries them out, one at once if it is a function of one trial."""
+        if isinstance(self.trial, Batches):
+            return self.trial
+        return Batches(partial(_one_by_one, self.trial), 1)
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The function that carries them out."""
+        return self.trial.run if isinstance(self.trial, Batches) else self.trial
 
     def run(
         self, config: Config, trials: Sequence[Trial], emit: Callable[[int, Any], None]
     ) -> None:
         """Run some trials in this process; emit the index and the row of each as it ends."""
         tasks = [(config, *trial, None) for trial in trials]
-        _Lockstep(self.carry_out, self.row)(tasks, lambda i, result: emit(i, result[0]))
+        self.batches.in_worker(tasks, lambda i, result: emit(i, result[0]))
 
     def run_on_device(
         self,
@@ -89,7 +182,7 @@ class Trials(Generic[Config]):
             ConfigError: This configuration has no such batches.
         """
         tasks = [(config, *trial, None) for trial in trials]
-        self._batched(tasks, lambda i, result: emit(i, result[0]), no_failure, device)
+        self.batches.on_device(tasks, lambda i, result: emit(i, result[0]), no_failure, device)
 
     def gather(
         self,
@@ -100,7 +193,7 @@ class Trials(Generic[Config]):
         logs: Path | None = None,
         view: SimulationView | None = None,
     ) -> tuple[list[tuple[Any, Any]], bool]:
-        """All trials by condition and number, and whether some are missing.
+        """All trials by condition and number, and whether Ctrl-C left some out.
 
         With a view they run in this process, one after the other, and give the same.
 
@@ -115,34 +208,39 @@ class Trials(Generic[Config]):
             on_row(item[0])
 
         def lost(place: int, failure: Failure) -> tuple[Any, None]:
-            if failure.status == "failed":
+            if failure.status == "failed" or self.invalid is None:
                 raise failure.raised()
             return self.invalid(config, *trials[place], failure.reason), None
 
         interrupted = False
         try:
             if view is None:
-                gather(
-                    _Lockstep(self.carry_out, self.row),
-                    [(config, *trial, logs) for trial in trials],
-                    *(workers, on_step, take),
-                    chunk=chunk_of(len(trials), workers, self.most),
-                    together=True,
-                    batched=self._batched if self.batch else None,
-                    lost=lost,
-                    group=lambda config, condition, *rest: condition,
-                )
+                tasks = [(config, *trial, logs) for trial in trials]
+                gather(self._together(), tasks, workers, on_step, take, lost)
             else:
                 for done, trial in enumerate(trials, start=1):
                     self._show(config, *trial, take, logs, view)
                     on_step(done, len(trials))
         except KeyboardInterrupt:
-            if not self.interruptible:
-                raise
             interrupted = True
         order = {name: i for i, name in enumerate(dict.fromkeys(name for name, _ in trials))}
-        ended.sort(key=lambda item: (order[getattr(item[0], self.condition)], item[0].trial))
+        ended.sort(key=lambda item: (order[self.condition_of(item[0])], item[0].trial))
         return ended, interrupted
+
+    def condition_of(self, row: Any) -> str:
+        """The condition of a row, empty without conditions."""
+        name = condition_of(self.row)
+        return getattr(row, name) if name else ""
+
+    def _together(self) -> Together:
+        known = filter(None, (self.function, self.row, self.drawn))
+        return Together(
+            self.batches.in_worker,
+            self.batches.most,
+            group=_condition,
+            batched=self.batches.on_device if self.batches.gpu else None,
+            packages=tuple(dict.fromkeys(map(package_of, known))),
+        )
 
     def _show(
         self,
@@ -154,64 +252,11 @@ class Trials(Generic[Config]):
         view: SimulationView,
     ) -> None:
         """One trial on a page; begun anew with another seed whenever a person wants that."""
-        how = {**({"logs": logs} if logs else {}), **self.watched(view)}
+        how = {"logs": logs} if logs else {}
+        name = f"{condition}, trial {number}" if condition else f"trial {number}"
         while True:
-            view.begin(f"{condition}, trial {number}", getattr(config, "seed", 0))
+            view.begin(name, getattr(config, "seed", 0))
             try:
-                return self.carry_out(config, condition, [number], emit, **how)
+                return self.batches.run(config, condition, [number], emit, view=view, **how)
             except Restart as wish:
                 config = config.model_copy(update={"seed": wish.seed})
-
-    def _batched(
-        self,
-        tasks: Sequence[_Task],
-        emit: Callable[[int, Any], None],
-        fail: Fail,
-        device: str | None,
-    ) -> None:
-        """Tasks on a GPU; what fails is an invalid row, and nothing is told to `fail`."""
-        self.check_batch(tasks[0][0], tasks[0][3])
-        assert self.batch is not None  # noqa: S101  whoever calls this has looked
-        _Lockstep(partial(self.batch, device=device), self.row)(tasks, emit)
-
-
-_Task = tuple[Any, str, int, Path | None]
-"""Configuration, condition, number of the trial, folder for its log."""
-
-
-class _Lockstep:
-    """Runs tasks in a worker, those of one condition at once."""
-
-    def __init__(self, carry_out: Callable[..., None], row: type) -> None:
-        self._carry_out = carry_out
-        self.__module__ = row.__module__  # by which `gather` knows whom to trust
-
-    def __call__(self, tasks: Sequence[_Task], emit: Callable[[int, Any], None]) -> None:
-        config, _, _, logs = tasks[0]
-        how = {"logs": logs} if logs else {}
-        places = {(name, number): i for i, (_, name, number, _) in enumerate(tasks)}
-        for name in dict.fromkeys(name for name, _ in places):
-            numbers = [number for condition, number in places if condition == name]
-
-            def take(item: tuple[Any, Any], name: str = name) -> None:
-                emit(places[name, item[0].trial], item)
-
-            self._carry_out(config, name, numbers, take, **how)
-
-
-@dataclass(frozen=True)
-class OneByOne:
-    """Runs trials one after the other: `Trials.carry_out` where nothing goes in lockstep.
-
-    Attributes:
-        trial: trial(config, condition, number, **how) -> what it comes to; at the top of a module.
-    """
-
-    trial: Callable[..., tuple[Any, Any]]
-
-    def __call__(
-        self, config: Any, condition: str, numbers: Sequence[int], emit: OnTrial, **how: Any
-    ) -> None:
-        """Run the trials of these numbers, and emit each."""
-        for number in numbers:
-            emit(self.trial(config, condition, number, **how))

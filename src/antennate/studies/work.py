@@ -11,9 +11,12 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from antennate.errors import LogError, WorkerError, in_one_line
+
+if TYPE_CHECKING:
+    from antennate.studies.trial_file import TrialFile
 
 CPUINFO = Path("/proc/cpuinfo")
 """Where Linux says what its processors are."""
@@ -76,22 +79,63 @@ def no_failure(place: int, failure: Failure) -> None:
     """Take a failure where there cannot be one."""
 
 
+def package_of(each: Any) -> str:
+    """The top-level package that a function or a class is of."""
+    return each.__module__.partition(".")[0]
+
+
+@dataclass(frozen=True)
+class Together:
+    """A function that carries out several tasks at once, for `gather`.
+
+    Functions among these are at the top of a module, as workers are given them.
+
+    Attributes:
+        function: function(tasks, emit): emits the index of each task and its result.
+        most: Most tasks that it is given at once.
+        group: group(*task) -> what neighbouring tasks have in common that one call may hold. Groups
+            take turns, so that each is known in part before the first is known in full.
+        batched: batched(tasks, emit, fail, device) does the work on a GPU, None if nothing does;
+            fail(index, failure) tells of a task that has no result.
+        packages: Packages whose classes its results have, beside that of the function.
+    """
+
+    function: Callable[..., None]
+    most: int
+    group: Callable[..., Any] | None = None
+    batched: Callable[..., None] | None = None
+    packages: tuple[str, ...] = ()
+
+    def __call__(self, tasks: Sequence[tuple[Any, ...]], emit: Emit) -> None:
+        """Carry out some tasks."""
+        self.function(tasks, emit)
+
+
 @dataclass(frozen=True)
 class Work:
     """Tasks of one kind, as a worker is given them.
 
     Attributes:
-        function: At the top of a module: function(*task) -> result; with `together`
-            function(tasks, emit), which emits the index of a task and its result.
+        function: function(*task) -> result, at the top of a module; or `Together`.
         tasks: Its arguments, by place.
-        together: Whether several tasks are carried out at once.
         timeout: Time after which a task that has not ended is given up [s].
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., Any] | Together
     tasks: Mapping[int, tuple[Any, ...]]
-    together: bool
     timeout: float
+
+    @property
+    def together(self) -> bool:
+        """Whether several tasks are carried out at once."""
+        return isinstance(self.function, Together)
+
+    @property
+    def packages(self) -> set[str]:
+        """Packages whose classes results may have: no file may name classes of others."""
+        if isinstance(self.function, Together):
+            return {"antennate", package_of(self.function.function), *self.function.packages}
+        return {"antennate", package_of(self.function)}
 
     def only(self, places: Sequence[int]) -> Work:
         """The tasks at these places alone."""
@@ -181,10 +225,8 @@ class Call:
         parts: Its places in parts, each for a worker at once.
         emit: Takes a result.
         fail: Takes why a task has none.
-        saw: Takes the model of each processor that tasks are run on.
-        folder: Run directory that it belongs to, None without.
-        batched: batched(tasks, emit, fail, device) does the work on a GPU, None if nothing does;
-            fail(index, failure) tells of a task that has no result.
+        trials: Where the run keeps its trials, and the processors that they ran on; None to keep
+            none.
         shared: What workers must share with this process, as of `environment`; None for no more
             than this package.
     """
@@ -195,13 +237,11 @@ class Call:
         parts: Sequence[Sequence[int]],
         emit: Emit,
         fail: Fail,
-        saw: Callable[[str], None] = lambda model: None,
-        folder: Path | None = None,
-        batched: Callable[..., Any] | None = None,
+        trials: TrialFile | None = None,
         shared: Mapping[str, Any] | None = None,
     ) -> None:
-        self.work, self.emit, self.fail, self.saw = work, emit, fail, saw
-        self.folder, self.batched, self.shared = folder, batched, shared
+        self.work, self.emit, self.fail = work, emit, fail
+        self.trials, self.shared = trials, shared
         self._parts = deque(list(part) for part in parts)
         self._deaths: Counter[int] = Counter()
 
@@ -218,6 +258,11 @@ class Call:
     def at_once(self) -> int:
         """Most tasks that are carried out at once."""
         return max(map(len, self._parts), default=1) if self.work.together else 1
+
+    def saw(self, model: str) -> None:
+        """Note the model of a processor that tasks are run on."""
+        if self.trials is not None:
+            self.trials.saw(model)
 
     def divide(self, size: int) -> None:
         """Divide what waits into parts of this size."""

@@ -19,9 +19,8 @@ from antennate.experiments.calibrate.next_push import (
 from antennate.experiments.calibrate.readings import conversion_sentence
 from antennate.experiments.calibrate.recording import Handled
 from antennate.experiments.calibrate.result import CalibrateResult, Curve, Sigmoid
-from antennate.experiments.calibrate.run import CalibrateOutcome
 from antennate.studies.columns import Ends, columns, shown
-from antennate.studies.experiment import Experiment
+from antennate.studies.experiment import Experiment, Files
 from antennate.studies.tables import Table
 
 _MUCH = 0.1
@@ -221,12 +220,11 @@ def _beyond_noise(ends: Ends | None) -> bool:
     return ends is not None and ends[0] * ends[1] > 0
 
 
-def _files(outcome: CalibrateOutcome) -> Mapping[str, str]:
-    return {
-        "calibration.json": outcome.calibration.to_json(),
-        "conditioning.toml": outcome.conditioning_toml(),
-        "recording.csv": recording.write(outcome.raw),
-    }
+FILES: Files = {
+    "calibration.json": lambda outcome: outcome.calibration.to_json(),
+    "conditioning.toml": lambda outcome: outcome.conditioning_toml(),
+    "recording.csv": lambda outcome: recording.write(outcome.raw),
+}
 
 
 EXPERIMENT = Experiment.of_folder(
@@ -236,8 +234,7 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     result=CalibrateResult,
-    files=_files,
-    parts="pushes",
+    files=lambda config: FILES,
     captions={
         "calibrate": "Readings against bends with the fitted curve, what it leaves, loading "
         "against unloading, and rival curves.",

@@ -12,9 +12,9 @@ from antennate.experiments.climb.physics import carry_out, lost_row
 from antennate.experiments.climb.result import ClimbResult
 from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.tables import sentence, tables
-from antennate.experiments.tunnel.batch import BATCH, watched
+from antennate.experiments.tunnel.batch import BATCH
 from antennate.studies.experiment import Experiment
-from antennate.studies.trials import Trial, Trials
+from antennate.studies.trials import Batches, Trial, Trials
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
@@ -46,32 +46,20 @@ def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
     }
 
 
-def none_valid(result: ClimbResult) -> bool:
-    """Whether every trial of some condition is invalid."""
-    climbs = [each for entry in result.climbing for each in entry.conditions.values()]
-    crosses = [each for e in result.grounds for some in e.grounds.values() for each in some]
-    return any(0 < each.trials == each.invalid for each in (*climbs, *crosses))
-
-
-EXPERIMENT = Experiment.of_trials(
+EXPERIMENT = Experiment.of_folder(
     __name__,
     ClimbConfig,
     Trials[ClimbConfig](
-        condition="cell",
-        every=every,
-        carry_out=carry_out,
+        Batches(carry_out, BATCH),
         row=ClimbRow,
+        summarise=lambda found: summarise(found.config, found.frame),
+        every=every,
         invalid=lost_row,
-        most=BATCH,
-        watched=watched,
-        interruptible=True,
     ),
-    summarise,
     tables,
     sentence,
     result=ClimbResult,
     films=films,
-    failed=none_valid,
     captions={
         "success": "Success over the height of the step and the width of the gap with Wilson's "
         "95 % interval, a row of panels for each gain divisor.",

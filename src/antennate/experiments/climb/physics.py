@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,11 +22,13 @@ from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.load import PitchLoad
 from antennate.experiments.climb.rows import ClimbRow, Place
 from antennate.experiments.climb.sensing import Touch, Verdict
-from antennate.experiments.tunnel.batch import PLAIN, run_trials
-from antennate.experiments.tunnel.lockstep import Apparatus
+from antennate.experiments.tunnel.batch import run_trials, watched
 from antennate.sim.episode import Episode
 from antennate.sim.world import World
 from antennate.types import Controller, Floats
+
+if TYPE_CHECKING:
+    from antennate.telemetry.view.simulation import SimulationView
 
 DRAWN = 1
 """Trials of each cell whose course is kept for the figure."""
@@ -240,10 +242,11 @@ def carry_out(
     name: str,
     trials: Sequence[int],
     emit: Callable[[tuple[ClimbRow, ClimbPath | None]], None],
-    apparatus: Apparatus = PLAIN,
+    view: SimulationView | None = None,
 ) -> None:
-    """Run trials of one cell in lockstep, and emit each as it ends."""
+    """Run trials of one cell in lockstep, and emit each as it ends; a page may show them."""
     cell = cells(config)[name]
+    apparatus = watched(view)
     made: list[Controller] = []
 
     def keep(kind: Any, control: Any = None, robot: Any = None, batch: int = 1) -> Controller:

@@ -219,3 +219,10 @@ class ClimbResult:
     """Other grounds: an entry for each gain divisor."""
     sensing: list[Sensing]
     """What is felt: an entry for each gain divisor; empty with `--sensing 0`."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether every trial of some condition is invalid."""
+        climbs = [each for entry in self.climbing for each in entry.conditions.values()]
+        crosses = [each for e in self.grounds for some in e.grounds.values() for each in some]
+        return any(0 < each.trials == each.invalid for each in (*climbs, *crosses))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from antennate.studies.columns import column, percent, tabular
+from dataclasses import field
+
+from antennate.studies.columns import CONDITION, column, percent, tabular
 from antennate.studies.pooling import mean
 
 
@@ -13,7 +15,7 @@ class Place:
     seed: int
     """Seed of the trials on this ground: on a step, that of the run plus ten thousand times the
     height in metres."""
-    cell: str
+    cell: str = field(metadata=CONDITION)
     """Name of the cell: part, condition, ground and gain divisor."""
     trial: int
     part: str

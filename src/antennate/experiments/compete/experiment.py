@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,11 +17,11 @@ from antennate.control.registry import make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.compete.apart import Apart
 from antennate.experiments.compete.checking import read_rows
-from antennate.experiments.compete.comparison import compared, refusal
+from antennate.experiments.compete.comparison import compared
 from antennate.experiments.compete.config import DEVELOPMENT, CompeteConfig, settled
 from antennate.experiments.compete.episodes import Draw, EpisodeRow, lost, run_episodes
 from antennate.experiments.compete.page import readme, sentence, tables
-from antennate.experiments.compete.result import CompeteResult, none_valid
+from antennate.experiments.compete.result import CompeteResult
 from antennate.experiments.compete.scenes import require_different_scenes, tunnel_config
 from antennate.experiments.compete.standings import standing
 from antennate.experiments.tunnel.batch import BATCH
@@ -29,12 +30,14 @@ from antennate.sim.judge import time_limit_of
 from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.studies.experiment import Done, Experiment
-from antennate.studies.pool import Workers, chunk_of, core_count, gather, places_of, workers_from
+from antennate.studies.pool import Workers, core_count, gather, places_of, workers_from
+from antennate.studies.processes import Processes
 from antennate.studies.run_times import span
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
-from antennate.studies.work import Failure
+from antennate.studies.work import Failure, Together
 from antennate.types import AntennaFrame, Controller
 
+_NOTE = logging.getLogger(__name__)
 START, COSTS = 2.0, (0.01, 0.2)
 """Time to begin, and time of a core for each second of the limits [s]: where all cross early and
 draws go in lockstep, and where most run into the limit, one by one (docs/performance.json)."""
@@ -91,7 +94,7 @@ def check(config: CompeteConfig) -> None:
     troubles = gather(
         _trouble_of,
         [(name, cells, config.decision_limit) for name, cells in asked.items()],
-        Workers(min(len(names), core_count()), timeout=PATIENCE, apart=True),
+        Workers(min(len(names), core_count()), Processes(), timeout=PATIENCE),
         no_step,
         lost=given_up,
     )
@@ -157,24 +160,32 @@ def run(
     """Run all episodes.
 
     Raises:
+        ConfigError: Shards of it would each draw a seed of its own.
         WorkerError: A worker process failed.
     """
-    workers = replace(workers_from(workers), engine=None, apart=True, _staying=None)
+    workers = workers_from(workers)
+    workers = replace(workers, engine=workers.engine or Processes())
+    if workers.shard is not None and config.hidden:
+        raise ConfigError(
+            "--shard: expected no --hidden beside it, as each shard would draw a seed of its own; "
+            "give --seed"
+        )
     planned = draws(config)
+    _NOTE.info(foretold(config, workers))
 
     def given_up(place: int, failure: Failure) -> EpisodeRow:
         return lost(planned[place], failure.reason)
 
     rows = gather(
-        run_episodes,
+        Together(run_episodes, BATCH, _cell),
         [(draw,) for draw in planned],
-        *(workers, on_step, on_row),
-        chunk=chunk_of(len(planned), workers, BATCH),
-        together=True,
-        lost=given_up,
-        group=lambda draw: (draw.controller, draw.scene, draw.seed),
+        *(workers, on_step, on_row, given_up),
     )
     return Done(rows, summarise(config, rows))
+
+
+def _cell(draw: Draw) -> tuple[str, str, int]:
+    return draw.controller, draw.scene, draw.seed
 
 
 def summarise(config: CompeteConfig, rows: Sequence[EpisodeRow]) -> CompeteResult:
@@ -189,33 +200,19 @@ def summarise(config: CompeteConfig, rows: Sequence[EpisodeRow]) -> CompeteResul
     )
 
 
-def failed(result: CompeteResult) -> bool:
-    """Whether a table that was checked does not repeat, or there is no valid episode at all."""
-    if result.check is not None:
-        return bool(refusal(result.check))
-    return len(none_valid(result)) == len(result.controllers)
-
-
-def undivided(config: CompeteConfig) -> str:
-    """Why shards cannot divide this run; empty if they can."""
-    hidden = (
-        "expected no --hidden beside it, as each shard would draw a seed of its own; give --seed"
-    )
-    return hidden if config.hidden else ""
+def prepared(config: CompeteConfig, folder: Path | None) -> CompeteConfig:
+    """The configuration with its seed, checked; see `settled` and `check`."""
+    config = settled(config, folder)
+    check(config)
+    return config
 
 
 EXPERIMENT = Experiment.of_folder(
     *(__name__, CompeteConfig, run, tables, sentence),
     result=CompeteResult,
     row=EpisodeRow,
-    settled=settled,
-    check=check,
-    names=lambda config: ["README.md"],
-    files=lambda outcome: {"README.md": readme(outcome.result(), outcome.rows)},
-    failed=failed,
-    undivided=undivided,
-    foretold=foretold,
-    parts="episodes",
+    settled=prepared,
+    files=lambda config: {"README.md": lambda outcome: readme(outcome.result(), outcome.rows)},
     workers="here",
     captions={
         "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.experiments.compete.comparison import Check
+from antennate.experiments.compete.comparison import Check, refusal
 from antennate.studies.columns import Ends, column, percent, tabular
 from antennate.studies.pooling import count, share, total
 from antennate.studies.statistics import wilson
@@ -137,6 +137,13 @@ class Standing:
 @tabular
 class CompeteResult(Standing, Asked):
     """What a run comes to."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether a table that was checked does not repeat, or there is no valid episode at all."""
+        if self.check is not None:
+            return bool(refusal(self.check))
+        return len(none_valid(self)) == len(self.controllers)
 
 
 def none_valid(result: Standing) -> dict[str, str | None]:

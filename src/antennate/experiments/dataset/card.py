@@ -46,16 +46,13 @@ def about(config: DatasetConfig, kind: Kind) -> dict[str, Any]:
     }
 
 
-def files(config: DatasetConfig, by_kind: Mapping[Kind, Windows]) -> dict[str, str | bytes]:
-    """A Parquet file for each kind, and the card."""
-    written: dict[str, str | bytes] = {"README.md": card(config, by_kind)}
-    for kind, windows in by_kind.items():
-        notes = {
-            column.name: {"unit": column.unit, "role": column.role, "meaning": column.meaning}
-            for column in columns_of(kind, config.robot)
-        }
-        written[f"{kind}.parquet"] = to_parquet(windows, notes, about(config, kind))
-    return written
+def parquet(config: DatasetConfig, kind: Kind, windows: Windows) -> bytes:
+    """The content of the Parquet file of a kind."""
+    notes = {
+        column.name: {"unit": column.unit, "role": column.role, "meaning": column.meaning}
+        for column in columns_of(kind, config.robot)
+    }
+    return to_parquet(windows, notes, about(config, kind))
 
 
 def card(config: DatasetConfig, by_kind: Mapping[Kind, Windows]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from antennate.experiments.sweep.physics import Trace, Wall, record
 from antennate.params.bench import SweepParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import Ball, Bench, compile_bench
-from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.columns import CONDITION, column, tabular, tabular_row
 from antennate.studies.pooling import total
 from antennate.types import Floats
 
@@ -41,7 +41,7 @@ class EpisodeRow(Kept):
     seed: int
     trial: int
     """Number of the episode."""
-    kind: str
+    kind: str = field(metadata=CONDITION)
     """`walk`, `gap` or `push`."""
     split: str
     """Split of the episode."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 from antennate.errors import SimulationError
-from antennate.experiments.dataset.card import files
+from antennate.experiments.dataset.card import card, parquet
 from antennate.experiments.dataset.columns import TASKS, Windows, columns_of, joined
 from antennate.experiments.dataset.config import (
     FORMAT,
@@ -34,12 +35,11 @@ from antennate.experiments.dataset.estimates import (
 )
 from antennate.experiments.dataset.walk import walk_windows
 from antennate.studies.columns import NONE, Frame, column, column_of, tabular
-from antennate.studies.experiment import Done, Experiment
+from antennate.studies.experiment import Experiment, Files, Found, checked
 from antennate.studies.parquet import require_parquet
-from antennate.studies.pool import Workers
-from antennate.studies.pooling import INVALID, by, frame, pooled
+from antennate.studies.pooling import INVALID, by, pooled
 from antennate.studies.tables import Table
-from antennate.studies.trials import OneByOne, OnRow, OnStep, Trials, no_row, no_step
+from antennate.studies.trials import Trials
 
 MAKE = {"walk": walk_windows, "gap": gap_windows, "push": push_windows}
 """What makes the windows of an episode, by its kind."""
@@ -85,17 +85,10 @@ class DatasetResult:
     published_percent: dict[str, float]
     """Published errors of CITRAS, of `base_to_tip` and `gap`."""
 
-
-@dataclass(frozen=True)
-class DatasetOutcome(Done):
-    """All episodes and their windows.
-
-    Attributes:
-        by_kind: Columns of the windows, by kind.
-    """
-
-    config: DatasetConfig
-    by_kind: dict[Kind, Windows]
+    @property
+    def failed(self) -> bool:
+        """Whether every episode of some kind is invalid."""
+        return any(0 < kind.trials == kind.invalid for kind in self.kinds.values())
 
 
 def episode(config: DatasetConfig, kind: Kind, trial: int) -> tuple[EpisodeRow, Windows | None]:
@@ -135,45 +128,37 @@ def invalid(config: DatasetConfig, kind: str, trial: int, reason: str) -> Episod
     )
 
 
-TRIALS = Trials[DatasetConfig](
-    "kind",
-    every=lambda config: [(kind, k) for k in range(config.trials) for kind in config.kinds],
-    carry_out=OneByOne(episode),
-    row=EpisodeRow,
-    invalid=invalid,
-)
+Outcome = Found[DatasetConfig, DatasetResult, Windows]
+"""All episodes and their windows."""
 
 
-def run(
-    config: DatasetConfig,
-    workers: int | Workers = 1,
-    on_step: OnStep = no_step,
-    on_row: OnRow = no_row,
-) -> DatasetOutcome:
-    """Run all episodes, and let the baselines estimate their labels.
+def windows_of(found: Outcome, kind: Kind) -> Windows:
+    """Columns of the windows of all episodes of a kind."""
+    parts = [windows for (of, _), windows in found.drawn.items() if of == kind]
+    return joined(columns_of(kind, found.config.robot), parts)
 
-    Raises:
-        WorkerError: A worker process failed.
-    """
-    ended, _ = TRIALS.gather(config, workers, on_step, on_row)
-    rows = [row for row, _ in ended]
-    by_kind: dict[Kind, Windows] = {}
-    for kind in config.kinds:
-        parts = [windows for row, windows in ended if row.kind == kind and windows is not None]
-        by_kind[kind] = joined(columns_of(kind, config.robot), parts)
-    result = DatasetResult(
+
+def by_kind(found: Outcome) -> dict[Kind, Windows]:
+    """Columns of the windows of all episodes, by kind."""
+    return {kind: windows_of(found, kind) for kind in found.config.kinds}
+
+
+def summarise(found: Outcome) -> DatasetResult:
+    """The result of a run: the baselines estimate the labels of its windows."""
+    config = found.config
+    windows = by_kind(found)
+    return DatasetResult(
         format=FORMAT,
         seed=config.seed,
         rate_hz=config.rate,
         history=HISTORY,
         kinds={
-            kind: _kind(some, by_kind[kind])
-            for kind, some in by(frame(rows, EpisodeRow), "kind", config.kinds).items()
+            kind: _kind(some, windows[kind])
+            for kind, some in by(found.frame, "kind", config.kinds).items()
         },
-        tasks=summary(config, by_kind),
+        tasks=summary(config, windows),
         published_percent=PUBLISHED,
     )
-    return DatasetOutcome(rows, result, config, by_kind)
 
 
 def _kind(rows: Frame, windows: Windows) -> KindSummary:
@@ -250,19 +235,37 @@ def sentence(result: DatasetResult) -> str:
     return f"Mean absolute error on test (95 %): {'; '.join(told)}."
 
 
+def files(config: DatasetConfig) -> Files:
+    """The card, and a Parquet file for each kind."""
+    tables = {f"{kind}.parquet": partial(_parquet, kind=kind) for kind in config.kinds}
+    return {"README.md": _card, **tables}
+
+
+def _card(found: Outcome) -> str:
+    return card(found.config, by_kind(found))
+
+
+def _parquet(found: Outcome, kind: Kind) -> bytes:
+    return parquet(found.config, kind, windows_of(found, kind))
+
+
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, DatasetConfig, run, tables, sentence),
-    trials=TRIALS,
+    __name__,
+    DatasetConfig,
+    Trials[DatasetConfig](
+        episode,
+        row=EpisodeRow,
+        summarise=summarise,
+        every=lambda config: [(kind, k) for k in range(config.trials) for kind in config.kinds],
+        invalid=invalid,
+    ),
+    tables,
+    sentence,
     result=DatasetResult,
-    row=EpisodeRow,
-    names=lambda config: ["README.md", *(f"{kind}.parquet" for kind in config.kinds)],
-    files=lambda outcome: files(outcome.config, outcome.by_kind),
-    check=lambda config: require_parquet("dataset") and None,
-    failed=lambda result: any(0 < kind.trials == kind.invalid for kind in result.kinds.values()),
-    parts="episodes",
+    files=files,
+    settled=checked(lambda config: require_parquet("dataset") and None),
     captions={
         "dataset": "Mean absolute error of each baseline, by task and split, with its interval "
         "over episodes."
     },
-    explained="docs/dataset.md",
 )

@@ -12,7 +12,7 @@ from antennate import figures as style
 from antennate.experiments.dataset.columns import TASKS
 from antennate.experiments.dataset.config import TESTS
 from antennate.experiments.dataset.estimates import BASELINES, MAE, Errors, TaskResult
-from antennate.experiments.dataset.experiment import TITLES, DatasetOutcome
+from antennate.experiments.dataset.experiment import TITLES, Outcome
 from antennate.studies.columns import Column
 
 _MARKS = {
@@ -23,7 +23,7 @@ _MARKS = {
 
 
 @style.styled
-def figures(outcome: DatasetOutcome) -> dict[str, Figure]:
+def figures(outcome: Outcome) -> dict[str, Figure]:
     """Errors of the baselines in each task, on the three splits of test."""
     results = outcome.result().tasks
     tasks = [task for task in TASKS if task.name in results]

@@ -264,7 +264,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=ForceResult,
     row=TraverseRow,
-    parts="profiles",
     captions={
         "force": "Force over flex, at rest and on the move, and the share of the force "
         "that one reading explains.",

@@ -26,7 +26,7 @@ from antennate.experiments.gait.result import (
 )
 from antennate.params.control import GaitParams
 from antennate.sim.world import World
-from antennate.studies.experiment import Done, Experiment
+from antennate.studies.experiment import Done, Experiment, checked
 from antennate.studies.pool import Workers, gather
 from antennate.studies.tables import Table
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
@@ -250,10 +250,8 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     result=GaitResult,
-    check=check,
-    parts="walks",
+    settled=checked(check),
     logs=log_names,
-    shown=True,
     captions={
         "gait": "The sweep over the lead of the body wave, and the maneuvers from above.",
         "unknown": "FORWARD over all draws of the unknown numbers, and over each of them alone.",

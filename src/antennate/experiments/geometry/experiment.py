@@ -343,7 +343,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=GeometryResult,
     row=Walked,
-    parts="walks",
     captions={
         "agreement": "Speed and yaw of random gaits by the model, against those by the engine.",
         "leads": "The best lead over wave numbers: engine, model, and the law of stiff servos.",

@@ -340,5 +340,4 @@ EXPERIMENT = Experiment.of_folder(
     row=Row,
     body=body,
     captions={claim.name: f"{claim.claim}." for claim in CLAIMS},
-    parts="% of 8 experiments",
 )

@@ -177,7 +177,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=ServoResult,
     row=RecordingRow,
-    parts="fits",
     figures=figures,
     captions={
         "servo": "Goals and measured positions of each recording, with those of two models; "

@@ -12,7 +12,15 @@ from pydantic.fields import FieldInfo
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shortened, without_group
 from antennate.params.base import Params, number
-from antennate.studies.plan import RANGE_OR_CHOICES, Axes, Kind, Point, Range, make_points
+from antennate.studies.plan import (
+    RANGE_OR_CHOICES,
+    Axes,
+    Kind,
+    Planned,
+    Point,
+    Range,
+    make_points,
+)
 
 OF_SEARCH = (
     *("maximize", "minimize", "batch", "least_ok", "validated", "validation_factor", "reference"),
@@ -20,7 +28,7 @@ OF_SEARCH = (
 """Parameters that only plan optuna reads."""
 
 
-class StudyConfig(Params):
+class StudyConfig(Planned):
     """Everything that decides the outcome of `antennate study`."""
 
     experiment: str = number(

@@ -12,7 +12,7 @@ from antennate.experiments.study.effects import Elementary, Slope
 from antennate.experiments.study.result import Cell, StudyResult, Successes
 from antennate.experiments.study.run import check, planned, run
 from antennate.studies.columns import NONE
-from antennate.studies.experiment import Experiment
+from antennate.studies.experiment import Experiment, checked
 from antennate.studies.tables import Table, few, of_valid
 
 _MOST = 60
@@ -168,15 +168,8 @@ EXPERIMENT = Experiment.of_folder(
     tables,
     sentence,
     result=StudyResult,
-    check=check,
-    failed=lambda result: measures.NO_RESULT.issuperset(result.statuses),
-    continued=True,
+    settled=checked(check),
     tasks=planned,
-    undivided=lambda config: (
-        "expected another plan than optuna, whose trials follow from others, found it"
-        if config.plan == "optuna"
-        else ""
-    ),
     captions={
         "effects": "The largest effects with their intervals, and how far noise alone would reach.",
         "map": "The response over two parameters, a map for each condition.",

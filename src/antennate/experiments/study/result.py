@@ -10,7 +10,7 @@ import numpy as np
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.designs import Search
 from antennate.experiments.study.effects import SUCCESS, Elementary, Slope, effects, value
-from antennate.experiments.study.measures import bounds, measure_of
+from antennate.experiments.study.measures import NO_RESULT, bounds, measure_of
 from antennate.studies import statistics
 from antennate.studies.columns import Column, Ends, column, tabular
 from antennate.studies.plan import Axes, Kind, Point
@@ -96,6 +96,11 @@ class StudyResult:
     grid, a list and optuna."""
     search: Search | None = None
     """Designs that optuna proposed; `null` in other plans."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether no trial gave a row."""
+        return NO_RESULT.issuperset(self.statuses)
 
     @property
     def measure(self) -> Column:

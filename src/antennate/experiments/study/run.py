@@ -30,9 +30,9 @@ from antennate.experiments.study.tasks import (
 from antennate.messages import shortened
 from antennate.studies.experiment import Done
 from antennate.studies.plan import Point
-from antennate.studies.pool import Workers, chunk_of, gather
+from antennate.studies.pool import Workers, gather, workers_from
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
-from antennate.studies.work import Failure
+from antennate.studies.work import Failure, Together
 
 
 def check(config: StudyConfig) -> None:
@@ -173,20 +173,10 @@ def run(
                 checked = True
             on_row({"point": key[0], **row})
 
-    chunk = chunk_of(len(tasks), workers, subject.most)
+    function = Together(run_tasks, subject.most, batched=run_batched)
     interrupted = False
     try:
-        gather(
-            run_tasks,
-            tasks,
-            workers,
-            on_step,
-            take,
-            chunk=chunk,
-            together=True,
-            lost=lost,
-            batched=run_batched,
-        )
+        gather(function, tasks, workers, on_step, take, lost)
     except KeyboardInterrupt:
         interrupted = True
     rows = aligned(
@@ -211,6 +201,10 @@ def run(
 
 def _searched(config: StudyConfig, workers: int | Workers, on_step: OnStep, on_row: OnRow) -> Done:
     """A search in place of the points of a plan."""
+    if workers_from(workers).shard is not None:
+        raise ConfigError(
+            "--shard: expected another plan than optuna, whose trials follow from others"
+        )
     ended = search.search(config, workers, on_step, on_row)
     found = summarise(
         config,

@@ -37,9 +37,9 @@ from antennate.experiments.study.tasks import REASON, STATUS, Key, Task, aligned
 from antennate.messages import shortened
 from antennate.params.base import Params, put_over
 from antennate.studies.plan import Point, Range, require_values
-from antennate.studies.pool import Workers, chunk_of, gather, workers_from
+from antennate.studies.pool import Workers, gather, workers_from
 from antennate.studies.trials import OnRow, OnStep, Trial
-from antennate.studies.work import Failure
+from antennate.studies.work import Failure, Together
 
 FRESH = 1_000_000
 """Added to a seed, it gives one that no trial of a search has."""
@@ -279,12 +279,11 @@ class Searching:
 
         self.trials_each = self.trials_each or len(tasks) // max(1, len(designs))
         total = self.before + len(tasks) + self._to_come(phase)
-        chunk = chunk_of(len(tasks), self.workers, self.subject.most)
         try:
             if tasks:
-                how: dict[str, Any] = {"chunk": chunk, "together": True, "lost": lost}
                 step = functools.partial(self._step, self.before, total)
-                gather(run_tasks, tasks, self.workers, step, take, **how)
+                function = Together(run_tasks, self.subject.most)
+                gather(function, tasks, self.workers, step, take, lost)
         finally:
             self.rows += [row for task in tasks for row in rows.get(task.key, ())]
         self.before += len(tasks)

@@ -21,7 +21,7 @@ from antennate.lookup import Registry
 from antennate.messages import nearest, shortened, shown
 from antennate.params.base import ALLOWED, Params, put_over, with_bases
 from antennate.params.faults import describe
-from antennate.studies.columns import content
+from antennate.studies.columns import condition_of, content
 from antennate.studies.engines import NO_BATCHES
 from antennate.studies.experiment import Experiment
 from antennate.studies.plan import Point
@@ -181,11 +181,10 @@ class _ExperimentSubject:
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
         self._experiment, self._trials = experiment, experiment.trials
         self.model: type[Params] | None = experiment.config
-        self.condition = self._trials.condition if self._trials else ""
-        self.most = self._trials.most if self._trials else 1
+        self.condition = condition_of(self._trials.row) if self._trials else ""
+        self.most = self._trials.batches.most if self._trials else 1
         self.whole = self._trials is None
-        row = self._trials.row if self._trials else experiment.row
-        self.columns = columns_of(row) if row else None
+        self.columns = columns_of(experiment.row) if experiment.row else None
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
         """Its configuration from nested values; `allowed` may differ though nothing reads them."""
@@ -198,7 +197,7 @@ class _ExperimentSubject:
         return config
 
     def check(self, config: Any) -> None:
-        self._experiment.check(config)
+        self._experiment.settled(config, None)
 
     def trials(self, config: Any) -> Sequence[Trial]:
         """All of them, in the order of its table."""
@@ -221,7 +220,7 @@ class _ExperimentSubject:
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
         """The same on a GPU or another device of Warp."""
-        if self._trials is None or self._trials.batch is None:
+        if self._trials is None or self._trials.batches.gpu is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)
 

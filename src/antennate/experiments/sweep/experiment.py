@@ -44,6 +44,7 @@ from antennate.studies.pool import Workers, gather
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
+from antennate.studies.work import Together
 
 MOTIONS = ("fixed", "moving")
 _TASK = 12
@@ -159,8 +160,13 @@ def map_cell(
     return row, outlines_of(f"{motion} {number}", trace, 1.0 / sweep.frequency) if saved else None
 
 
-def _sweep(function: Callable[..., Any], *arguments: Any) -> Any:
-    return function(*arguments)
+def _sweep(tasks: Sequence[tuple[Any, ...]], emit: Callable[[int, Any], None]) -> None:
+    for i, (function, *arguments) in enumerate(tasks):
+        emit(i, function(*arguments))
+
+
+def _points(outcome: Sweeps) -> str | None:
+    return outlines_csv(outcome.outlines) if outcome.outlines else None
 
 
 def run(
@@ -185,7 +191,8 @@ def run(
     def keep(item: Any) -> None:
         on_row(_row(config, item) if isinstance(item, Trial) else item[0])
 
-    items: list[Any] = gather(_sweep, [*cells, *trials], workers, on_step, keep, _TASK)
+    tasks = [*cells, *trials]
+    items: list[Any] = gather(Together(_sweep, _TASK), tasks, workers, on_step, keep)
     mapped, tried = items[: len(cells)], items[len(cells) :]
     rows = [row for row, _ in mapped]
     return Sweeps(
@@ -260,10 +267,7 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=SweepResult,
     row=SweepRow,
-    files=lambda outcome: (
-        {"points.csv": outlines_csv(outcome.outlines)} if outcome.outlines else {}
-    ),
-    parts="sweeps",
+    files=lambda config: {"points.csv": _points} if config.points else {},
     captions={
         "sweep": "Shares of the time in each shape, with the base fixed and moving, and "
         "the errors of the estimates.",

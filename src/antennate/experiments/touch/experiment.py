@@ -291,7 +291,6 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=TouchResult,
     row=TouchRow,
-    parts="traverses",
     captions={
         "touch": "F1 by speed and by wall, and latencies by speed, a colour for each profile.",
         "touch_roc": "True against false contacts for every threshold, with the default "

@@ -285,16 +285,13 @@ EXPERIMENT = Experiment.of_folder(
     run,
     tables,
     sentence,
-    files=lambda outcome: {"frames.csv": outcome.frames_csv()},
+    files=lambda config: {"frames.csv": lambda outcome: outcome.frames_csv()},
     result=TracksResult,
     row=TrackRow,
-    failed=lambda result: not result.trials_in_contact,
-    parts="files",
     figures=figures,
     captions={
         "tracks": "Shares of the shapes in each trial and over all, outlines of each shape, an "
         "angle over time, and what other criteria change.",
     },
-    explained="docs/tracks.md",
     workers="none",
 )

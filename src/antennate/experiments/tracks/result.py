@@ -125,3 +125,8 @@ class TracksResult:
     """Median curvature of each shape at each inner point, base first, times the length."""
     correct: float | None
     """Share of frames that are classified correctly, of the synthetic animal alone."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether no animal is in contact."""
+        return not self.trials_in_contact

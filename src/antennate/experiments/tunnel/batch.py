@@ -91,13 +91,15 @@ def _run(begin: Callable[[int], Lockstep], trials: Sequence[int], batch: int) ->
             _run(begin, [trial], 1)
 
 
-def watched(view: SimulationView) -> dict[str, Any]:
-    """What `run_trials` is given to show its trials on a page."""
+def watched(view: SimulationView | None) -> Apparatus:
+    """What `run_trials` is given to show its trials on a page, if there is one."""
+    if view is None:
+        return PLAIN
 
     def watch(world: World, frame: AntennaFrame, control: Controller) -> Sequence[str]:
         return view.tick(world.model, world.data, frame, control)
 
-    return {"apparatus": Apparatus(view.controller, watch=watch)}
+    return Apparatus(view.controller, watch=watch)
 
 
 class _Taped(Wrapped):

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of, short_names
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.batch import BATCH, run_trials, watched
-from antennate.experiments.tunnel.lockstep import Apparatus, Emit, lost_row
+from antennate.experiments.tunnel.batch import BATCH, run_trials
+from antennate.experiments.tunnel.batches import on_cpu, on_warp
+from antennate.experiments.tunnel.lockstep import Apparatus, lost_row
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import TunnelResult, summarise
-from antennate.experiments.tunnel.tables import none_valid, sentence, tables
+from antennate.experiments.tunnel.tables import sentence, tables
 from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
-from antennate.studies.experiment import Experiment
-from antennate.studies.trials import Trial, Trials
+from antennate.studies.experiment import Experiment, checked
+from antennate.studies.trials import Batches, Trial, Trials
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Controller
 
@@ -62,22 +62,6 @@ def tasks(config: TunnelConfig) -> list[tuple[str, int, int]]:
         (name, trial, config.following(trial) if parts_of(name)[1] == YOKED else trial)
         for name, trial in every(config)
     ]
-
-
-def _on_warp(
-    config: TunnelConfig, condition: str, trials: Sequence[int], emit: Emit, device: str | None
-) -> None:
-    """Trials in batches on a GPU."""
-    from antennate.experiments.tunnel.warp import run_trials_on_warp
-
-    run_trials_on_warp(config, condition, trials, emit, device=device)
-
-
-def _check_batch(config: TunnelConfig, logs: Path | None) -> None:
-    if logs is not None:
-        raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
-    if YOKED in config.readings:
-        raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
 
 
 SPEED = 2.0
@@ -142,28 +126,21 @@ CAPTIONS = {
     "restricted mean time, with a 95 % interval from five trials on.",
 }
 
-EXPERIMENT = Experiment.of_trials(
+EXPERIMENT = Experiment.of_folder(
     __name__,
     TunnelConfig,
     Trials[TunnelConfig](
-        condition="controller",
-        every=every,
-        carry_out=run_trials,
+        Batches(on_cpu, BATCH, on_warp),
         row=TrialResult,
+        summarise=lambda found: summarise(found.config, found.frame),
+        every=every,
         invalid=lost_row,
-        most=BATCH,
-        batch=_on_warp,
-        check_batch=_check_batch,
-        watched=watched,
-        interruptible=True,
     ),
-    summarise,
     tables,
     sentence,
     result=TunnelResult,
-    check=check,
+    settled=checked(check),
     films=films,
-    failed=lambda result: bool(none_valid(result)),
     logs=lambda config: [log_name(f"{name}-{trial}") for name, trial in every(config)],
     tasks=tasks,
     captions=CAPTIONS,

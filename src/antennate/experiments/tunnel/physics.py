@@ -43,7 +43,7 @@ from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import TrialConfig, require_own_curves
 from antennate.sim.world import World
-from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.columns import CONDITION, column, tabular, tabular_row
 from antennate.studies.pooling import largest, mean, smallest, total
 from antennate.types import Floats, Maneuver
 
@@ -170,7 +170,7 @@ class TrialResult(Measured):
 
     seed: int
     trial: int
-    controller: str
+    controller: str = field(metadata=CONDITION)
     """Name of the controller, with its readings if they are not its own."""
     outcome: Outcome
     """How it ended, see above."""

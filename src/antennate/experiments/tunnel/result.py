@@ -115,6 +115,11 @@ class TunnelResult:
     paired: dict[str, Pair]
     """Every two controllers, as `first-second`."""
 
+    @property
+    def failed(self) -> bool:
+        """Whether every trial of some controller is invalid."""
+        return any(0 < each.trials == each.invalid for each in self.controllers.values())
+
 
 def summarise(config: TunnelConfig, rows: Frame) -> TunnelResult:
     """The result of the rows of a run."""

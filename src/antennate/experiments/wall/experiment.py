@@ -17,18 +17,20 @@ from antennate.experiments.wall.physics import (
     invalid,
     passage,
 )
-from antennate.sim.bench import Watch, unwatched
+from antennate.sim.bench import Bench, unwatched
 from antennate.studies.charts import Shares, Strip
 from antennate.studies.columns import Ends, Frame, column, column_of, tabular
 from antennate.studies.experiment import Experiment, Found
 from antennate.studies.pooling import by, count, pooled, valid
 from antennate.studies.statistics import Discordance, Matched, mcnemar, wilson
 from antennate.studies.tables import Table, few, successes
-from antennate.studies.trials import OneByOne, Trials
+from antennate.studies.trials import Trials
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from antennate.telemetry.view.simulation import SimulationView
 
 REFERENCE: Profile = "descending"
 """The profile that all others are compared with."""
@@ -96,6 +98,11 @@ class WallResult:
     paired: dict[str, Pair]
     """`descending` against each other profile, as `descending-stiff`."""
 
+    @property
+    def failed(self) -> bool:
+        """Whether every trial of some profile is invalid."""
+        return any(0 < each.trials == each.invalid for each in self.profiles.values())
+
 
 def summarise(config: WallConfig, rows: Frame) -> WallResult:
     """The result of the rows of a run."""
@@ -146,11 +153,16 @@ def _matched(both: Frame, outcome: str) -> Matched:
 
 
 def run_trial(
-    config: WallConfig, profile: str, trial: int, watch: Watch = unwatched
+    config: WallConfig, profile: str, trial: int, view: SimulationView | None = None
 ) -> tuple[WallTrial, Traverse | None]:
-    """One trial, and of the first of a profile its passage."""
+    """One trial, which a page may show, and of the first of a profile its passage."""
+
+    def watch(bench: Bench) -> None:
+        if view is not None:
+            view.tick(bench.model, bench.data)
+
     try:
-        seen = passage(config, profile, trial, watch)
+        seen = passage(config, profile, trial, watch if view else unwatched)
     except SimulationError as error:
         return invalid(config, profile, trial, str(error)), None
     row = classify(config.wall, config.seed, trial, profile, seen)
@@ -251,25 +263,20 @@ def _draw_boulders(panel: Axes, seen: Traverse) -> None:
         panel.add_patch(Circle((x, y), radius, color=style.MUTED, linewidth=0))
 
 
-EXPERIMENT = Experiment.of_trials(
+EXPERIMENT = Experiment.of_folder(
     __name__,
     WallConfig,
     Trials[WallConfig](
-        condition="profile",
-        every=lambda config: [(p, k) for k in range(config.trials) for p in config.profiles],
-        carry_out=OneByOne(run_trial),
+        run_trial,
         row=WallTrial,
+        summarise=lambda found: summarise(found.config, found.frame),
+        every=lambda config: [(p, k) for k in range(config.trials) for p in config.profiles],
         invalid=invalid,
-        watched=lambda view: {"watch": lambda bench: view.tick(bench.model, bench.data)},
     ),
-    summarise,
     tables,
     sentence,
     result=WallResult,
     figures=figures,
-    failed=lambda result: any(  # all trials of a profile are invalid
-        0 < each.trials == each.invalid for each in result.profiles.values()
-    ),
     captions={
         "wall": "Outcomes of the trials of each profile, over the whole travel and after the "
         "start.",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from antennate.params.bench import BenchVariationParams, WallParams
 from antennate.params.scene import GRAVITY, BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
 from antennate.sim.bench import Ball, Bench, Watch, compile_bench, unwatched
-from antennate.studies.columns import column, tabular, tabular_row
+from antennate.studies.columns import CONDITION, column, tabular, tabular_row
 from antennate.studies.pooling import largest, median
 from antennate.types import Floats
 
@@ -110,7 +110,7 @@ class WallTrial(Measured):
 
     seed: int
     trial: int
-    profile: str
+    profile: str = field(metadata=CONDITION)
     outcome: Outcome
     """Success, jam, slip or invalid, over the whole travel."""
     outcome_after_start: Outcome
