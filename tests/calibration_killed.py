@@ -49,7 +49,7 @@ def outcome(sensor_id: str) -> CalibrateOutcome:
 
 def calibrate(folder: Path, made: CalibrateOutcome) -> None:
     """The command from the end of the fit on."""
-    experiment: Any = dataclasses.replace(EXPERIMENT, run=lambda *_: made)
+    experiment: Any = dataclasses.replace(EXPERIMENT, procedure=lambda *_: made)
     options = Options(out=folder, overwrite=True, json=True, no_figures=True)
     carry_out(experiment, [], made.config, options)
 

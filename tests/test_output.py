@@ -130,7 +130,7 @@ def test_a_terminal_of_twenty_columns(tmp_path: Path) -> None:
     assert "Traceback" not in terminal.text
     xterm, dumb, rest = re.split(r"written to runs/gait-[12]\r\n", terminal.text)
     assert "\x1b" in xterm
-    assert dumb.startswith("walks: 1 of 7")
+    assert dumb.startswith("gait: 1 of 7")
     assert "\x1b" not in dumb + rest
 
 

@@ -374,7 +374,9 @@ def test_where_numbers_were_fitted_a_claim_is_fitted_at_best_and_says_so(
     """Here the soft one slips and all springs stay below 30°: conditional by default."""
     found = passing(20, 3, stiff={"jams": 19}, compliant={"slips": 19})
     load = experiments.load
-    stub = dataclasses.replace(load("wall"), run=lambda *_: SimpleNamespace(result=lambda: found))
+    stub = dataclasses.replace(
+        load("wall"), procedure=lambda *_: SimpleNamespace(result=lambda: found)
+    )
     monkeypatch.setattr(experiments, "load", lambda n: stub if n == "wall" else load(n))
     monkeypatch.setattr(reproduce, "FULL", {"antenna": {}, "wall": {}})
     monkeypatch.setattr(reproduce, "QUICK", {"antenna": {}, "wall": {}})
@@ -492,7 +494,7 @@ def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -
         raise KeyboardInterrupt
 
     load = experiments.load
-    stopped = dataclasses.replace(load("gait"), run=interrupted)
+    stopped = dataclasses.replace(load("gait"), procedure=interrupted)
     monkeypatch.setattr(experiments, "load", lambda n: stopped if n == "gait" else load(n))
     monkeypatch.setattr(reproduce, "QUICK", {"antenna": {}, "gait": {}})
     half = EXPERIMENT.run(ReproduceConfig(quick=True), 1, lambda *_: None, lambda row: None)

@@ -27,7 +27,7 @@ sleep = {{sleep}}
 [vary]
 x = [0.5, 1.5]
 """
-PROGRESS = ("trials: ", "written to ")
+PROGRESS = ("study: ", "written to ")
 """How lines on stderr begin that are there without a fault."""
 pytestmark = pytest.mark.slow
 
