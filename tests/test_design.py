@@ -67,7 +67,7 @@ def test_a_known_front_is_found_and_run_again(capsys: pytest.CaptureFixture[str]
     assert main(["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1"]) == 0
     out, err = capsys.readouterr()
     assert "optuna" not in (out + err).lower()
-    said = [line for line in err.splitlines() if not re.match(r"So far|[ ─]|trials +[0-9]|$", line)]
+    said = [line for line in err.splitlines() if not re.match(r"So far|[ ─]|study: [0-9]|$", line)]
     assert all(line.startswith(("design: ", "written to ")) for line in said)
     assert optuna.logging.get_verbosity() == quiet
     told = " ".join(out.split())
