@@ -115,6 +115,7 @@ def test_a_key_let_go_again_and_again_is_no_fault() -> None:
     assert report.ended == "the end of its time"
 
 
+@pytest.mark.ci
 def test_it_needs_a_terminal_and_says_so(tmp_path: Path) -> None:
     words = ["drive", "--esp32", "a", "--bus", "b", "--hold-to-run", "--out", str(tmp_path / "r")]
     run = subprocess.run(

@@ -226,9 +226,11 @@ def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None
     for row in stiffness:
         assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
     assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
-    main(["geometry", "--robot.links", "3", "--no-figures", "--out", "other"])
+    main(["calibrate", "--no-figures", "--out", "other"])
     told = refusal(capsys, "--compare", "coil-4", "other")
-    assert "expected two runs of one command, found antenna in coil-4 and geometry in other" in told
+    assert (
+        "expected two runs of one command, found antenna in coil-4 and calibrate in other" in told
+    )
 
 
 def test_points_of_two_studies_stand_together_by_what_varies() -> None:

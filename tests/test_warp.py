@@ -242,7 +242,7 @@ def test_a_study_of_another_experiment_has_no_batches(
 ) -> None:
     study = tmp_path / "springs.toml"
     study.write_text('experiment = "antenna"\n[vary]\nwire_mm = [0.4, 0.5]\n')
-    assert "study of it; springs has none" in refused(
+    assert "study of it; antenna has none" in refused(
         "study", str(study), "--engine", "warp", "--out", str(tmp_path / "run")
     )
 

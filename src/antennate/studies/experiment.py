@@ -16,28 +16,26 @@ your own is named by an entry point (docs/experiments.md).
 
 from __future__ import annotations
 
-import functools
 import importlib
 import importlib.util
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar, cast
 
 from antennate.errors import ConfigError
-from antennate.studies.columns import Frame, content, typed
+from antennate.studies.columns import content, typed
 from antennate.studies.formats import strict
 from antennate.studies.plan import Planned
 from antennate.studies.pool import Workers
-from antennate.studies.pooling import frame
 from antennate.studies.report import View
 from antennate.studies.tables import Table
 from antennate.studies.trials import (
     Config,
+    Found,
     OnRow,
     OnStep,
-    Trial,
     Trials,
     can_take,
     no_row,
@@ -80,43 +78,6 @@ ELSEWHERE = ("whole", "anywhere")
 """Where trials may run if they may on other machines."""
 Files = Mapping[str, Callable[[Any], str | bytes | None]]
 """Names of files, and what makes the content of each of an outcome; None for no such file."""
-Result = TypeVar("Result")
-Drawn = TypeVar("Drawn")
-
-
-@dataclass(frozen=True)
-class Found(Generic[Config, Result, Drawn]):
-    """What the trials of a run came to.
-
-    Attributes:
-        config: The configuration.
-        rows: Finished trials in the order of conditions and numbers.
-        drawn: What figures draw of a trial, by its condition and its number.
-        interrupted: Whether trials are missing.
-        row: Class of the rows.
-        summarise: summarise(found) -> result, an object.
-    """
-
-    config: Config
-    rows: list[Any]
-    drawn: dict[Trial, Drawn]
-    interrupted: bool
-    row: type
-    summarise: Callable[[Found[Any, Any, Any]], Result]
-
-    @functools.cached_property
-    def frame(self) -> Frame:
-        """The rows as a pandas DataFrame."""
-        return frame(self.rows, self.row)
-
-    @functools.cached_property
-    def _result(self) -> Any:
-        found: Any = self.summarise(self)
-        return replace(found, interrupted=True) if self.interrupted else found
-
-    def result(self) -> Result:
-        """What they come to; `interrupted` is true in it if trials are missing."""
-        return self._result
 
 
 def checked(check: Callable[[Config], None]) -> Callable[[Config, Path | None], Config]:

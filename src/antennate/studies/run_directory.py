@@ -352,7 +352,7 @@ class RunDirectory:
             if self._lock is not None and stays:
                 run_files.trim_list(self.path, self._lock)
             elif self._lock is not None:
-                run_files.remove_run(self.path)
+                run_files.remove_run(self.path, lambda file: not self.old and not _is_before(file))
             if not stays and self.old is not None:
                 self.old.rename(self.path)
             for folder in () if stays else self._created:
@@ -360,3 +360,9 @@ class RunDirectory:
         if self._lock is not None:
             os.close(self._lock)
         self._lock = None
+
+
+def _is_before(file: Path) -> bool:
+    """Whether a file is of those that stand there before anything is measured, or a log."""
+    before = (run_files.CONFIG, run_files.VERSIONS, run_files.COMMAND, TRIALS, ROOM)
+    return file.name in before or file.parent.name == LOGS

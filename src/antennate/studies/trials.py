@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from antennate.errors import ConfigError
 from antennate.params.base import Params
-from antennate.studies.columns import condition_of
+from antennate.studies.columns import Frame, condition_of
 from antennate.studies.pool import Workers, gather
+from antennate.studies.pooling import frame
 from antennate.studies.work import Fail, Failure, Together, no_failure, package_of
 from antennate.telemetry.view import Restart
 
 if TYPE_CHECKING:
-    from antennate.studies.experiment import Found
     from antennate.telemetry.view.simulation import SimulationView
 
 Config = TypeVar("Config", bound=Params)
@@ -49,6 +49,45 @@ def can_take(function: Callable[..., Any], name: str) -> bool:
     return name in inspect.signature(function).parameters
 
 
+Result = TypeVar("Result")
+Drawn = TypeVar("Drawn")
+
+
+@dataclass(frozen=True)
+class Found(Generic[Config, Result, Drawn]):
+    """What the trials of a run came to.
+
+    Attributes:
+        config: The configuration.
+        rows: Finished trials in the order of conditions and numbers.
+        drawn: What figures draw of a trial, by its condition and its number.
+        interrupted: Whether trials are missing.
+        row: Class of the rows.
+        summarise: summarise(found) -> result, an object.
+    """
+
+    config: Config
+    rows: list[Any]
+    drawn: dict[Trial, Drawn]
+    interrupted: bool
+    row: type
+    summarise: Callable[[Found[Any, Any, Any]], Result]
+
+    @functools.cached_property
+    def frame(self) -> Frame:
+        """The rows as a pandas DataFrame."""
+        return frame(self.rows, self.row)
+
+    @functools.cached_property
+    def _result(self) -> Any:
+        found: Any = self.summarise(self)
+        return replace(found, interrupted=True) if self.interrupted else found
+
+    def result(self) -> Result:
+        """What they come to; `interrupted` is true in it if trials are missing."""
+        return self._result
+
+
 _Task = tuple[Any, str, int, Path | None]
 """Configuration, condition, number of the trial, folder for its log."""
 
@@ -73,7 +112,7 @@ class Batches:
     def in_worker(self, tasks: Sequence[_Task], emit: Callable[[int, Any], None]) -> None:
         """Carry out tasks, those of one condition at once."""
         logs = tasks[0][3]
-        _by_condition(partial(self.run, **({"logs": logs} if logs else {})), tasks, emit)
+        _by_condition(functools.partial(self.run, **({"logs": logs} if logs else {})), tasks, emit)
 
     def on_device(
         self,
@@ -89,7 +128,7 @@ class Batches:
         """
         if self.gpu is None:
             raise ConfigError("expected trials that have batches on a GPU, found others")
-        _by_condition(partial(self.gpu, device=device, logs=tasks[0][3]), tasks, emit)
+        _by_condition(functools.partial(self.gpu, device=device, logs=tasks[0][3]), tasks, emit)
 
 
 def _by_condition(
@@ -155,7 +194,7 @@ class Trials(Generic[Config]):
         """What carries them out, one at once if it is a function of one trial."""
         if isinstance(self.trial, Batches):
             return self.trial
-        return Batches(partial(_one_by_one, self.trial), 1)
+        return Batches(functools.partial(_one_by_one, self.trial), 1)
 
     @property
     def function(self) -> Callable[..., Any]:

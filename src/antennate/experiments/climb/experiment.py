@@ -14,7 +14,7 @@ from antennate.experiments.climb.rows import ClimbRow
 from antennate.experiments.climb.tables import sentence, tables
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.studies.experiment import Experiment
-from antennate.studies.trials import Batches, Trial, Trials
+from antennate.studies.trials import Batches, Found, Trial, Trials
 
 if TYPE_CHECKING:
     from antennate.telemetry.film import Film
@@ -46,13 +46,17 @@ def films(config: ClimbConfig, trial: int) -> dict[str, Callable[[], Film]]:
     }
 
 
+def _result_of(found: Found[ClimbConfig, ClimbResult, object]) -> ClimbResult:
+    return summarise(found.config, found.frame)
+
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     ClimbConfig,
     Trials[ClimbConfig](
         Batches(carry_out, BATCH),
         row=ClimbRow,
-        summarise=lambda found: summarise(found.config, found.frame),
+        summarise=_result_of,
         every=every,
         invalid=lost_row,
     ),

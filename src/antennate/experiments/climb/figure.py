@@ -13,7 +13,7 @@ from antennate.experiments.climb.config import ClimbConfig
 from antennate.experiments.climb.measures import PLAN_BAND, VERDICTS
 from antennate.experiments.climb.physics import ClimbPath
 from antennate.experiments.climb.result import Climbed, Climbing, ClimbResult, Crossing, Sensing
-from antennate.studies.experiment import Found
+from antennate.studies.trials import Found
 
 _LOOKS: Mapping[str, tuple[str, str]] = {
     "locked": ("#8C8C8C", "s"),

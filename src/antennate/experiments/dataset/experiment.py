@@ -35,11 +35,11 @@ from antennate.experiments.dataset.estimates import (
 )
 from antennate.experiments.dataset.walk import walk_windows
 from antennate.studies.columns import NONE, Frame, column, column_of, tabular
-from antennate.studies.experiment import Experiment, Files, Found, checked
+from antennate.studies.experiment import Experiment, Files, checked
 from antennate.studies.parquet import require_parquet
 from antennate.studies.pooling import INVALID, by, pooled
 from antennate.studies.tables import Table
-from antennate.studies.trials import Trials
+from antennate.studies.trials import Found, Trials
 
 MAKE = {"walk": walk_windows, "gap": gap_windows, "push": push_windows}
 """What makes the windows of an episode, by its kind."""

@@ -21,7 +21,7 @@ from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
 from antennate.studies.experiment import Experiment, checked
-from antennate.studies.trials import Batches, Trial, Trials
+from antennate.studies.trials import Batches, Found, Trial, Trials
 from antennate.telemetry.header import log_name
 from antennate.types import AntennaFrame, Controller
 
@@ -126,13 +126,18 @@ CAPTIONS = {
     "restricted mean time, with a 95 % interval from five trials on.",
 }
 
+
+def _result_of(found: Found[TunnelConfig, TunnelResult, object]) -> TunnelResult:
+    return summarise(found.config, found.frame)
+
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     TunnelConfig,
     Trials[TunnelConfig](
         Batches(on_cpu, BATCH, on_warp),
         row=TrialResult,
-        summarise=lambda found: summarise(found.config, found.frame),
+        summarise=_result_of,
         every=every,
         invalid=lost_row,
     ),

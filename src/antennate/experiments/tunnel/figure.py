@@ -22,7 +22,7 @@ from antennate.experiments.tunnel.lockstep import SHOWN_TRIALS
 from antennate.experiments.tunnel.physics import TrialPath, TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import ControllerSummary, TunnelResult
 from antennate.studies.columns import Ends
-from antennate.studies.experiment import Found
+from antennate.studies.trials import Found
 from antennate.types import Floats, Maneuver
 
 MARGIN = 0.3

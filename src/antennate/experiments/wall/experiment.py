@@ -20,11 +20,11 @@ from antennate.experiments.wall.physics import (
 from antennate.sim.bench import Bench, unwatched
 from antennate.studies.charts import Shares, Strip
 from antennate.studies.columns import Ends, Frame, column, column_of, tabular
-from antennate.studies.experiment import Experiment, Found
+from antennate.studies.experiment import Experiment
 from antennate.studies.pooling import by, count, pooled, valid
 from antennate.studies.statistics import Discordance, Matched, mcnemar, wilson
 from antennate.studies.tables import Table, few, successes
-from antennate.studies.trials import Trials
+from antennate.studies.trials import Found, Trials
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -263,13 +263,17 @@ def _draw_boulders(panel: Axes, seen: Traverse) -> None:
         panel.add_patch(Circle((x, y), radius, color=style.MUTED, linewidth=0))
 
 
+def _result_of(found: Found[WallConfig, WallResult, object]) -> WallResult:
+    return summarise(found.config, found.frame)
+
+
 EXPERIMENT = Experiment.of_folder(
     __name__,
     WallConfig,
     Trials[WallConfig](
         run_trial,
         row=WallTrial,
-        summarise=lambda found: summarise(found.config, found.frame),
+        summarise=_result_of,
         every=lambda config: [(p, k) for k in range(config.trials) for p in config.profiles],
         invalid=invalid,
     ),
