@@ -149,11 +149,7 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
 
 
 def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
-    """Run the command of an experiment and return its exit code.
-
-    Raises:
-        AntennateError: As below, or something given cannot be used.
-    """
+    """Run the command of an experiment and return its exit code."""
     config, options = parsed(experiment, argv)
     if experiment.continued and options.config is None and "assumed" not in config.model_fields_set:
         raise ConfigError(
@@ -167,11 +163,7 @@ def command(experiment: Experiment[Any, Any], argv: Sequence[str]) -> int:
 
 
 def parsed(experiment: Experiment[Any, Any], argv: Sequence[str]) -> tuple[Params, Options]:
-    """Configuration and options of an experiment by the words of its command.
-
-    Raises:
-        ConfigError: As `parse`, or a file is named as if it were that of fitted numbers.
-    """
+    """Configuration and options of an experiment by the words of its command."""
     kind = FittedOptions if experiment.name in fitted() else Options
     kind = AntennaOptions if experiment.of_file else kind
     return parse(
@@ -211,12 +203,7 @@ def carry_out(
     options: Options,
     shards: Content | None = None,
 ) -> int:
-    """Run what has been parsed, or put shards together that were run.
-
-    Raises:
-        AntennateError: The physics became invalid, a worker died, or a file could not be written;
-            what was measured is kept and shown first.
-    """
+    """Run what has been parsed, or put shards together that were run."""
     _require_possible(options, config)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
     workers = _workers(options, apart) if shards is None else Workers(1, NoMore())

@@ -42,11 +42,7 @@ class MergeOptions(ResultOptions):
 
 
 def command(argv: Sequence[str]) -> int:
-    """Write the run.
-
-    Raises:
-        AntennateError: A folder is no shard, trials are missing, or nothing can be written.
-    """
+    """Write the run."""
     _, options = parse("merge", DESCRIPTION, Params, argv, MergeOptions, without=["config"])
     if not options.shards:
         raise ConfigError("merge: expected the folders of all shards, found none")

@@ -63,10 +63,6 @@ class Episodes:
     Attributes:
         size: Numbers of an observation.
         running: Rows that hold an episode, shape (B,).
-
-    Raises:
-        ConfigError: There is no such scene.
-        SceneError: The scene cannot be used.
     """
 
     def __init__(self, config: EnvConfig, batch: int) -> None:
@@ -258,9 +254,6 @@ def draw_episode(
     """An episode at its start; gains and offsets [counts] of its antennae, shapes (2,).
 
     Without randomisation it is the trial of this number of `antennate tunnel` with this seed.
-
-    Raises:
-        SceneError: The scene cannot be drawn or built.
     """
     chance = np.random.default_rng(np.random.SeedSequence([seed, number], spawn_key=(3,)))
     drawn = config.randomise.draw(chance)

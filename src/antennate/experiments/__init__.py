@@ -58,11 +58,7 @@ def summaries() -> dict[str, str]:
 
 
 def load(name: str) -> Experiment[Any, Any]:
-    """The experiment of this name.
-
-    Raises:
-        BadInputError: There is none, or the one of another package cannot be loaded.
-    """
+    """The experiment of this name."""
     if is_ours(name):
         return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
     entries = _entries()

@@ -225,9 +225,6 @@ def keep(
         result: What result.json holds, from `Experiment.content`.
         directory: The run directory.
         figures: Whether figures are drawn.
-
-    Raises:
-        OutputError: Something cannot be written; what was written stays.
     """
     for name, make in experiment.files(config).items():
         if (content := make(outcome)) is not None:
@@ -240,12 +237,7 @@ def keep(
 def require_films(
     experiment: Experiment[Any, Any], config: Params, trial: int, out: str | Path | None = ""
 ) -> None:
-    """Find out before a run whether its films can be made.
-
-    Raises:
-        BadInputError: There is no such trial, no run directory, or nothing here that can draw.
-        MissingPackageError: A package of the extra `video` is missing.
-    """
+    """Find out before a run whether its films can be made."""
     from antennate.telemetry.film import require_video  # slow to import
 
     trials = getattr(config, "trials", 1)
@@ -266,11 +258,7 @@ def write_films(
     on_step: Callable[[int, int], None] = lambda done, total: None,
     view: FilmView = "above",
 ) -> None:
-    """Run one trial of each condition once more, and write its film into the run directory.
-
-    Raises:
-        AntennateError: A trial failed, or a film cannot be drawn or written.
-    """
+    """Run one trial of each condition once more, and write its film into the run directory."""
     from antennate.telemetry.film import encoded
 
     assert experiment.films is not None  # noqa: S101 `require_films` looked

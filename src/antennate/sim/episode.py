@@ -41,9 +41,6 @@ class Episode:
         outcome: How it ended, an `Outcome` unless another judge was asked; None while it goes on.
         reason: Why it is invalid, empty unless it is.
         error: What the scene did not answer; None if it did.
-
-    Raises:
-        SceneError: The time limit of the scene is no time.
     """
 
     def __init__(
@@ -95,10 +92,6 @@ class Episode:
         return self.outcome
 
     def progress_of(self, head: Floats) -> float:
-        """How far a head at this position, shape (2,), has come [m]; kept as `progress`.
-
-        Raises:
-            SceneError: The scene raises an exception, or does not say a finite number.
-        """
+        """How far a head at this position, shape (2,), has come [m]; kept as `progress`."""
         self.progress = progress_of(self.scene, head)
         return self.progress

@@ -75,20 +75,12 @@ class Judge:
         self._crossings = 0
 
     def watch(self, world: Walker) -> Outcome | None:
-        """How the episode has ended with the robot as it is now; None if it goes on.
-
-        Raises:
-            SceneError: The scene raises an exception, or does not say True or False.
-        """
+        """How the episode has ended with the robot as it is now; None if it goes on."""
         seen = self.look(world.head[:2]) or self._mishap(world)
         return in_time(seen, world.t, self.limit)
 
     def look(self, head: Floats) -> Literal["success", "left"] | None:
-        """How the episode has ended with the head at this position, shape (2,); None if it goes on.
-
-        Raises:
-            SceneError: The scene raises an exception, or does not say True or False.
-        """
+        """How the episode ended with the head at this position, shape (2,); None if it goes on."""
         if self._succeeded(head):
             return "success"
         return "left" if _answer(self._scene, "left", head, "True or False", _is_bool) else None
@@ -110,11 +102,7 @@ class Judge:
 
 
 def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
-    """Time after which a trial has failed [s]: the one that is wanted, or else the scene's own.
-
-    Raises:
-        SceneError: That of the scene is no time.
-    """
+    """Time after which a trial has failed [s]: the one that is wanted, or else the scene's own."""
     if wanted is not None:
         return wanted
     limit = getattr(scene, "time_limit", TIME_LIMIT)
@@ -137,11 +125,7 @@ def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
 
 
 def require_times(time: float, limit: float, close: float = 0.0) -> None:
-    """Check a time and a time limit of a table [s]; the time may exceed the limit by `close` [s].
-
-    Raises:
-        ValueError: The limit is no finite time above 0 s, or the time is not within 0 and it.
-    """
+    """Check a time and a time limit of a table; the time may exceed the limit by `close` [s]."""
     if not 0.0 < limit < math.inf:
         raise ValueError(f"limit_s: expected a finite number above 0, found {limit}")
     if not 0.0 <= time <= limit + close:
@@ -161,11 +145,7 @@ def has_fallen(links: Floats, ground: float) -> bool:
 
 
 def progress_of(scene: SceneInstance, head: Floats) -> float:
-    """What a scene says of how far a head at this position, shape (2,), has come [m].
-
-    Raises:
-        SceneError: It raises an exception, or does not say a finite number.
-    """
+    """What a scene says of how far a head at this position, shape (2,), has come [m]."""
     return _answer(scene, "progress", head, "a finite number [m]", _is_finite)
 
 

@@ -92,21 +92,12 @@ class TrialConfig(Params):
 
 
 def scene_of(config: TrialConfig) -> Scene:
-    """The scene of a configuration.
-
-    Raises:
-        ConfigError: There is no such scene.
-        SceneError: The file cannot be used, or the constructor failed.
-    """
+    """The scene of a configuration."""
     return make_scene(config.scene, config.tunnel, config.corridors, config.ground)
 
 
 def require_own_curves(robot: RobotSpec, control: ControlParams) -> None:
-    """Check that the curves of both antennae can belong to the robot's flex sensors.
-
-    Raises:
-        ValueError: One cannot.
-    """
+    """Check that the curves of both antennae can belong to the robot's flex sensors."""
     for name in ("conditioning", "conditioning_right"):
         require_own_curve(robot.antenna.sensor, f"control.{name}", getattr(control, name))
 
@@ -136,9 +127,6 @@ class Trial:
         Args:
             limit: Time after which it has failed [s]; None for that of the scene.
             on_its_back: Whether a robot on its back ends it in any scene.
-
-        Raises:
-            SceneError: The time limit of the scene is no time.
         """
         return Episode(self.scene, limit, on_its_back, self.seed, self.number)
 
@@ -154,9 +142,6 @@ def draw_trial(
         trial: Its number.
         gait: The pose at the start is one of this gait.
         period: Control period [s].
-
-    Raises:
-        SceneError: The scene cannot be built.
     """
     for_scene, for_start, for_chance = _generators(config.seed, trial)
     robot, variation = config.robot, variation_of(config, scene)
@@ -172,20 +157,12 @@ def draw_trial(
 
 
 def draw_scene(config: TrialConfig, scene: Scene, trial: int) -> SceneInstance:
-    """The instance of the scene that `draw_trial` draws.
-
-    Raises:
-        SceneError: There is none.
-    """
+    """The instance of the scene that `draw_trial` draws."""
     return _drawn(config, scene, _generators(config.seed, trial)[0])
 
 
 def variation_of(config: TrialConfig, scene: Scene) -> VariationParams:
-    """What differs between the trials of a configuration, with the changes of its scene.
-
-    Raises:
-        SceneError: The scene changes what there is not, or what was set.
-    """
+    """What differs between the trials of a configuration, with the changes of its scene."""
     own = dict(getattr(scene, "variation", {}))
     for name, *_ in changes(config.variation, [n for n in own if hasattr(config.variation, n)]):
         raise SceneError(
@@ -200,12 +177,7 @@ def variation_of(config: TrialConfig, scene: Scene) -> VariationParams:
 
 
 def check_start(config: TrialConfig) -> None:
-    """Find a bad scene before anything is run: draw trial 0, and compile it if it is not ours.
-
-    Raises:
-        ConfigError: There is no such scene.
-        SceneError: It cannot be read, drawn or built, or the robot does not fit at its start.
-    """
+    """Find a bad scene before anything is run: draw trial 0, and compile it if it is not ours."""
     scene = scene_of(config)
     variation_of(config, scene)
     if config.scene == TUNNEL:
@@ -215,11 +187,7 @@ def check_start(config: TrialConfig) -> None:
 
 
 def still_trial(config: TrialConfig, scene: Scene, gait: GaitParams) -> tuple[World, SceneInstance]:
-    """Trial 0 without chance: the robot at the start of its scene, at phase 0 of a gait.
-
-    Raises:
-        SceneError: The scene cannot be drawn or built, or the robot does not fit at its start.
-    """
+    """Trial 0 without chance: the robot at the start of its scene, at phase 0 of a gait."""
     drawn = draw_scene(config, scene, 0)
     with _errors_of(config.scene):
         world = make_world(config.physics, config.robot, drawn)
@@ -252,11 +220,7 @@ def _errors_of(name: str) -> Iterator[None]:
 
 
 def require_room(world: World) -> None:
-    """Check that the robot stands free.
-
-    Raises:
-        SceneError: It is inside an obstacle, deeper than MOST_OVERLAP.
-    """
+    """Check that the robot stands free."""
     overlap = world.obstacle_overlap()
     if overlap > MOST_OVERLAP:
         raise SceneError(

@@ -182,11 +182,7 @@ def condition_of(row: type) -> str:
 
 
 def column_of(kind: type, name: str) -> Column:
-    """The column of this name.
-
-    Raises:
-        ConfigError: The class has none.
-    """
+    """The column of this name."""
     found = {each.name: each for each in columns(kind)}
     if name not in found:
         raise ConfigError(
@@ -248,11 +244,7 @@ def content(result: Any) -> dict[str, Any]:
 
 
 def typed(kind: type[Kind], data: Any) -> Kind:
-    """A result from the content of result.json.
-
-    Raises:
-        ValueError: It is not of this class: another version wrote it, or it is damaged.
-    """
+    """A result from the content of result.json."""
     from pydantic import ValidationError
 
     try:

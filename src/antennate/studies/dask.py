@@ -200,9 +200,6 @@ def carry_out_apart(
     The model of its processor comes among them.
 
     That process serves one run alone, as it knows the user's code as it was at first.
-
-    Raises:
-        WorkerError: The driver has other versions or other code, or no process starts.
     """
     folder = folder_of(theirs)
     require_same(theirs, folder)

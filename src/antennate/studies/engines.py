@@ -26,10 +26,6 @@ def make_engine(name: Any, slurm: Sequence[str] = ()) -> Engine | None:
     Args:
         name: One of FORMS, or an executor.
         slurm: What SLURM is asked for, each as NAME=VALUE.
-
-    Raises:
-        ConfigError: There is none, or SLURM is asked for something and another engine is named.
-        MissingPackageError: Its package is not installed.
     """
     if slurm and name not in ("slurm", "slurm-local"):
         raise ConfigError("--slurm: expected --engine slurm beside it, found another engine")
@@ -64,11 +60,7 @@ class NoMore:
     name = "merge"
 
     def run(self, call: Call, count: int) -> None:
-        """Refuse tasks that wait; see `Engine`.
-
-        Raises:
-            WorkerError: Always, as an engine is called for tasks that wait.
-        """
+        """Refuse tasks that wait; see `Engine`."""
         total = len(call.work.tasks)
         raise WorkerError(
             f"expected {total} finished trials, found {total - len(call.places)}: a shard is "
@@ -89,11 +81,7 @@ class Device:
         self._device = device
 
     def run(self, call: Call, count: int) -> None:
-        """Carry out all parts of a call; see `Engine`.
-
-        Raises:
-            ConfigError: This work has no batch.
-        """
+        """Carry out all parts of a call; see `Engine`."""
         function = call.work.function
         batched = function.batched if isinstance(function, Together) else None
         if batched is None:

@@ -50,20 +50,12 @@ def strict(value: Any) -> Any:
 
 
 def to_json(value: Any) -> str:
-    """Strict JSON, indented, as result.json holds it.
-
-    Raises:
-        BadInputError: It holds an object of another kind.
-    """
+    """Strict JSON, indented, as result.json holds it."""
     return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
 
 
 def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
-    """The content of a file, piece by piece.
-
-    Raises:
-        ConfigError: It is neither text nor bytes nor pieces of text.
-    """
+    """The content of a file, piece by piece."""
     for piece in content if isinstance(content, Iterator) else [content]:
         if not isinstance(piece, str | bytes):
             raise ConfigError(f"content: expected text, bytes or pieces, found {shown(piece)}")
@@ -71,11 +63,7 @@ def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
 
 
 def as_mapping(row: Any) -> Mapping[str, Any]:
-    """A row by the names of its fields.
-
-    Raises:
-        ConfigError: It is neither a mapping nor a dataclass.
-    """
+    """A row by the names of its fields."""
     if isinstance(row, Mapping):
         return cast("Mapping[str, Any]", row)
     if not is_dataclass(row) or isinstance(row, type):
@@ -96,11 +84,7 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def csv_lines(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """The same line by line, for a table that does not fit into memory.
-
-    Raises:
-        ConfigError: A row has other columns than the first.
-    """
+    """The same line by line, for a table that does not fit into memory."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     names: Sequence[str] = ()
@@ -119,11 +103,7 @@ def csv_lines(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def from_csv(text: str) -> list[dict[str, Any]]:
-    """Rows of such a table; numbers as int or float, empty cells as None.
-
-    Raises:
-        ValueError: It is no such table.
-    """
+    """Rows of such a table; numbers as int or float, empty cells as None."""
     csv.field_size_limit(max(len(text), csv.field_size_limit()))
     try:
         lines = csv.reader(io.StringIO(text), strict=True)
@@ -201,11 +181,7 @@ def _toml(value: Any) -> str:
 
 
 def encoded(value: Any) -> Any:
-    """A value as what JSON can hold.
-
-    Raises:
-        TypeError: It holds an object of another kind.
-    """
+    """A value as what JSON can hold."""
     match value:
         case Enum():
             return {"@": _name(value), "value": value.value}
@@ -237,9 +213,6 @@ def decoded(data: Any, packages: Collection[str] | None) -> Any:
         data: What JSON held.
         packages: Top-level packages whose classes may be named; None for the fields of an object in
             place of it, whatever its class.
-
-    Raises:
-        ValueError: It names a class that is not trusted, not imported or of another form.
     """
     match data:
         case list():
@@ -281,11 +254,7 @@ def _name(value: Any) -> str:
 
 
 def dumped(value: Any) -> str:
-    """JSON on one line; NaN and infinities are kept.
-
-    Raises:
-        BadInputError: It holds an object of another kind.
-    """
+    """JSON on one line; NaN and infinities are kept."""
     return json.dumps(value, separators=(",", ":"), default=_refuse)
 
 

@@ -20,9 +20,6 @@ def require_parquet(what: str, instead: str = "") -> tuple[Any, Any]:
     Args:
         what: Needs them.
         instead: What can be done without them.
-
-    Raises:
-        MissingPackageError: They are not installed.
     """
     try:
         return import_module("pyarrow"), import_module("pyarrow.parquet")
@@ -44,9 +41,6 @@ def to_parquet(
         columns: Arrays of shape (n,), or (n, k) for a list of k numbers in each cell, by name.
         notes: Metadata of each column, as its unit.
         about: Metadata of the file; each value is kept as JSON.
-
-    Raises:
-        MissingPackageError: pyarrow is not installed.
     """
     arrow, parquet = require_parquet("Parquet")
     arrays = [_array(arrow, np.asarray(values)) for values in columns.values()]

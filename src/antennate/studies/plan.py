@@ -119,10 +119,6 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
         axes: What varies.
         count: Points of random and sobol, trajectories of morris.
         seed: Seed of what is drawn.
-
-    Raises:
-        ConfigError: Nothing varies, a value is not finite or given twice, or lists and ranges do
-            not fit the kind.
     """
     require_values(kind, axes)
     if kind in ("grid", "list"):
@@ -145,11 +141,7 @@ def make_points(kind: Kind, axes: Axes, count: int, seed: int) -> list[Point]:
 
 
 def require_values(kind: Kind, axes: Axes) -> None:
-    """Check that something varies, over finite values, and over lists of ranges only in optuna.
-
-    Raises:
-        ConfigError: It does not.
-    """
+    """Check that something varies, over finite values, and over lists of ranges only in optuna."""
     if not axes or not all(axes.values()):
         empty = [f"vary.{name}" for name, axis in axes.items() if not axis] or ["vary"]
         raise ConfigError(f"{empty[0]}: expected values, found none: the {kind} is empty")

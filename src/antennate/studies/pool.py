@@ -214,11 +214,6 @@ def gather(
         on_result: Called with each result as it comes, in no particular order.
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.
-
-    Raises:
-        WorkerError: A task failed, or its workers died.
-        ShardEnd: All tasks of this shard are finished.
-        KeyboardInterrupt: After the results that had arrived by then were given to `on_result`.
     """
     workers = workers_from(workers)
     if IMPORTING:

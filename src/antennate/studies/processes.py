@@ -203,11 +203,7 @@ class _Worker:
 
 
 def _require_children() -> None:
-    """Check that this process may begin workers, and that they can import the program.
-
-    Raises:
-        WorkerError: They cannot.
-    """
+    """Check that this process may begin workers, and that they can import the program."""
     if multiprocessing.current_process().daemon:
         raise WorkerError(
             "expected a process that may begin others, found a daemonic one, as of a pool of "

@@ -91,11 +91,7 @@ class View:
 
 
 def command_of(run: RunDirectory) -> str:
-    """Name of the command that made a run.
-
-    Raises:
-        BadInputError: No file tells, or one is damaged.
-    """
+    """Name of the command that made a run."""
     result = run.result() if (run.path / RESULT).exists() else {}
     words = shlex.split(run.text(COMMAND).partition("\n")[0])
     name = result.get("command") if isinstance(result, dict) else None
@@ -106,21 +102,12 @@ def command_of(run: RunDirectory) -> str:
 
 
 def write_report(run: RunDirectory, view: View) -> None:
-    """Write the page of a run into its directory.
-
-    Raises:
-        BadInputError: The directory is damaged.
-        OutputError: It cannot be written.
-    """
+    """Write the page of a run into its directory."""
     run.write(REPORT, report(run, view))
 
 
 def report(run: RunDirectory, view: View) -> str:
-    """The page of a run.
-
-    Raises:
-        BadInputError: The directory is damaged.
-    """
+    """The page of a run."""
     ended = (run.path / TABLE).exists() and not (run.path / TRIALS).exists()
     result = run.result() if ended or (run.path / RESULT).exists() else None
     parts = [f"<h1>{page.escape(view.title)}</h1>"]
@@ -260,11 +247,7 @@ def _versions(run: RunDirectory) -> str:
 
 
 def compare(runs: Sequence[RunDirectory], view: View) -> str:
-    """The page of two runs of one command.
-
-    Raises:
-        BadInputError: One has no result, or is damaged.
-    """
+    """The page of two runs of one command."""
     names = _names(runs)
     results = [run.result() for run in runs]
     parts = [f"<h1>{page.escape(view.title)}: {page.escape(' and '.join(names))}</h1>"]

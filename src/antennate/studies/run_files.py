@@ -65,11 +65,7 @@ def listed(place: Path) -> list[str] | None:
 
 
 def add_to_list(place: Path, names: Iterable[str]) -> None:
-    """Add names to the list of the files of a run, which is begun if there is none; none twice.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Add names to the list of the files of a run, which is begun if there is none; none twice."""
     known = listed(place) or ()
     lines = "".join(f"{name}\n" for name in names if name not in known).encode()
     if not os.path.lexists(place / FILES):
@@ -80,11 +76,7 @@ def add_to_list(place: Path, names: Iterable[str]) -> None:
 
 
 def trim_list(place: Path, handle: int) -> None:
-    """Leave in the list of a run, which is open to write, the files that are there.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Leave in the list of a run, which is open to write, the files that are there."""
     before = listed(place) or []
     names = [name for name in before if os.path.lexists(place / name)]
     if names != before:
@@ -106,9 +98,6 @@ def remove_run(place: Path, kept: Callable[[Path], bool] = lambda file: False) -
     Args:
         place: The folder.
         kept: Which of the files stay.
-
-    Raises:
-        OSError: A file cannot be removed.
     """
     *files, last = files_of(place) or [place / FILES]
     for file in files:
@@ -130,11 +119,7 @@ def sweep(place: Path) -> None:
 
 
 def place_of(command: str, path: str | Path | None) -> Path:
-    """The folder for a run of a command: the one of a path, or the next that nobody has named.
-
-    Raises:
-        ConfigError: The path is none, or no folder can have such a name.
-    """
+    """The folder for a run of a command: the one of a path, or the next that nobody has named."""
     if "/" in checks.text("command", command):
         raise ConfigError(f"command: expected a name without a slash, found {command}")
     if path is not None:
@@ -149,9 +134,6 @@ def goes_on(place: Path, resume: bool | None) -> bool:
     Args:
         place: The folder.
         resume: Whether a run that it holds is to go on; None if the command goes on with none.
-
-    Raises:
-        OutputError: It holds another run, or a folder of a run leads elsewhere.
     """
     if links := [place / name for name in FOLDERS if (place / name).is_symlink()]:
         raise OutputError(f"expected {links[0]} within its run, found a link")
@@ -170,12 +152,7 @@ def goes_on(place: Path, resume: bool | None) -> bool:
 
 
 def set_aside(place: Path) -> Path:
-    """Rename a folder that holds a run; its new name.
-
-    Raises:
-        OutputError: It holds no run of ours, or a process works on it.
-        OSError: It cannot be renamed.
-    """
+    """Rename a folder that holds a run; its new name."""
     if listed(place) is None and {path.name for path in place.iterdir()} != {JOBS}:
         first = min(path.name for path in place.iterdir())
         raise OutputError(
@@ -198,9 +175,6 @@ def read_as(path: Path, decode: Callable[[str], T]) -> T:
     Args:
         path: The file.
         decode: Reads its text; a ValueError says that it is damaged.
-
-    Raises:
-        BadInputError: It cannot be read, or is damaged.
     """
     text = decoded(path, read_limited(path, LARGEST))
     try:
@@ -212,11 +186,7 @@ def read_as(path: Path, decode: Callable[[str], T]) -> T:
 
 
 def inside(place: Path, name: str) -> Path:
-    """The file or folder of a name in a run's folder.
-
-    Raises:
-        ConfigError: The name leads out of it.
-    """
+    """The file or folder of a name in a run's folder."""
     path = Path(checks.text("name", name))
     if path.is_absolute() or ".." in path.parts:
         raise ConfigError(f"name: expected one within the run, found {name}")

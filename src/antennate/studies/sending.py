@@ -84,11 +84,7 @@ def _has_file(each: Any) -> bool:
 
 
 def require_sent(names: Iterable[str]) -> None:
-    """Check that the objects of these names that were added here can be sent to workers.
-
-    Raises:
-        WorkerError: One cannot.
-    """
+    """Check that the objects of these names that were added here can be sent to workers."""
     named = set(names)
     for objects in ADDED.values():
         for name in sorted(objects.keys() & named):

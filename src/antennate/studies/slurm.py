@@ -68,11 +68,7 @@ class Resumable:
             return TimeoutError()
 
     def carry_out(self) -> int:
-        """Carry out what is not in its file yet; how many tasks that was.
-
-        Raises:
-            WorkerError: The driver has other versions or other code, or nothing can be run here.
-        """
+        """Carry out what is not in its file yet; how many tasks that was."""
         file = Path(self._file)
         if not file.exists():
             return 0
@@ -154,11 +150,7 @@ class Slurm:
         _Driver(call, folder, self._executor(folder)[0]).run(count)
 
     def _executor(self, folder: Path) -> tuple[Any, list[warnings.WarningMessage]]:
-        """What submits jobs, and what it warns of.
-
-        Raises:
-            WorkerError: It refuses the options, or cannot be used here.
-        """
+        """What submits jobs, and what it warns of."""
         import submitit
 
         try:

@@ -97,11 +97,7 @@ class Submitted:
 
 
 def carry_out(part: Work, theirs: Mapping[str, Any], added: Packed) -> list[tuple[int, Any]]:
-    """In a worker: results and failures by place, and the model of its processor.
-
-    Raises:
-        WorkerError: The driver has other versions or other code.
-    """
+    """In a worker: results and failures by place, and the model of its processor."""
     require_same(theirs, Path())
     take_added(added)
     answers: list[tuple[int, Any]] = [(NO_PLACE, Processor(processor()))]
@@ -177,9 +173,6 @@ def require_same(theirs: Mapping[str, Any], folder: Path) -> None:
     Args:
         theirs: The driver's environment.
         folder: Where the trials will run, from which files are named.
-
-    Raises:
-        WorkerError: It has others.
     """
     theirs = {key: value for key, value in theirs.items() if key != _FOLDER}
     if changes := differences(theirs, environment_here(theirs, folder)):

@@ -113,10 +113,6 @@ class TrialFile(Content):
     Attributes:
         holds_trials: Whether it holds any that no other file has, kept before or now.
         calls: Numbers the calls of `gather`, by which their tasks are kept.
-
-    Raises:
-        OutputError: It cannot be opened, or another process appends to it.
-        BadInputError: It cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -139,10 +135,6 @@ class TrialFile(Content):
         Args:
             identity: What is run.
             tasks: Of a configuration; None if there cannot be more trials.
-
-        Raises:
-            BadInputError: It is something else, or fewer trials; the text says what differs.
-            OutputError: It cannot be written.
         """
         before, where = self.identity, "choose another folder or give --overwrite"
         if before is None and self.records:
@@ -179,9 +171,6 @@ class TrialFile(Content):
             key: The key of the trial.
             result: What its worker returned.
             more: What else its line says.
-
-        Raises:
-            OutputError: As for `append`.
         """
         content = {**more, "result": encoded(result)}
         with self.known() as rows:
@@ -205,9 +194,6 @@ class TrialFile(Content):
         Args:
             key: Its key.
             content: What else its line says.
-
-        Raises:
-            OutputError: The disk is full, or the like; what was kept before stays whole.
         """
         lines = [*({"processor": model} for model in self._seen), {"key": key, **content}]
         self._write(b"".join(map(line, lines)), is_trial=True)
@@ -218,11 +204,6 @@ class TrialFile(Content):
         """Keep a row, a dataclass or a mapping: within a trial with it, else in a line of its own.
 
         One that the file has from a process before is not written again.
-
-        Raises:
-            ConfigError: The row is neither.
-            BadInputError: It holds what is no number, text, list or dictionary.
-            OutputError: As for `append`.
         """
         if self._rows is not None:
             self._rows.append(row if is_dataclass(row) else as_mapping(row))
@@ -275,11 +256,7 @@ class TrialFile(Content):
 
 
 def read_trials(path: Path) -> Content:
-    """The content of a file; nobody need have ended it.
-
-    Raises:
-        BadInputError: It cannot be read.
-    """
+    """The content of a file; nobody need have ended it."""
     return Content().read(read_limited(path, sys.maxsize))
 
 
@@ -295,12 +272,7 @@ def line(content: Mapping[str, Any]) -> bytes:
 
 
 def locked(path: Path, flags: int = 0) -> int:
-    """The handle of a file of a run, locked: the system frees it when this process ends.
-
-    Raises:
-        OSError: It cannot be opened.
-        OutputError: Another process works on it.
-    """
+    """The handle of a file of a run, locked: the system frees it when this process ends."""
     handle = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o666)
     if lock(handle) is False:  # None on a file system without locks
         os.close(handle)

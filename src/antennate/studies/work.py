@@ -206,11 +206,7 @@ class Engine(Protocol):
     name: str
 
     def run(self, call: Call, count: int) -> None:
-        """Carry out the parts of a call on so many workers.
-
-        Raises:
-            WorkerError: The workers cannot run anything.
-        """
+        """Carry out the parts of a call on so many workers."""
         ...
 
 

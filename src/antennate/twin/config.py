@@ -102,11 +102,7 @@ class Passage:
         return self._walk.progress
 
     def watch(self, world: World) -> None:
-        """Look at the world after a tick.
-
-        Raises:
-            SceneError: The scene does not answer as its protocol says.
-        """
+        """Look at the world after a tick."""
         self.on_tick(world)
         self._walk.tick(world, look=self._look)
         if self._walk.error is not None:
@@ -132,9 +128,6 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     """The robot at the start of its trial, and how far it comes.
 
     Each start of a real board has a boot id of its own.
-
-    Raises:
-        SceneError: The scene cannot be built, or the robot starts inside an obstacle.
     """
     require_antennae(config.robot, "the twin")
     control, period = config.control, config.control.period

@@ -51,9 +51,6 @@ class FaultyServer(Server):
         bus: The servos; only the server touches them.
         endpoint: The server's end of their wire, a pseudo-terminal by default.
         faults: What goes wrong, and when.
-
-    Raises:
-        BadInputError: A fault is for a servo that is not there.
     """
 
     def __init__(

@@ -80,9 +80,6 @@ def read(
         text: `TARGET=WHAT[:SIZE][@Ts]`.
         targets: What can be wrong with what.
         sizes: Faults that need a size.
-
-    Raises:
-        BadInputError: It has another form, is not known, or lacks a size or has one out of range.
     """
     match = _FORM.fullmatch(text)
     target = match["target"].split(":")[0] if match is not None else ""

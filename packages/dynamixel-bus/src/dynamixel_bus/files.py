@@ -19,11 +19,7 @@ _QUOTED, _BETWEEN = re.compile(r"\"[^\"]*\"|'[^']*'"), re.compile(r"[][,={}]")
 
 
 def read_toml(path: Path, largest: int) -> dict[str, Any]:
-    """The tables of a TOML file of at most `largest` bytes.
-
-    Raises:
-        ConfigError: The file cannot be read, is larger, or is no TOML.
-    """
+    """The tables of a TOML file of at most `largest` bytes."""
     text = _text_of(path, largest)
     for number, line in enumerate(text.splitlines(), 1):
         if max(part.count(".") for part in _BETWEEN.split(_QUOTED.sub("", line))) > _MOST_DOTS:

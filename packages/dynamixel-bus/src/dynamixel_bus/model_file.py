@@ -93,9 +93,6 @@ def model_of(table: Any, where: str, layout: Mapping[str, Any]) -> ServoModel:
         table: What stands in the file.
         where: Its path, for errors.
         layout: Entries of the registers that all models have, as they stand in a file.
-
-    Raises:
-        ConfigError: It is not one of a servo of the X series; the text says where and why.
     """
     known = checked(table, where, _HEAD)
     entries = {name: _register(name, entry, where) for name, entry in known["registers"].items()}

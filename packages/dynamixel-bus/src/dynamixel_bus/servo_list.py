@@ -50,9 +50,6 @@ def read_list(
     Args:
         words: The words.
         expected: What is said of a word of another form, before the word.
-
-    Raises:
-        ConfigError: One has another form.
     """
     found: list[ListedServo] = []
     for word in words:
@@ -74,9 +71,6 @@ def make_servo(listed: ListedServo, position: float = MIDDLE, flag: str = "") ->
         listed: What the list says.
         position: Where its shaft is [ticks].
         flag: What named it, for errors, such as `--servos: `.
-
-    Raises:
-        ConfigError: There is no such model, or it has no such id or speed.
     """
     if listed.id > LAST_ID:
         raise ConfigError(f"{flag}expected an id from 0 to {LAST_ID}, found {listed.id}")

@@ -51,9 +51,6 @@ def read(path: Path) -> AntennaConfig:
 
     Args:
         path: The file, or the name of a robot.
-
-    Raises:
-        ConfigError: The file cannot be read, or holds none of these.
     """
     if str(path) in ROBOTS:
         return _with(RobotSpec.named(path).antenna)

@@ -47,13 +47,7 @@ class AntennaOutcome(Outcome):
 
 
 def run(config: AntennaConfig) -> AntennaOutcome:
-    """Work out the springs and the taper, try the sensor, and let the antenna go.
-
-    Raises:
-        ConfigError: Limits are the wrong way round, the spring index lies outside its own, no
-            reading changes with the bend, or a file of another antenna cannot be used.
-        SimulationError: The physics became invalid.
-    """
+    """Work out the springs and the taper, try the sensor, and let the antenna go."""
     springs, taper = springs_of(config), taper_of(config)
     sensor, readings = sensor_of(config)
     ringdown, trace = ringdown_of(config)

@@ -73,12 +73,7 @@ class Trace(NamedTuple):
 
 
 def springs_of(config: AntennaConfig) -> Springs:
-    """Springs of an antenna as they are, one for each count of coils, and sets to wind.
-
-    Raises:
-        ConfigError: The spring index lies outside its limits, where the law does not hold, or
-            limits are the wrong way round.
-    """
+    """Springs of an antenna as they are, one for each count of coils, and sets to wind."""
     for name in ("index_limits", "coil_limits", "ladder_limits"):
         low, high = getattr(config, name)
         if low >= high:
@@ -154,11 +149,7 @@ def _ladder(coils: Floats, animal: Floats) -> Ladder:
 
 
 def sensor_of(config: AntennaConfig) -> tuple[Sensor, Readings]:
-    """The sensor of an antenna, and its readings.
-
-    Raises:
-        ConfigError: No reading changes over the whole range of bends.
-    """
+    """The sensor of an antenna, and its readings."""
     params = config.antenna.sensor
     flex = np.linspace(0.0, config.largest_flex, config.points)
     counts = sensor.counts(params, flex)
@@ -226,12 +217,7 @@ def _hold(config: AntennaConfig) -> Floats:
 
 
 def ringdown_of(config: AntennaConfig) -> tuple[Ringdown, Trace]:
-    """The ring-down of an antenna, its modes, and the path of its tip.
-
-    Raises:
-        ConfigError: A file of another antenna cannot be used.
-        SimulationError: The physics became invalid.
-    """
+    """The ring-down of an antenna, its modes, and the path of its tip."""
     others = {
         Path(name).stem.replace("_", " "): read_file(Path(name), RobotSpec).antenna
         for name in config.beside

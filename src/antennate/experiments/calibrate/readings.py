@@ -148,11 +148,7 @@ def _reading_range(unit: str, value: float) -> str:
 def to_counts(
     path: Path, unit: str, values: Floats, rows: Ints, sensor: SensorParams
 ) -> tuple[Floats, Conversion | None]:
-    """Readings in a unit as counts, and how they became counts; None if they are.
-
-    Raises:
-        CalibrationError: Most lie where the converter does not tell them apart.
-    """
+    """Readings in a unit as counts, and how they became counts; None if they are."""
     if unit == "counts":
         _require_counts(path, values, rows)
         return values, None

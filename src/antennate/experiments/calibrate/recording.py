@@ -128,9 +128,6 @@ def read(
         params: Its columns and units.
         rate: Readings a second [Hz] of a file without a column of time.
         sensor: Divider and converter, for readings that are no counts; the default ones if None.
-
-    Raises:
-        CalibrationError: Names the row and the cure.
     """
     data = read_limited(path, _LARGEST_FILE, CalibrationError)
     table, lines, damages, units = _rows(path, data, params, rate)

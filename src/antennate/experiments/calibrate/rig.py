@@ -57,11 +57,7 @@ class Push:
     gap: float
 
     def run(self, ticks: int) -> tuple[Floats, Floats, Floats]:
-        """Time [s], flex [rad] and way of the rod from the first touch [m], each shape (ticks,).
-
-        Raises:
-            SimulationError: The physics became invalid.
-        """
+        """Time [s], flex [rad] and way of the rod from the first touch [m], each shape (ticks,)."""
         t = np.asarray(np.arange(ticks) * (1.0 / self.antenna.sensor.rate), np.float64)
         flex, y = self._pushed(self._commands(t))
         return t, flex, y + self._touch

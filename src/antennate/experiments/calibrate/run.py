@@ -187,11 +187,7 @@ class CalibrateOutcome(Outcome):
 
 
 def push(config: CalibrateConfig, trial: int) -> Recording:
-    """One push of the rig.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
+    """One push of the rig."""
     rig = config.rig
     speed = rig.speeds[trial // rig.pushes]
     rng = np.random.default_rng([config.seed, trial])
@@ -220,11 +216,7 @@ def record(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
 ) -> Recording:
-    """All pushes of the rig, as one recording.
-
-    Raises:
-        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
-    """
+    """All pushes of the rig, as one recording."""
     tasks = [(config, trial) for trial in range(len(config.rig.speeds) * config.rig.pushes)]
     parts = gather(push, tasks, workers, on_step)
     fields = ("counts", "level", "trial", "speed", "row")
@@ -252,12 +244,7 @@ def run(
     workers: int | Workers = 1,
     on_step: OnStep = no_step,
 ) -> CalibrateOutcome:
-    """Calibrate from the recording, or from the rig if there is none.
-
-    Raises:
-        CalibrationError: The recording cannot be used or calibrated.
-        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
-    """
+    """Calibrate from the recording, or from the rig if there is none."""
     if config.recording is None:
         raw = record(config, workers, on_step)
     else:

@@ -61,11 +61,7 @@ class Terrain:
 
     @classmethod
     def of(cls, word: str) -> Terrain:
-        """The ground of a word, as `gap:0.1`.
-
-        Raises:
-            ValueError: It is none, or its size is out of bounds.
-        """
+        """The ground of a word, as `gap:0.1`."""
         scene, _, text = word.partition(":")
         if word == FLAT:
             return cls(word, FLAT)

@@ -68,11 +68,6 @@ class Apart:
         knows, needs: What it could use and needed when it was made: that it is given, whatever it
             says later.
         maneuver, contact, level: As of a `Controller`, of the last step.
-
-    Raises:
-        ConfigError: It cannot be made.
-        ControllerError: It died; later also in a step or reset that raised, that took longer, or
-            that left a program running.
     """
 
     maneuver: Ints

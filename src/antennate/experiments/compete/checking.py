@@ -30,11 +30,7 @@ _WORDS = ("given", "reason")
 
 
 def read_rows(path: Path) -> list[EpisodeRow]:
-    """The rows of such a table.
-
-    Raises:
-        ConfigError: It cannot be read, is no such table, or holds a row twice.
-    """
+    """The rows of such a table."""
     if path.is_dir():
         raise ConfigError(
             f"{path}: expected a table of trials, found a folder; name its trials.csv"
@@ -62,11 +58,7 @@ def read_rows(path: Path) -> list[EpisodeRow]:
 
 
 def _require_columns(path: Path, names: Sequence[str]) -> None:
-    """Check the head of a table.
-
-    Raises:
-        ConfigError: A column is missing, or is none of `antennate compete`.
-    """
+    """Check the head of a table."""
     known = [field.name for field in fields(EpisodeRow)]
     needed = [field.name for field in fields(EpisodeRow) if field.default is NO_DEFAULT]
     for place, name in enumerate(names):
@@ -110,10 +102,6 @@ def _require_sound(row: EpisodeRow, limited: bool) -> None:
     Args:
         row: The row.
         limited: Whether its table says the limit; the time of a failure is compared with no other.
-
-    Raises:
-        ConfigError: There is no controller of that name.
-        ValueError: A value is none that an episode can end with.
     """
     CONTROLLERS.check(row.controller)
     require_times(row.time_s, row.limit_s, CLOSE)

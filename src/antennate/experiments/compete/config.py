@@ -127,11 +127,7 @@ class CompeteConfig(Params):
 
 
 def require_unreserved(seed: int) -> int:
-    """A seed that is not reserved.
-
-    Raises:
-        ValueError: It is.
-    """
+    """A seed that is not reserved."""
     if seed in RESERVED:
         raise ValueError(
             f"expected no seed of {RESERVED[0]} to {RESERVED[-1]}, which are reserved, found {seed}"
@@ -151,12 +147,7 @@ def hidden_seed(draw: Callable[[int], int] = secrets.randbelow) -> int:
 
 
 def settled(config: CompeteConfig, folder: Path | None) -> CompeteConfig:
-    """The configuration with its hidden seed: that of the run that goes on, or a fresh one.
-
-    Raises:
-        ConfigError: A seed is given beside `hidden` that is not the one of the run in the folder,
-            or the configuration in the folder cannot be read.
-    """
+    """The configuration with its hidden seed: that of the run that goes on, or a fresh one."""
     if not config.hidden:
         return config
     file = None if folder is None else folder / CONFIG

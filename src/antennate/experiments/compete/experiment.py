@@ -46,11 +46,7 @@ PATIENCE = 120.0
 
 
 def draws(config: CompeteConfig) -> list[Draw]:
-    """All that is to be run, controller by controller, scene by scene and seed by seed.
-
-    Raises:
-        ConfigError: The table to check cannot be read.
-    """
+    """All that is to be run, controller by controller, scene by scene and seed by seed."""
     if config.check is None:
         keys = [
             (name, scene, config.seed, trial)
@@ -72,11 +68,6 @@ def check(config: CompeteConfig) -> None:
     """Find a bad scene or controller before anything is run; each controller decides once.
 
     That is done in a process for each: what it does there ends or delays nobody else.
-
-    Raises:
-        ConfigError: There is no such scene or controller, it was made for another robot or rate,
-            what it answers has another form, or its process died or did not end.
-        SceneError: A scene cannot be built, or the robot does not fit at its start.
     """
     cells = dict.fromkeys((draw.controller, draw.scene, draw.seed) for draw in draws(config))
     require_different_scenes(dict.fromkeys(scene for _, scene, _ in cells), next(iter(cells))[0])
@@ -157,12 +148,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> Done:
-    """Run all episodes.
-
-    Raises:
-        ConfigError: Shards of it would each draw a seed of its own.
-        WorkerError: A worker process failed.
-    """
+    """Run all episodes."""
     workers = workers_from(workers)
     workers = replace(workers, engine=workers.engine or Processes())
     if workers.shard is not None and config.hidden:

@@ -29,12 +29,7 @@ _GROUPS = (
 
 
 def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
-    """The run of one controller in such a scene.
-
-    Raises:
-        ConfigError: A parameter is unknown, stands twice, cannot be set here, or has a value out of
-            bounds.
-    """
+    """The run of one controller in such a scene."""
     scene, *parts = _NEXT.split(text)
     values: dict[str, Any] = {"scene": scene, "seed": seed, "controllers": (controller,)}
     for part in parts:
@@ -56,11 +51,7 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
 
 
 def _put(values: dict[str, Any], path: str, value: Any, text: str) -> None:
-    """Set a value at its dotted path.
-
-    Raises:
-        ConfigError: One stands there, or at a part of the path.
-    """
+    """Set a value at its dotted path."""
     *groups, name = path.split(".")
     place: Any = values
     for group in groups:
@@ -79,10 +70,6 @@ def require_different_scenes(texts: Iterable[str], controller: str) -> None:
     Args:
         texts: The scenes.
         controller: One that runs in all of them.
-
-    Raises:
-        ConfigError: Two are, or one cannot be read.
-        SceneError: One cannot be built.
     """
     seen: dict[str, str] = {}
     for text in texts:

@@ -116,11 +116,7 @@ def _readings(antenna: AntennaSpec, flex: Floats, rng: np.random.Generator) -> F
 
 
 def gap_windows(config: DatasetConfig, draw: Draw) -> Windows:
-    """One window between two walls; empty unless both antennae touch their wall in it.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
+    """One window between two walls; empty unless both antennae touch their wall in it."""
     rng, gap = draw.rng, config.gap
     spread = gap.spread * rng.uniform(-1.0, 1.0, 2)
     sweep = SweepParams(
@@ -163,9 +159,6 @@ def push_windows(config: DatasetConfig, draw: Draw) -> Windows:
     """One window of a turn of the head against a post; empty if it slipped off before the end.
 
     The bench has a left antenna; on the right all is mirrored.
-
-    Raises:
-        SimulationError: The physics became invalid.
     """
     rng, push, antenna = draw.rng, config.push, individual(config, draw)
     place = float(rng.uniform(*push.place)) * antenna.length
@@ -249,11 +242,7 @@ class HeadTurn:
         return Ball(float(x), float(y), radius)
 
     def against(self, post: Ball) -> Push:
-        """Turn against a post.
-
-        Raises:
-            SimulationError: The physics became invalid.
-        """
+        """Turn against a post."""
         config, antenna = self.config, self.antenna
         bench = Bench(compile_bench(config.bench, antenna, [post]), antenna)
         start = self.angle(0.0)

@@ -66,11 +66,7 @@ def axis_of(links: Floats) -> Floats:
 
 
 def walk_windows(config: DatasetConfig, draw: Draw) -> Windows:
-    """The windows of a walk in which an antenna touches the wall.
-
-    Raises:
-        SimulationError: The physics became invalid, or there is no room to start.
-    """
+    """The windows of a walk in which an antenna touches the wall."""
     rng, walk = draw.rng, config.walk
     robot = config.robot.model_copy(update={"antenna": individual(config, draw)})
     side = 1.0 if rng.uniform() < 0.5 else -1.0
@@ -140,11 +136,7 @@ def _place(
 def _walked(
     config: DatasetConfig, world: World, gait: GaitParams, phase: float, chance: Disturbance
 ) -> dict[str, Floats]:
-    """A walk tick by tick: `t`, `counts`, `positions`, `links`, `antenna` and `body` at the wall.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
+    """Ticks of a walk: `t`, `counts`, `positions`, `links`, `antenna` and `body` at the wall."""
     period = 1.0 / config.rate
     body = SimRobot(1, world.robot, period, config.physics.timestep)
     body.load(0, world, chance)

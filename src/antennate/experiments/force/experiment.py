@@ -208,11 +208,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> ForceOutcome:
-    """Study every profile.
-
-    Raises:
-        WorkerError: A worker process died.
-    """
+    """Study every profile."""
 
     def keep(outcome: ProfileOutcome) -> None:
         for row in outcome.rows:

@@ -50,11 +50,7 @@ class Unknown:
 
     @classmethod
     def read(cls, text: str) -> Unknown:
-        """From words such as `robot.leg_friction=0.18:0.25`.
-
-        Raises:
-            ValueError: They say something else.
-        """
+        """From words such as `robot.leg_friction=0.18:0.25`."""
         name, _, span = text.partition("=")
         low, _, high = span.partition(":")
         try:
@@ -72,11 +68,7 @@ class Unknown:
 
 
 def changed(config: Config, values: Mapping[str, float]) -> Config:
-    """A configuration with other numbers in it, by their dotted names.
-
-    Raises:
-        ConfigError: There is no such number, or it cannot have this value.
-    """
+    """A configuration with other numbers in it, by their dotted names."""
     table = config.model_dump()
     places = {name: place for group in GROUPS for name, place in _numbers(table[group], group)}
     for name, value in values.items():
@@ -163,11 +155,7 @@ class GaitStudyConfig(Params):
         return self.robot.length if self.body_length is None else self.body_length
 
     def at(self, values: Mapping[str, float]) -> GaitStudyConfig:
-        """The same with all numbers known and these values of some.
-
-        Raises:
-            ConfigError: They make no robot or gait.
-        """
+        """The same with all numbers known and these values of some."""
         known = {name: type(self).model_fields[name].default for name in _OF_UNKNOWN}
         return changed(self.model_copy(update={"unknown": (), **known}), values)
 

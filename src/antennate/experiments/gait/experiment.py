@@ -49,11 +49,7 @@ class Walks(Done):
 
 
 def check(config: GaitStudyConfig) -> None:
-    """Find draws that make no robot or gait before anything is run.
-
-    Raises:
-        ConfigError: There is one.
-    """
+    """Find draws that make no robot or gait before anything is run."""
     _tasks(config)
 
 
@@ -139,11 +135,6 @@ def run(
 
     With a view they run in this process, one after the other, and give the same. The log of each
     goes to a folder if one is given.
-
-    Raises:
-        ConfigError: A draw of the unknown numbers makes no robot or gait.
-        LogError: A log cannot be written.
-        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
     """
     tasks = _tasks(config)
     if view is None:

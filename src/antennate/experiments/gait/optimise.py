@@ -43,9 +43,6 @@ def optimise(robot: RobotSpec, gait: GaitParams, goal: Goal) -> GaitParams:
         robot: The robot.
         gait: Where the search starts; its frequency and the step of lifting legs stay.
         goal: What is best.
-
-    Raises:
-        ConfigError: The configured gait is beyond the joints.
     """
     require_wave(robot, gait)
     turning = goal == "turning"

@@ -180,12 +180,7 @@ def walk_flat(
     watch: Watch = lambda world, frame: None,
     logs: Path | None = None,
 ) -> Walk:
-    """Walk one maneuver on the flat floor from a straight start; its log goes to a folder `logs`.
-
-    Raises:
-        SimulationError: The physics became invalid.
-        LogError: The log cannot be written.
-    """
+    """Walk one maneuver on the flat floor from a straight start; `logs` is a folder for its log."""
     robot, period = config.robot, 1.0 / config.rate
     scene = FlatScene().draw(robot, np.random.default_rng(0))
     world = MeteredWorld(compile_world(config.physics, robot, scene), robot)

@@ -246,11 +246,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> GeometryOutcome:
-    """Plan all gaits by the model, and walk each in the engine.
-
-    Raises:
-        SimulationError: The physics became invalid; from a worker it comes as a WorkerError.
-    """
+    """Plan all gaits by the model, and walk each in the engine."""
     plans = plan(config)
     walked = gather(walk, [(config, row) for row in plans.rows], workers, on_step, on_row)
     wave = wave_of(config.gait)

@@ -246,11 +246,7 @@ def _modelled(
 
 
 def walk(config: GeometryConfig, row: Walked) -> Walked:
-    """A gait by the engine too.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
+    """A gait by the engine too."""
     numbers = {
         "frequency": row.frequency_hz,
         "amplitude": row.amplitude_rad,

@@ -206,11 +206,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> ReproduceOutcome:
-    """Run everything and judge it. What was judged before an interruption is kept.
-
-    Raises:
-        AntennateError: An experiment failed.
-    """
+    """Run everything and judge it. What was judged before an interruption is kept."""
     judged: list[tuple[Claim, Finding]] = []
     more = {n: (_MORE_FITTED if is_fitted(n, config) else _MORE).get(n, 1) for n in QUICK}
     work = {n: _WORK.get(n, 1) * (1 if config.quick else more[n]) for n in QUICK}

@@ -48,10 +48,6 @@ def read(path: Path, config: ServoConfig) -> Recording:
     comes on, the supervisor lets goals come near slowly; what it tells the servo meanwhile is not
     known, so that torque counts from the first tick on that finds the servo at its goal. The log
     tells neither drive nor supply.
-
-    Raises:
-        BadInputError: No such joint, another servo, or a log without measured positions.
-        LogError: It cannot be read.
     """
     with LogReader(path) as log:
         robot = log.header.robot

@@ -144,9 +144,6 @@ def read(
         servo: The servo that it is taken for.
         mass: Mass at the end of the arm [kg]; None for what the file says.
         length: Length of the arm [m]; None for what the file says.
-
-    Raises:
-        BadInputError: It cannot be used; says where and why.
     """
     data = read_limited(path, _LARGEST_FILE)
     try:
@@ -238,11 +235,7 @@ def _torque(path: Path, entries: list[Any]) -> Bools:
 
 
 def check_course(path: Path, t: Floats, position: Floats, goal: Floats, servo: ServoParams) -> None:
-    """Refuse times that do not rise or have gaps, and angles that cannot be radians.
-
-    Raises:
-        BadInputError: Says where and why.
-    """
+    """Refuse times that do not rise or have gaps, and angles that cannot be radians."""
     steps = np.diff(t)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1
@@ -288,11 +281,7 @@ def _peak_speed(t: Floats, position: Floats) -> float:
 
 
 def check_load(path: Path, p_gain: float, weight: float, servo: ServoParams) -> None:
-    """Refuse a gain that moves nothing, and a weight [N·m] that no such servo could move.
-
-    Raises:
-        BadInputError: Says what was found.
-    """
+    """Refuse a gain that moves nothing, and a weight [N·m] that no such servo could move."""
     if not p_gain > 0.0:
         raise BadInputError(
             f"{path}: expected a gain kp above 0, found {p_gain:g}; a servo without it follows "
@@ -308,11 +297,7 @@ def check_load(path: Path, p_gain: float, weight: float, servo: ServoParams) -> 
 
 
 def check_supply(what: str, supply: Floats, servo: ServoParams) -> None:
-    """Refuse a supply [V] that such a servo does not run on; NaN is not known.
-
-    Raises:
-        BadInputError: Says of what, and why.
-    """
+    """Refuse a supply [V] that such a servo does not run on; NaN is not known."""
     low, high = (share * servo.voltage for share in _SUPPLIES)
     wrong = np.isfinite(supply) & ~((supply >= low) & (supply <= high))
     if wrong.any():
@@ -323,11 +308,7 @@ def check_supply(what: str, supply: Floats, servo: ServoParams) -> None:
 
 
 def check_torque(path: Path, t: Floats, torque: Bools) -> None:
-    """Refuse a recording with hardly any torque.
-
-    Raises:
-        BadInputError: Says how long it was on.
-    """
+    """Refuse a recording with hardly any torque."""
     on = float(np.diff(t)[torque[:-1]].sum())
     if on < _SHORTEST:
         raise BadInputError(

@@ -135,11 +135,7 @@ def _by_file(recordings: list[Recording]) -> bool:
 
 
 def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
-    """Replay, and fit if asked.
-
-    Raises:
-        BadInputError: A recording cannot be used, or none is named.
-    """
+    """Replay, and fit if asked."""
     if not config.recording:
         raise BadInputError("--recording: expected one file or more, found none")
     recordings = [_read(Path(name), config) for name in config.recording]

@@ -86,20 +86,11 @@ class StudyConfig(Planned):
         return without_group(name)
 
     def points_of(self, model: type[Params] | None) -> list[Point]:
-        """All points, in order.
-
-        Raises:
-            ConfigError: The plan is empty or cannot be made.
-        """
+        """All points, in order."""
         return make_points(self.plan, self.axes(model), self.points, self.seed)
 
     def axes(self, model: type[Params] | None) -> Axes:
-        """What varies: what is named, and the assumed numbers of the experiment if asked for.
-
-        Raises:
-            ConfigError: Assumed numbers cannot vary in this plan, or there is none that is left
-                out.
-        """
+        """What varies: what is named, and the assumed numbers of the experiment if asked for."""
         axes: dict[str, Any] = dict(self.vary)
         if self.assumed is not None and model is not None:
             if self.plan in ("grid", "list", "optuna"):

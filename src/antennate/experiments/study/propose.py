@@ -43,11 +43,7 @@ class Proposal:
 
 
 def package() -> Any:
-    """Optuna.
-
-    Raises:
-        MissingPackageError: It is not installed.
-    """
+    """Optuna."""
     try:
         return importlib.import_module("optuna")
     except ModuleNotFoundError as error:
@@ -84,9 +80,6 @@ def propose(
         goals: Of each objective.
         count: How many are wanted.
         seed: Seed of the search.
-
-    Raises:
-        MissingPackageError: Optuna is not installed.
     """
     optuna = package()
     number = int(np.random.SeedSequence([seed, len(past)]).generate_state(1)[0])

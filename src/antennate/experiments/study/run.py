@@ -36,12 +36,7 @@ from antennate.studies.work import Failure, Together
 
 
 def check(config: StudyConfig) -> None:
-    """Find what cannot be run before anything is.
-
-    Raises:
-        BadInputError: There is no such experiment, a parameter or the response is unknown, the plan
-            is empty, or a point of it is out of bounds.
-    """
+    """Find what cannot be run before anything is."""
     subject = find(config.experiment)
     _require_names(config, subject)
     _require_read(config)
@@ -145,12 +140,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> Done:
-    """Run all trials of all points; the rows come point by point, all with the same keys.
-
-    Raises:
-        BadInputError: As for `check`.
-        WorkerError: The workers cannot run anything.
-    """
+    """Run all trials of all points; the rows come point by point, all with the same keys."""
     if config.plan == "optuna":
         return _searched(config, workers, on_step, on_row)
     subject = find(config.experiment)

@@ -47,13 +47,7 @@ SEARCH, VALIDATION = "search", "validation"
 
 
 def check(config: StudyConfig, subject: Subject) -> None:
-    """Find what cannot be run before anything is.
-
-    Raises:
-        ConfigError: Nothing varies or is judged, a name is unknown, a value out of bounds, an
-            objective stands twice or is not measured, or there are several conditions.
-        MissingPackageError: Optuna is not installed.
-    """
+    """Find what cannot be run before anything is."""
     names = [objective.name for objective in objectives_of(config)]
     if not names:
         raise ConfigError("maximize: expected measures here or in minimize, found none")
@@ -90,11 +84,7 @@ def _ends(config: StudyConfig) -> Iterator[tuple[str, Any]]:
 
 
 def configured(config: StudyConfig, subject: Subject, point: Point, where: str = "") -> Any:
-    """The configuration of a design.
-
-    Raises:
-        ConfigError: A value is out of bounds, or does not fit another one.
-    """
+    """The configuration of a design."""
     trials = {} if config.trials is None else {"trials": config.trials}
     settings = put_over(config.settings, trials)
     try:
@@ -108,11 +98,7 @@ def configured(config: StudyConfig, subject: Subject, point: Point, where: str =
 
 
 def require(config: StudyConfig, columns: Columns) -> None:
-    """Check that there is a column of numbers for each objective.
-
-    Raises:
-        ConfigError: There is none.
-    """
+    """Check that there is a column of numbers for each objective."""
     successes = [n + OF_SUCCESSES for n in columns.numbers if OUTCOME in columns.names]
     for objective in objectives_of(config):
         columns.require(objective.name, objective.goal, config.experiment, successes)
@@ -347,12 +333,7 @@ class Searching:
 def search(
     config: StudyConfig, workers: int | Workers, on_step: OnStep, on_row: OnRow
 ) -> Searching:
-    """A search that has ended, or was interrupted.
-
-    Raises:
-        BadInputError: As for `check`; or the store was begun with another version of Optuna.
-        WorkerError: The workers cannot run anything.
-    """
+    """A search that has ended, or was interrupted."""
     searching = Searching(config, workers_from(workers), on_step, on_row)
     searching.run()
     return searching

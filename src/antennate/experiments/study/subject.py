@@ -51,9 +51,6 @@ def find(name: str, axes: Collection[str] = ()) -> Subject:
     Args:
         name: An experiment or a function.
         axes: Names of what varies; a function may have no such column.
-
-    Raises:
-        BadInputError: There is no such experiment or function.
     """
     if name in experiments.names():
         return _ExperimentSubject(experiments.load(name))
@@ -63,12 +60,7 @@ def find(name: str, axes: Collection[str] = ()) -> Subject:
 
 
 def configurations(config: StudyConfig, subject: Subject) -> list[tuple[Point, Any]]:
-    """Every point with its configuration.
-
-    Raises:
-        ConfigError: A parameter is unknown, a value out of bounds, the plan is empty, or there are
-            too many trials.
-    """
+    """Every point with its configuration."""
     settings = put_over(config.settings, {} if config.trials is None else {"trials": config.trials})
     for name in config.vary:
         _require_groups(settings, name)
@@ -128,9 +120,6 @@ class Columns:
             where: Where it is asked for.
             of: The experiment.
             more: Further names that are measures.
-
-        Raises:
-            ConfigError: There is no such measure.
         """
         known = [SUCCESS, *self.numbers] if OUTCOME in self.names else self.numbers
         if measure not in (*known, *more):
@@ -294,9 +283,6 @@ def own_row(result: Any, taken: Collection[str] = ()) -> dict[str, Any]:
     Args:
         result: A dictionary or a dataclass. Scalars of NumPy become numbers, arrays lists.
         taken: Names of what varies, which are columns of the study as well.
-
-    Raises:
-        BadInputError: It is something else, or has a column or a value that cannot be kept.
     """
     if is_dataclass(result) and not isinstance(result, type):
         result = asdict(result)

@@ -175,11 +175,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> Sweeps:
-    """Sweep in every cell of the map and in every trial of the estimates.
-
-    Raises:
-        WorkerError: A worker process died.
-    """
+    """Sweep in every cell of the map and in every trial of the estimates."""
     grid = list(product(config.distances, config.centres, config.amplitudes))
     cells = [
         (map_cell, config, profile, motion, number, *cell)

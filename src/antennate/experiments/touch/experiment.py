@@ -114,11 +114,7 @@ def _row(traverse: Traverse, comparison: Comparison | None) -> TouchRow:
 
 
 def run(config: TouchConfig, workers: int | Workers = 1, on_step: OnStep = no_step) -> TouchOutcome:
-    """Run all traverses, then let the control read them.
-
-    Raises:
-        WorkerError: A worker died.
-    """
+    """Run all traverses, then let the control read them."""
     trials = range(config.trials)
     tasks = list(product([config], config.walls, config.speeds, config.profiles, trials))
     traverses = gather(run_traverse, tasks, workers, on_step)

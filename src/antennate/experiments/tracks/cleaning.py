@@ -88,12 +88,7 @@ class Antennae:
 
 
 def clean(config: TracksConfig, track: Track, rate: float, y_down: bool) -> Antennae:
-    """The antennae of a track.
-
-    Raises:
-        BadInputError: Left and right are exchanged throughout, or frames are numbered so far apart
-            that nearly all are absent.
-    """
+    """The antennae of a track."""
     params, names = config.cleaning, config.points
     _refuse_far_apart(track)
     counts = {each.name: 0 for each in columns(Handled)}

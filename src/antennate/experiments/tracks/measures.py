@@ -94,9 +94,6 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
         file: The file, for messages.
         tips: Where the tips were, in the file's unit, shape (n, 2).
         length: Length of the antennae, in the same unit.
-
-    Raises:
-        BadInputError: It has to be fitted and the tips do not fix it.
     """
     given = params.line if params.kind == "line" else params.circle
     if params.kind in ("none", "file") or given is not None:
@@ -119,11 +116,7 @@ def wall_of(params: TrackWallParams, file: str, tips: Floats, length: float) -> 
 
 
 def require_inside(file: str, wall: Wall, bases: Floats) -> None:
-    """Check that bases (n, 2) of antennae lie in a circle; if not, it is in another unit.
-
-    Raises:
-        BadInputError: Most of them lie outside.
-    """
+    """Check that bases (n, 2) of antennae lie in a circle; if not, it is in another unit."""
     known = bases[np.isfinite(bases).all(axis=1)]
     if wall.kind != "circle" or not len(known):
         return

@@ -57,10 +57,6 @@ def read(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track
         path: The file; its suffix gives the format.
         names: Points that are wanted.
         columns: Columns of plain CSV.
-
-    Raises:
-        BadInputError: It cannot be read, or lacks a point; the text says how to go on.
-        MissingPackageError: It is HDF5 and h5py is not installed.
     """
     suffix = path.suffix.lower()
     if suffix == ".csv":

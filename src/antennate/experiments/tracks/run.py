@@ -171,13 +171,7 @@ def run(
     on_step: OnStep = no_step,
     on_row: OnRow = no_row,
 ) -> TracksOutcome:
-    """Classify the shapes of the antennae in every file.
-
-    Raises:
-        BadInputError: A file cannot be read, lacks a point, states another frame rate, or holds an
-            animal of another file.
-        MissingPackageError: A file is HDF5 and h5py is not installed.
-    """
+    """Classify the shapes of the antennae in every file."""
     del workers  # reading and measuring take less time than starting processes
     outcome = TracksOutcome(config)
     if not config.files:
@@ -220,11 +214,7 @@ def _wall(config: TracksConfig, animals: Sequence[Antennae]) -> measures.Wall:
 
 
 def frame_rate(config: TracksConfig, track: Track) -> float:
-    """Frames a second at which a track was recorded [Hz].
-
-    Raises:
-        BadInputError: Neither file nor configuration gives it, or they differ.
-    """
+    """Frames a second at which a track was recorded [Hz]."""
     stated = track.rate
     if stated is None:
         if config.rate is None:

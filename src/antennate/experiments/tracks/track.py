@@ -69,11 +69,7 @@ class Track:
     replaced: int = 0
 
     def in_order(self) -> Track:
-        """The same with its frames in rising order.
-
-        Raises:
-            BadInputError: A frame stands twice with different points: it may be several animals.
-        """
+        """The same with its frames in rising order."""
         late = self.frames < np.maximum.accumulate(self.frames)
         order = np.argsort(self.frames, kind="stable")
 
@@ -107,11 +103,7 @@ class Track:
 
 
 def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> None:
-    """Check that a file has the named points.
-
-    Raises:
-        BadInputError: One is missing.
-    """
+    """Check that a file has the named points."""
     for name in names:
         if name not in known:
             listed = shortened(", ".join(dict.fromkeys(known)) or "none")
@@ -122,11 +114,7 @@ def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> No
 
 
 def require_room_for(path: Path, size: int) -> None:
-    """Check, before anything is unpacked, how much a file unpacks to [byte].
-
-    Raises:
-        BadInputError: It is more than `UNPACKED`.
-    """
+    """Check, before anything is unpacked, how much a file unpacks to [byte]."""
     if size > UNPACKED:
         raise BadInputError(
             f"{path}: expected at most {in_units(UNPACKED)} once unpacked, found {in_units(size)}; "
@@ -169,11 +157,7 @@ def from_columns(
 
 
 def numbered(path: Path, frames: Floats) -> Ints:
-    """Numbers of frames as whole numbers.
-
-    Raises:
-        BadInputError: They are none.
-    """
+    """Numbers of frames as whole numbers."""
     if not np.isfinite(frames).all() or (frames != np.round(frames)).any():
         raise BadInputError(f"{path}: expected whole numbers of frames, found others")
     if abs(frames).max(initial=0.0) > LARGEST_WHOLE:
@@ -185,11 +169,7 @@ def numbered(path: Path, frames: Floats) -> Ints:
 
 
 def read_csv(path: Path, names: Sequence[str], columns: ColumnsParams) -> list[Track]:
-    """The animals of a plain CSV file, or of one of DeepLabCut.
-
-    Raises:
-        BadInputError: It cannot be read, or lacks a point.
-    """
+    """The animals of a plain CSV file, or of one of DeepLabCut."""
     rows = csv_rows(path, read_limited(path, LARGEST), (), BadInputError, ended=True)
     _, header = next(rows)
     if not header:

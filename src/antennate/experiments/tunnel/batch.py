@@ -56,9 +56,6 @@ def run_trials(
         batch: Trials at once.
         logs: Folder for their logs.
         apparatus: What they are run with.
-
-    Raises:
-        LogError: A log cannot be written.
     """
 
     def begin(size: int, donors: Donors) -> Lockstep:

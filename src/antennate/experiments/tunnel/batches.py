@@ -36,11 +36,7 @@ def on_warp(
     device: str | None,
     logs: Path | None,
 ) -> None:
-    """Run trials of one condition in batches on a GPU.
-
-    Raises:
-        ConfigError: Logs or yoked readings are wanted, which batches have not.
-    """
+    """Run trials of one condition in batches on a GPU."""
     if logs is not None:
         raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
     if YOKED in config.readings:

@@ -30,12 +30,7 @@ if TYPE_CHECKING:
 
 
 def check(config: TunnelConfig) -> None:
-    """Find a bad scene or controller before anything is run.
-
-    Raises:
-        ConfigError: There is no such scene or controller, or it cannot be made.
-        SceneError: The scene cannot be built, or the robot does not fit at its start.
-    """
+    """Find a bad scene or controller before anything is run."""
     check_start(config)
     given: dict[Kind, None] = {}
     for name in config.controllers:
@@ -79,11 +74,7 @@ def films(config: TunnelConfig, trial: int) -> dict[str, Callable[[], Film]]:
 def record(
     config: TunnelConfig, controller: str, trial: int, label: str, speed: float = SPEED
 ) -> Film:
-    """Run one trial and record it.
-
-    Raises:
-        BadInputError: The controller failed at its first tick.
-    """
+    """Run one trial and record it."""
     from antennate.telemetry.film import WalkRecorder  # slow to import
 
     recorder, rows = WalkRecorder(config.robot, speed), list[TrialResult]()

@@ -152,12 +152,7 @@ class Lockstep:
         return sorted(running + self._waiting)
 
     def run(self, trials: Sequence[int]) -> None:
-        """Run trials of these numbers.
-
-        Raises:
-            ControllerError: The controller cannot be made, or failed so that no row can be told.
-            LogError: A log cannot be written.
-        """
+        """Run trials of these numbers."""
         config, self._waiting = self._config, list(trials)
         phases = [self._place(row) for row in range(self._batch)]
         if not self._monitors:

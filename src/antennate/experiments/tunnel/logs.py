@@ -39,9 +39,6 @@ class Logs:
             world: Its robot.
             header: What the log begins with.
             control: Decides for all rows.
-
-        Raises:
-            LogError: The log cannot be written.
         """
         if self.folder is None or not isinstance(world, World):
             return
@@ -55,40 +52,24 @@ class Logs:
         self._running[row] = SimulatedLog(path, header, world, self._decisions, row)
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> None:
-        """Keep a tick of every trial.
-
-        Raises:
-            LogError: A log cannot be written.
-        """
+        """Keep a tick of every trial."""
         if self._running and self._decisions is not None:
             decided = self._decisions.take(frame, command)
             for log in self._running.values():
                 log.take(decided)
 
     def event(self, text: str) -> None:
-        """Keep what happened in every log.
-
-        Raises:
-            LogError: A log cannot be written.
-        """
+        """Keep what happened in every log."""
         for log in self._running.values():
             log.event(text)
 
     def close(self, row: int) -> None:
-        """End the log of a row, if there is one.
-
-        Raises:
-            LogError: It cannot be written.
-        """
+        """End the log of a row, if there is one."""
         if (log := self._running.pop(row, None)) is not None:
             log.close()
 
     def drop(self) -> None:
-        """Remove the logs of trials that are given up.
-
-        Raises:
-            LogError: A log cannot be written.
-        """
+        """Remove the logs of trials that are given up."""
         for log in self._running.values():
             log.close()
             log.path.unlink(missing_ok=True)

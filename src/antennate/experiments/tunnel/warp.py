@@ -40,11 +40,6 @@ def run_trials_on_warp(
         batch: Trials at once.
         limits: Sizes on the device; if not given, two trials on the CPU tell them.
         device: Name of a device of Warp, as cuda:0 or cpu; a GPU if not given.
-
-    Raises:
-        ConfigError: Two engines are installed, or Warp cannot hold that model.
-        MissingPackageError: Warp is not installed.
-        SceneError: The scene's instances are not of one structure.
     """
     require_device(device)
     if not trials:

@@ -261,11 +261,7 @@ def draw(config: WallConfig, profile: str, trial: int) -> Passage:
 
 
 def passage(config: WallConfig, profile: str, trial: int, watch: Watch = unwatched) -> Traverse:
-    """Move one antenna along the wall; `watch` looks at the bench.
-
-    Raises:
-        SimulationError: The physics became invalid.
-    """
+    """Move one antenna along the wall; `watch` looks at the bench."""
     drawn = draw(config, profile, trial)
     wall, physics = config.wall, config.physics
     base, approach = drawn.base, drawn.approach
