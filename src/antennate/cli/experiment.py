@@ -96,7 +96,7 @@ class Options(ViewOptions, RunOptions):
 
 @dataclass(frozen=True)
 class FittedOptions(Options):
-    """The same where numbers were fitted to the paper."""
+    """Options where numbers were fitted to the paper."""
 
     config: Path | None = option(
         None,
@@ -109,14 +109,14 @@ class FittedOptions(Options):
 
 @dataclass(frozen=True)
 class StudyOptions(Options):
-    """The same where a file says what is run."""
+    """Options where a file says what is run."""
 
     config: Path | None = option(None, "TOML file of the study or search", "FILE", positional=True)
 
 
 @dataclass(frozen=True)
 class AntennaOptions(Options):
-    """The same where a file may hold an antenna alone."""
+    """Options where a file may hold an antenna alone."""
 
     config: Path | None = option(
         None,

@@ -1,4 +1,4 @@
-"""`antennate study merge`: the shards of one run as the run that they are parts of."""
+"""`antennate study merge`: the shards of a run put together."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def command(argv: Sequence[str]) -> int:
 
 
 class _Part(NamedTuple):
-    """What a shard says of itself: the I-th of N parts of so many trials."""
+    """Part of a run that a shard holds: the I-th of N parts of all trials."""
 
     number: int
     parts: int
@@ -65,7 +65,7 @@ class _Part(NamedTuple):
 
     @property
     def places(self) -> range:
-        """Its trials."""
+        """Trials of the part."""
         return range(self.number - 1, self.trials, self.parts)
 
 

@@ -47,7 +47,7 @@ class Result:
     path: Path | None = None
 
     def __repr__(self) -> str:
-        """It in one line: what was run, and what came out."""
+        """One line: what was run, and what came out."""
         trials = f", {len(self.rows)} trials" if self.rows else ""
         return f"<Result of {self.experiment.name}{trials}: {one_line(self.sentence)}>"
 
@@ -81,7 +81,7 @@ class Result:
         return self.experiment.sentence(self.found)
 
     def figures(self) -> Mapping[str, Any]:
-        """Its figures by name, of matplotlib."""
+        """Figures of matplotlib by name."""
         return self.experiment.figures(self.outcome)
 
     def to_dataframe(self) -> Any:

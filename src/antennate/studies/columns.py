@@ -109,7 +109,7 @@ class Column:
 
     @property
     def ends(self) -> Column:
-        """Its interval."""
+        """Column of the interval."""
         path = self.name.rpartition(".")[0]
         name = f"{path}.{self.interval}" if path else self.interval
         return replace(self, name=name, label="  95 %", pool=None, interval="")
@@ -120,13 +120,13 @@ class Column:
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
     def value(self, of: Any) -> Any:
-        """Its value in a row or a summary, an object or a mapping; None where there is none."""
+        """Value of the column in a row or a summary, an object or a mapping; None if absent."""
         for part in self.name.split("."):
             of = of.get(part) if isinstance(of, Mapping) else getattr(of, part, None)
         return of
 
     def cell(self, of: Any) -> str:
-        """Its value as a table shows it."""
+        """Value of the column as a table shows it."""
         return shown(self.value(of), self.form, self.scale, self.join)
 
 

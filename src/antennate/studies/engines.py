@@ -15,7 +15,7 @@ WARP = "warp"
 EVERYWHERE = (LOCAL, "dask", "dask://HOST:PORT", "slurm", "slurm-local")
 """How an engine is named; slurm-local starts what would be jobs as processes of this machine."""
 BATCHED = (WARP, f"{WARP}:DEVICE")
-"""The same of those that only tunnel and studies of it have."""
+"""How an engine is named that only tunnel and studies of it have."""
 NO_BATCHES = "--engine warp: expected tunnel or a study of it"
 FORMS = (*EVERYWHERE, *BATCHED)
 

@@ -155,7 +155,7 @@ class Experiment(Generic[Config, Out]):
 
     @property
     def trials(self) -> Trials[Config] | None:
-        """Its trials one by one, for studies; without them a study runs it as a whole."""
+        """Trials one by one, for studies; without them a study runs the experiment as a whole."""
         return self.procedure if isinstance(self.procedure, Trials) else None
 
     @property

@@ -84,7 +84,7 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def csv_lines(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """The same line by line, for a table that does not fit into memory."""
+    """Lines of a table as of `to_csv`, for one that does not fit into memory."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     names: Sequence[str] = ()

@@ -31,8 +31,8 @@ class ShardEnd(Exception):
     """All tasks of a shard are finished; another command puts the shards together.
 
     Attributes:
-        count: How many those are.
-        total: How many tasks there are in all shards.
+        count: Finished tasks of the shard.
+        total: Tasks of all shards together.
     """
 
     def __init__(self, count: int, total: int) -> None:
@@ -52,8 +52,8 @@ class Workers:
     """How many workers there are, where they are, and what they have finished before.
 
     Attributes:
-        count: How many.
-        engine: Where they are; processes of this machine if not given.
+        count: Number of workers.
+        engine: Where the workers are; processes of this machine if not given.
         shard: (i, n): carry out the i-th of n parts of the tasks, from 1, and raise ShardEnd.
         timeout: Time after which a task that has not ended is given up [s], so that even one worker
             is a process of its own; None for an hour, where one worker waits on.
@@ -72,7 +72,7 @@ class Workers:
 
     @contextlib.contextmanager
     def stay(self) -> Iterator[Workers]:
-        """The same, whose processes of this machine serve one call after the other."""
+        """Workers whose processes of this machine serve one call after the other."""
         if self.engine_for(self.count).name != LOCAL:
             yield self
             return
@@ -85,7 +85,7 @@ class Workers:
             staying.end()
 
     def engine_for(self, parts: int) -> Engine:
-        """Where so many parts are carried out."""
+        """The engine that carries out a number of parts."""
         if self.engine is not None:
             return self.engine
         if self.timeout is None and (self.count == 1 or parts <= 1):
@@ -105,7 +105,7 @@ def workers_from(given: int | Workers) -> Workers:
 
 
 def places_of(records: Iterable[str]) -> set[int]:
-    """Places of the tasks that a shard kept, by the keys of its records: those of one call."""
+    """Places of the tasks that a shard kept of its first call, from the keys of its records."""
     return {int(key.removeprefix("0.")) for key in records if key.startswith("0.")}
 
 
@@ -176,9 +176,10 @@ class _Kept:
 
 
 def _parts(work: Work, places: Sequence[int], count: int) -> list[Sequence[int]]:
-    """Places in parts, each for one of so many workers at once: each worker is given some thrice.
+    """Places in parts, of which a worker is given one at a time.
 
-    Groups of tasks take turns.
+    A part is one task. For `Together` it holds at most a third of a worker's share of all tasks,
+    and groups of tasks take turns.
     """
     if not isinstance(work.function, Together):
         return [[place] for place in places]
@@ -190,7 +191,7 @@ def _parts(work: Work, places: Sequence[int], count: int) -> list[Sequence[int]]
 
 
 def _divided(places: Sequence[int], most: int) -> list[Sequence[int]]:
-    """Parts of at most so many, as few and as alike in size as can be."""
+    """Parts of at most `most` places, as few and as alike in size as can be."""
     count = math.ceil(len(places) / most)
     ends = [len(places) * k // count for k in range(count + 1)]
     return [places[first:end] for first, end in itertools.pairwise(ends)]
@@ -208,9 +209,9 @@ def gather(
 
     Args:
         function: function(*task) -> result, at the top of a module; or `Together`.
-        tasks: Its arguments, picklable.
-        workers: How many, or `Workers`.
-        on_step: Called after each with how many of how many tasks are done.
+        tasks: Arguments of each call of the function, picklable.
+        workers: Number of workers, or `Workers`.
+        on_step: Called after each task with the number of finished tasks and that of all.
         on_result: Called with each result as it comes, in no particular order.
         lost: lost(place, failure) -> the result of a task that has none; it may raise. Without it
             the failure is raised.

@@ -57,7 +57,7 @@ class _OfProgram:
     content: bytes
 
     def found(self, may_import: bool) -> Any:
-        """It by name if the same program can be imported here, else a copy."""
+        """The object by its name if the same program can be imported here, else a copy."""
         with contextlib.suppress(Exception, SystemExit):
             if may_import and Path(self.path).read_bytes() == self.source:
                 IMPORTING.append(self.path)
@@ -130,7 +130,7 @@ def _read(content: bytes, may_import: bool) -> Any:
 
 
 def sendable(each: Any) -> Any:
-    """The same object if it can be sent to a worker, else what says why not."""
+    """An object if it can be sent to a worker, else what says why not."""
     try:
         pickle.dumps(each)
     except Exception as error:  # noqa: BLE001  (an object's own code may raise anything)

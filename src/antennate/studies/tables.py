@@ -16,22 +16,22 @@ class Tried(Protocol):
 
     @property
     def trials(self) -> int:
-        """All of them."""
+        """All trials."""
         ...
 
     @property
     def invalid(self) -> int:
-        """Those that say nothing."""
+        """Trials that say nothing."""
         ...
 
     @property
     def successes(self) -> int:
-        """Those that succeeded."""
+        """Trials that succeeded."""
         ...
 
     @property
     def wilson95(self) -> Ends | None:
-        """Interval of their share of the valid ones; None without any."""
+        """Interval of the share of successes among valid trials; None without any."""
         ...
 
 

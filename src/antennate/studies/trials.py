@@ -215,7 +215,7 @@ class Trials(Generic[Config]):
         emit: Callable[[int, Any], None],
         device: str | None,
     ) -> None:
-        """The same in batches on a GPU or another device of Warp.
+        """Run some trials in batches on a GPU or another device of Warp; emit as `run` does.
 
         Raises:
             ConfigError: This configuration has no such batches.

@@ -28,7 +28,7 @@ _NUMBERS = ("cpu family", "model", "stepping", "CPU implementer", "CPU part", "C
 
 @functools.cache
 def processor() -> str:
-    """Its model, as the system calls it, and the numbers of that model."""
+    """Model of the processor, as the system calls it, and the numbers of that model."""
     try:
         first = CPUINFO.read_text().partition("\n\n")[0]
     except OSError:
@@ -206,7 +206,7 @@ class Engine(Protocol):
     name: str
 
     def run(self, call: Call, count: int) -> None:
-        """Carry out the parts of a call on so many workers."""
+        """Carry out the parts of a call on `count` workers."""
         ...
 
 

@@ -117,7 +117,7 @@ class Passage:
 
     @property
     def summary(self) -> str:
-        """The same in one sentence."""
+        """When the head passed the exit, or how far it came, in one sentence."""
         length = self._scene.length
         if self.passed < math.inf:
             return f"the head passed the exit after {self.passed:.1f} s of walking"

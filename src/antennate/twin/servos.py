@@ -123,11 +123,11 @@ class ServoEntry(Params):
     model: str = number("xc430-w240", "1", "assumed: the robot's")
     """Model of the servo, or a file with one."""
     id: int = number(1, "1", _FACTORY, ge=0, le=252)
-    """Its id."""
+    """Id of the servo."""
     baud: int = number(FACTORY_BAUD, "bit/s", _FACTORY, gt=0)
-    """Its speed on the bus."""
+    """Speed of the servo on the bus."""
     position: float = number(MIDDLE, "ticks", "assumed: the middle", ge=-1_048_575, le=1_048_575)
-    """Where its shaft is."""
+    """Where the shaft of the servo is."""
     name: str = number("", "1", "assumed: its place in the list")
     """Name of the servo in orders."""
 

@@ -46,8 +46,8 @@ FAST_TRIES = 3
 """Fast reads without any answer, but answers to a slow one, after which fast ones are given up: at
 1 % loss three in a row are one in 10^6 (assumed)."""
 KNOWN_TRIES = 100
-"""The same once a fast read was answered: then they are understood, and late answers of a second
-are a busy computer's (assumed)."""
+"""Fast reads without any answer after which they are given up once one was answered: then servos
+understand them, and late answers of a second are a busy computer's (assumed)."""
 ALONE = 2
 """Misses in a row after which a servo no longer holds up the others; noise loses one (assumed)."""
 BUSY = 0.010
@@ -59,7 +59,7 @@ R = TypeVar("R")
 
 
 def exclusive(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
-    """The same method; it waits until no other thread is in one of them, by the lock `turn`."""
+    """A method that waits until no other thread is in one of its kind, by the lock `turn`."""
 
     @wraps(method)
     def waiting(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:

@@ -41,7 +41,7 @@ SIZES: Sizes = {
     **dict.fromkeys(("late", "latency"), (0.0, math.inf, "seconds from 0 on")),
     _JUMP: (-MOST_TICKS, MOST_TICKS, f"a jump of 1 to {MOST_TICKS} ticks"),
 }
-"""Those of servos and their bus."""
+"""Sizes of faults of servos and their bus."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,14 +67,14 @@ class Pull(NamedTuple):
     high: float = 1.0
 
     def within(self, low: float, high: float) -> Pull:
-        """The same within narrower limits; its own limits come first."""
+        """The pull within narrower limits; its own limits come first."""
         if low <= self.low and high >= self.high:
             return self
         low, high = (max(self.low, min(bound, self.high)) for bound in (low, high))
         return self._replace(low=low, high=high)
 
     def reversed(self) -> Pull:
-        """The same for a shaft that turns the other way round; the goal stays."""
+        """The pull on a shaft that turns the other way round; the goal stays."""
         return self._replace(push=-self.push, low=-self.high, high=-self.low)
 
 
@@ -134,7 +134,7 @@ class DrivenMotion(Motion):
         self._loops.total = 0.0
 
     def _wanted(self, t: float, period: float) -> Pull | None:
-        """Its goal for the shaft, drives as the servo counts; None if friction holds the shaft."""
+        """Pull that the mode asks for, as the servo counts; None if friction holds the shaft."""
         if self.mode == PWM_MODE:
             pull = Pull(self.shaft.position, 0.0, self.memory.get("goal_pwm") / FULL_DRIVE)
         elif self.mode == CURRENT_MODE:

@@ -85,12 +85,12 @@ class Register:
 
     @property
     def eeprom(self) -> bool:
-        """It survives power-off and is locked while torque is on."""
+        """Whether the register survives power-off and is locked while torque is on."""
         return self.address < EEPROM_END
 
     @property
     def writable(self) -> bool:
-        """It may be written at all."""
+        """Whether the register may be written at all."""
         return self.access == "RW"
 
     def encode(self, value: SupportsIndex) -> bytes:

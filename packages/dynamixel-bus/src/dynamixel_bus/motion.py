@@ -68,7 +68,7 @@ class Motion:
 
     @property
     def driven(self) -> bool:
-        """It has torque and was not stopped."""
+        """Whether the servo has torque and was not stopped."""
         return self.torque and not self.stopped
 
     def counted(self, ticks: float) -> float:

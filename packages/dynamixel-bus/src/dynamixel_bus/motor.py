@@ -44,7 +44,7 @@ class Shaft:
         self.speed = self.duty = self.load = 0.0
 
     def rest(self) -> None:
-        """It stands, without drive."""
+        """Let the shaft stand, without drive."""
         self.speed = self.duty = self.load = 0.0
 
 

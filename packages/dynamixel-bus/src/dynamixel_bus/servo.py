@@ -97,7 +97,7 @@ class Servo:
 
     @property
     def torque(self) -> bool:
-        """It holds or moves."""
+        """Whether the servo holds or moves."""
         return self.get("torque_enable") == 1
 
     def place(self, position: float) -> None:
@@ -145,7 +145,7 @@ class Servo:
     # what the wire sees
 
     def awake(self, t: float) -> bool:
-        """It takes packets."""
+        """Whether the servo takes packets."""
         return self.plugged and t >= self._boot
 
     def advance(self, t: float) -> None:

@@ -194,7 +194,7 @@ class _Convex(Protocol):
     """A convex function of each of G rows of numbers."""
 
     def value(self, at: Floats) -> Floats:
-        """Its value, shape (G,)."""
+        """Value of each row, shape (G,)."""
         ...
 
     def slopes(self, at: Floats) -> tuple[Floats, Floats]:

@@ -53,19 +53,19 @@ class RecordingParams(Params):
     time_column: str = number("time", "1", "assumed: plain")
     """Column of time."""
     time_unit: Literal["s", "ms", "us"] = number("s", "1", "assumed: SI")
-    """Its unit."""
+    """Unit of time."""
     counts_column: str = number("counts", "1", "assumed: plain")
     """Column of readings."""
     reading_unit: Literal["counts", "ohm", "kohm", "V", "mV"] = number(
         "counts", "1", "assumed: what the board sends"
     )
-    """Its unit; others become counts by the divider and converter of antenna.sensor."""
+    """Unit of readings; any but counts is converted by divider and converter of antenna.sensor."""
     bend_column: str = number("bend", "1", "assumed: plain")
     """Column of bend or position."""
     bend_unit: Literal["1", "rad", "deg", "m", "mm"] = number(
         "1", "1", "assumed: 0 straight, 1 full"
     )
-    """Its unit."""
+    """Unit of bend or position."""
     bend_zero: float | None = number(None, "unit of bend", "assumed: its smallest value")
     """Value when straight."""
     bend_full: float | None = number(None, "unit of bend", "assumed: its largest value")
@@ -75,7 +75,7 @@ class RecordingParams(Params):
     speed_column: str = number("speed_m_s", "1", "assumed: plain")
     """Column of pushing speed, if any."""
     speed_unit: Literal["m/s", "cm/s", "mm/s"] = number("m/s", "1", "assumed: SI")
-    """Its unit."""
+    """Unit of pushing speed."""
     most_lost: float = number(
         0.02, "1", "assumed: far more than the serial logs we have seen", ge=0, le=0.5
     )

@@ -99,7 +99,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Its name in the table."""
+        """Name of the cell in the table."""
         return f"{self.part}: {self.condition}, {self.ground}, 1/{self.divisor:g}"
 
 

@@ -67,7 +67,7 @@ class Apart:
     Attributes:
         knows, needs: What it could use and needed when it was made: that it is given, whatever it
             says later.
-        maneuver, contact, level: As of a `Controller`, of the last step.
+        maneuver, contact, level: Those of a `Controller`, of the last step.
     """
 
     maneuver: Ints
@@ -95,15 +95,15 @@ class Apart:
             raise
 
     def know(self, knowledge: Knowledge) -> None:
-        """As of `Knowing`."""
+        """Tell the controller what it knows; see `Knowing`."""
         self._ask(self._limit, "know", knowledge)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """As of a `Controller`."""
+        """Start some rows of the controller anew; see `Controller`."""
         self._ask(WAITING * self._limit, "reset", rows, phase)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """As of a `Controller`."""
+        """Answer of the controller to a frame; see `Controller`."""
         limit = self._limit * (1.0 if self._begun else WAITING)
         command, self.maneuver, self.contact, self.level, void = self._ask(limit, "step", frame)
         self.void_decisions = void

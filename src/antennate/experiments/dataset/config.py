@@ -149,7 +149,7 @@ class DatasetConfig(Params):
     held_out_speeds: tuple[_Factor, _Factor] = number(
         (1.3, 1.5), "1", "assumed: faster, and apart from `speeds`"
     )
-    """The same of the split test_speed alone."""
+    """Range of that factor in the split test_speed alone."""
     averaging_time: float = number(0.1, "s", "assumed: T_avg, ten samples", gt=0, le=1)
     """Running mean of the readings before estimates look at them; the data are not averaged."""
     touch_flex: float = number(

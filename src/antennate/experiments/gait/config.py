@@ -155,7 +155,7 @@ class GaitStudyConfig(Params):
         return self.robot.length if self.body_length is None else self.body_length
 
     def at(self, values: Mapping[str, float]) -> GaitStudyConfig:
-        """The same with all numbers known and these values of some."""
+        """The configuration with all numbers known and these values of some."""
         known = {name: type(self).model_fields[name].default for name in _OF_UNKNOWN}
         return changed(self.model_copy(update={"unknown": (), **known}), values)
 

@@ -53,13 +53,13 @@ FULL: Mapping[str, Mapping[str, Any]] = {
     "calibrate": _CALIBRATE,
     "tunnel": {"trials": 100},
 }
-"""Its settings otherwise: its defaults, and more tunnels."""
+"""Settings of each experiment without `quick`: defaults, and more tunnels."""
 _FULL_FITTED: Mapping[str, Mapping[str, Any]] = {"wall": {"trials": 200}, "tunnel": {"trials": 200}}
-"""Its settings beside numbers that were fitted; of others those above."""
+"""Settings beside numbers that were fitted; other experiments have those of FULL."""
 _WORK = {"calibrate": 2, "force": 1, "touch": 4, "sweep": 28, "gait": 3, "wall": 16, "tunnel": 86}
 """Processor time of each experiment with `quick` [s]: what a bar counts; of others at most 1."""
 _MORE = {"force": 8, "touch": 22, "sweep": 5, "gait": 3, "wall": 3, "tunnel": 10}
-"""How many times as long it takes without."""
+"""How many times as long an experiment takes without `quick`."""
 _MORE_FITTED = {"wall": 33, "tunnel": 20}
 """How many times as long with fitted numbers."""
 _WITHOUT_CHANCE = {"gait"}

@@ -35,7 +35,7 @@ _ENOUGH = 1e-6
 _HARDLY = 0.1
 """A step of less damping is hardly shortened."""
 _STUCK = 1e4
-"""It is done, too, when no shorter step than that of this damping improves it."""
+"""A fit is done, too, when no shorter step than that of this damping improves it."""
 _CHUNK = 24
 """Fits that are simulated together; more would need more memory."""
 _SMOOTHING = 0.05

@@ -164,7 +164,7 @@ class _ExperimentSubject:
         condition: Column of its rows that tells the condition; empty without.
         most: Trials that may be run at once.
         whole: Whether it has no trials of its own.
-        columns: Those of its rows; None if they are not known before it is run.
+        columns: Columns of its rows; None if they are not known before it is run.
     """
 
     def __init__(self, experiment: Experiment[Any, Any]) -> None:
@@ -176,7 +176,7 @@ class _ExperimentSubject:
         self.columns = columns_of(experiment.row) if experiment.row else None
 
     def configured(self, values: Mapping[str, Any], allowed: Collection[str] = ()) -> Params:
-        """Its configuration from nested values; `allowed` may differ though nothing reads them."""
+        """The configuration from nested values; `allowed` may differ though nothing reads them."""
         model = self._experiment.config
         text = json.dumps(with_bases(values, model, Path()), default=_plain)
         try:
@@ -208,7 +208,7 @@ class _ExperimentSubject:
     def run_on_device(
         self, config: Any, trials: Sequence[Trial], emit: EmitRows, device: str | None
     ) -> None:
-        """The same on a GPU or another device of Warp."""
+        """Run some trials on a GPU or another device of Warp; emit as `run` does."""
         if self._trials is None or self._trials.batches.gpu is None:
             raise ConfigError(f"{NO_BATCHES}; {self._experiment.name} has none")
         self._trials.run_on_device(config, trials, lambda i, row: emit(i, [asdict(row)]), device)

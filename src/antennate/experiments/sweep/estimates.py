@@ -42,7 +42,7 @@ _FEATURES: dict[str, tuple[str, ...]] = {
     "blind": (),
 }
 TIP_CUES = ("flex_and_base", "flex", "blind")
-"""Those that also estimate the distance from base to tip."""
+"""Cues that also estimate the distance from base to tip."""
 _TIP_FEATURES: dict[str, tuple[str, ...]] = {
     "flex_and_base": ("peak", "peak_base"),
     "flex": ("peak",),

@@ -160,7 +160,7 @@ def _require_room(path: Path, array: Any, share: float = 1.0) -> None:
 
 
 def _picked(array: Any, places: Sequence[int], axis: int) -> Floats:
-    """Some places along an axis of an array of a file, in this order."""
+    """Values at places along an axis of an array of a file, in this order."""
     before = (slice(None),) * axis
     return np.stack([np.asarray(array[(*before, i)], np.float64) for i in places], axis)
 

@@ -83,7 +83,7 @@ def _separated(rng: np.random.Generator) -> tuple[float, ...]:
 
 
 def _continuous(rng: np.random.Generator) -> tuple[float, ...]:
-    """The same, with a shape that only the criteria know."""
+    """A dwell as of `_separated`, but NaN for its shape, which only the criteria know."""
     off = float(rng.uniform(*_OFF)) if rng.random() < _SHARE_FREE else 0.0
     first, even, opposed = (float(rng.uniform(*ends)) for ends in (_FIRST, _EVEN, _OPPOSED))
     return (np.nan, off, first, even + opposed, even, even - opposed)

@@ -69,7 +69,7 @@ class Track:
     replaced: int = 0
 
     def in_order(self) -> Track:
-        """The same with its frames in rising order."""
+        """The track with its frames in rising order."""
         late = self.frames < np.maximum.accumulate(self.frames)
         order = np.argsort(self.frames, kind="stable")
 

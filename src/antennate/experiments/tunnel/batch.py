@@ -107,7 +107,7 @@ class _Taped(Wrapped):
         self.counts: list[Floats] = []
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """As of a `Controller`."""
+        """Keep the counts of a frame, and let the controller answer it."""
         self.counts.append(frame.counts.copy())
         return super().step(frame)
 

@@ -144,7 +144,7 @@ class Measured:
 
     stuck: int = column("stuck episodes", pool=total, form="d", least=0.0, default=0)
     recovered: int = column("  recovered", pool=total, form="d", least=0.0, default=0)
-    """Those of them after which the robot got on."""
+    """Stuck episodes after which the robot got on."""
     force_mean_n: float | None = column("contact force, mean", "N", mean, least=0.0, default=0.0)
     """Summed normal force on robot and antennae, mean over samples at 10 Hz."""
     force_max_n: float | None = column(

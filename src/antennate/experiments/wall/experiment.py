@@ -58,7 +58,7 @@ class ProfileSummary(Measured, Passed):
     """All trials of a profile."""
 
     after_start: Passed = column("after")
-    """The same counts without the first `start_m` of the travel."""
+    """Counts without the first `start_m` of the travel."""
 
 
 @tabular
@@ -66,7 +66,7 @@ class Pair(Matched):
     """`descending` against another profile."""
 
     after_start: Discordance = column("after")
-    """The same without the first `start_m` of the travel."""
+    """Comparison without the first `start_m` of the travel."""
 
 
 @tabular

@@ -114,7 +114,7 @@ class WallTrial(Measured):
     outcome: Outcome
     """Success, jam, slip or invalid, over the whole travel."""
     outcome_after_start: Outcome
-    """The same without the start."""
+    """Success, jam, slip or invalid, without the start of the travel."""
     reason: str = ""
 
 
