@@ -102,8 +102,12 @@ def _replayed(
         while True:
             with contextlib.suppress(Restart), LogReader(path) as log:
                 player = ReplayPlayer(
-                    *(page.channel, log.header, str(path), options.view_speed),
-                    *(arena_of(path, log.header), config.controller),
+                    page.channel,
+                    log.header,
+                    title=str(path),
+                    speed=options.view_speed,
+                    arena=arena_of(path, log.header),
+                    name=config.controller,
                 )
                 player.state["paused"] = options.view_paused
                 player.tell()

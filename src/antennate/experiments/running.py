@@ -58,7 +58,13 @@ class Result:
         tables, figures = self.experiment.tables(self.found), self.figures()
         table = tables[0] if tables else Table("", (), ())
         first = next(iter(self.experiment.view.ordered(figures)), "")
-        return html(*(self.sentence, table.columns, table.rows, figures.get(first), table.preface))
+        return html(
+            self.sentence,
+            table.columns,
+            table.rows,
+            figure=figures.get(first),
+            note=table.preface,
+        )
 
     @property
     def rows(self) -> Sequence[Any]:

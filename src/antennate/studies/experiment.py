@@ -207,7 +207,9 @@ class Experiment(Generic[Config, Out]):
         """How its result is shown."""
         body = self.body
         return View(
-            *(self.name, self.description, self.config),
+            self.name,
+            about=self.description,
+            config=self.config,
             tables=lambda data: self.tables(self.read(data)),
             sentence=lambda data: self.sentence(self.read(data)),
             body=body and (lambda data, images: body(self.read(data), images)),
@@ -286,6 +288,9 @@ class Experiment(Generic[Config, Out]):
         return cls(
             folder.rpartition(".")[2],
             importlib.import_module(folder).__doc__ or "",
-            *(config, procedure, tables, sentence),
+            config,
+            procedure,
+            tables=tables,
+            sentence=sentence,
             **more,
         )

@@ -302,7 +302,10 @@ def _side_by_side(names: Sequence[str], found: Sequence[Sequence[Table]]) -> lis
         prefaces = (line for table in own.values() for line in table.preface.splitlines())
         joined.append(
             Table(
-                *(title, ["run", *columns], rows, "\n\n".join(filter(None, notes))),
+                title,
+                ["run", *columns],
+                rows,
+                note="\n\n".join(filter(None, notes)),
                 preface="\n".join(dict.fromkeys(prefaces)),
             )
         )

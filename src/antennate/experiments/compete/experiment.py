@@ -165,7 +165,10 @@ def run(
     rows = gather(
         Together(run_episodes, BATCH, _cell),
         [(draw,) for draw in planned],
-        *(workers, on_step, on_row, given_up),
+        workers,
+        on_step,
+        on_result=on_row,
+        lost=given_up,
     )
     return Done(rows, summarise(config, rows))
 
@@ -194,7 +197,11 @@ def prepared(config: CompeteConfig, folder: Path | None) -> CompeteConfig:
 
 
 EXPERIMENT = Experiment.of_folder(
-    *(__name__, CompeteConfig, run, tables, sentence),
+    __name__,
+    CompeteConfig,
+    procedure=run,
+    tables=tables,
+    sentence=sentence,
     result=CompeteResult,
     row=EpisodeRow,
     settled=prepared,

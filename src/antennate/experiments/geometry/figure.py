@@ -149,7 +149,9 @@ def torus(motion: Torus, lead: float) -> Figure:
     panel, below = figure.subplots(2, 1, height_ratios=(4.4, 2.4))
     largest = 1e3 * float(abs(motion.curvature).max())
     image = panel.pcolormesh(
-        *(np.degrees(motion.phase), np.degrees(motion.phase), 1e3 * motion.curvature.T),
+        np.degrees(motion.phase),
+        np.degrees(motion.phase),
+        1e3 * motion.curvature.T,
         cmap="RdBu_r",
         vmin=-largest,
         vmax=largest,

@@ -171,7 +171,15 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
     held_errors = np.array(judged).reshape(len(held), len(rows)).T
     replayed = servos.replay(fits[0][-1:], data.course, fitting.EVERY)[:, 0]
     return ServoOutcome(
-        *(config, recordings, data, rows, fits[0], errors, held, held_errors, interval),
+        config,
+        recordings,
+        data,
+        models=rows,
+        fitted=fits[0],
+        errors=errors,
+        held=held,
+        held_errors=held_errors,
+        interval=interval,
         rows=_recording_rows(recordings, data, replayed),
     )
 

@@ -173,7 +173,9 @@ def trace(traverse: Traverse, sensed: Comparison) -> Figure:
         panel.set_xlim(t[0], t[-1])
         panel.tick_params(labelbottom=False)
         panel.fill_between(
-            *(t, 0, 1),
+            t,
+            y1=0,
+            y2=1,
             where=sensed.truth.tolist(),
             color=_TRUE,
             alpha=0.15,
@@ -191,7 +193,9 @@ def _draw_bounds(panel: Axes, rule: RuleParams) -> None:
     ):
         panel.axhline(bound, color=_SENSED, linewidth=0.9, linestyle=(0, (4, 2)))
         panel.annotate(
-            *(name, (0.0, bound), (4, lift)),
+            name,
+            xy=(0.0, bound),
+            xytext=(4, lift),
             textcoords="offset points",
             va=side,
             fontsize=8,

@@ -218,7 +218,13 @@ def plan(config: TouchConfig, wall: WallKind, speed: float, profile: Profile, tr
     antenna = nominal.model_copy(update={"active_coils": coils})
     stands = site(antenna, overlap, config.wall_length, phase)
     return Plan(
-        *(config, wall, speed, profile, trial, springs, antenna),
+        config,
+        wall,
+        speed,
+        profile,
+        trial,
+        springs=springs,
+        antenna=antenna,
         overlap=reach(antenna) - stands.near,
         site=stands,
         wall_start=config.lead + config.free_length + shift * config.place_spread,

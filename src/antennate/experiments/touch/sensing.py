@@ -83,7 +83,11 @@ def match(truth: Bools, alarm: Bools, grace: int) -> Matches:
         if not onwards and end < len(truth) and last < len(truth):
             release.append(last - end)
     return Matches(
-        *(contacts, answered, carried, len(alarms), int((~answering).sum())),
+        contacts,
+        found=answered,
+        carried=carried,
+        alarms=len(alarms),
+        false=int((~answering).sum()),
         onset=np.array(onset, dtype=np.int64),
         release=np.array(release, dtype=np.int64),
     )
@@ -184,7 +188,10 @@ def _compare_batch(config: TouchConfig, batch: Sequence[Traverse]) -> list[Compa
         truth, plan = true_contact(config, traverse.force), traverse.plan
         comparisons.append(
             Comparison(
-                *(plan.wall, plan.speed, plan.profile, plan.trial),
+                plan.wall,
+                plan.speed,
+                plan.profile,
+                plan.trial,
                 metres=float(traverse.x[-1] - traverse.x[0]),
                 truth=truth,
                 alarm=alarm[:, i],
