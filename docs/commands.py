@@ -12,8 +12,7 @@ from pathlib import Path
 from generated import finish, heads, row
 
 from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, commands, described
-from antennate.cli.help import Command
-from antennate.cli.options import Option
+from antennate.cli.options import Command, Option
 from antennate.experiments import is_ours
 from antennate.messages import command_words
 

@@ -14,9 +14,8 @@ from antennate.params.scene import PhysicsParams, TunnelParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.ground import BEYOND, KINDS, Ground, GroundScene
-from antennate.sim.scenes.registry import HARD
 from antennate.sim.scenes.scene import Scene
-from antennate.sim.scenes.tunnel import Tunnel
+from antennate.sim.scenes.tunnel import HARD, Tunnel
 from antennate.sim.world import new_spec
 from antennate.types import Floats
 

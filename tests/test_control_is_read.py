@@ -11,9 +11,7 @@ from recorded import act, climb_all, leaves, press, recorded
 
 from antennate.cli import main
 from antennate.control.registry import (
-    BUILT_IN,
     KINDS,
-    PRIVILEGED,
     TELEOP,
     unread,
     unread_by_all,
@@ -62,7 +60,7 @@ def by_keys(control: ControlParams, robot: RobotSpec) -> None:
 
 
 ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
-    **{name: lambda c, r, name=name: act(name, c, r) for name in (*BUILT_IN, *PRIVILEGED)},
+    **{name: lambda c, r, name=name: act(name, c, r) for name in KINDS},
     TELEOP: by_keys,
     "climb": climb_all,
 }

@@ -23,8 +23,8 @@ from antennate.sim.judge import Judge, time_limit_of
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.geometry import Arm, Plan, Room
-from antennate.sim.scenes.registry import HARD, SHIPPED, make_scene
-from antennate.sim.scenes.tunnel import Tunnel
+from antennate.sim.scenes.registry import SHIPPED, make_scene
+from antennate.sim.scenes.tunnel import HARD, Tunnel
 from antennate.sim.trial import (
     TrialConfig,
     draw_scene,

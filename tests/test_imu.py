@@ -13,11 +13,11 @@ from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams, VariationParams
-from antennate.robots.imu import ImuParams, measured
+from antennate.robots.imu import ImuParams, bias_of, measured, noise_of
 from antennate.robots.parts import bill
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
-from antennate.sim.imu import Imu, bias_of, noise_of
+from antennate.sim.imu import Imu
 from antennate.sim.sim_robot import Disturbance, SimRobot
 from antennate.sim.trial import draw_trial, scene_of
 from antennate.sim.world import PREFIX, World, compile_world, world_spec

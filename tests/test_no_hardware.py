@@ -1,4 +1,4 @@
-"""Simulations, their logs and environments load nothing of servos, ports and the twin."""
+"""Simulations, their logs and environments load what they use: no servos, ports and no twin."""
 
 from __future__ import annotations
 
@@ -41,6 +41,12 @@ DATA = {
     *(f"dynamixel_bus.{name}" for name in ("model", "model_file", "models")),
 }
 """Ratings and registers of servo models; a description of a robot names them."""
+MOST_OF_TUNNEL = 97
+"""Modules of ours that `tunnel` loads. Ten stand at the top: figures, files, words, signals. There
+are 6 of `cli` (a command, its flags, what it prints), 10 of `experiments` (the tunnel), 19 of
+`studies` (workers, the run, its page), 3 of `telemetry` (names and versions in a run), 17 of `sim`
+(engine, world and tunnel), 12 of `control` (the loop and the usual four), 13 of `robots` and
+`params`, which a configuration holds whole, 3 of `antenna` (sensor, loads), 4 of `dxl` (DATA)."""
 WATCHED = """
 def hardware():
     rooms = ("antennate.hardware", "antennate.twin", "dynamixel_bus", "serial")
@@ -67,6 +73,18 @@ for words in json.loads(sys.argv[1]):
     assert len(found) == len(COMMANDS)
     for words, names in zip(COMMANDS, found, strict=True):
         assert names <= DATA, words
+
+
+def test_tunnel_loads_what_it_uses(tmp_path: Path) -> None:
+    code = """
+from antennate.cli import main
+assert main("tunnel --trials 1 --time-limit 1 --workers 1 --out walk".split()) == 0
+print(json.dumps([name for name in sys.modules if name.startswith("antennate")]), file=sys.stderr)
+"""
+    (names,) = loaded(tmp_path, code)
+    unused = ("climbing", "geometric", "steering", "mjcf", "ground", "topics", "pages", "help")
+    assert [name for name in names if name.endswith(unused)] == []
+    assert len(names) <= MOST_OF_TUNNEL
 
 
 def test_an_environment(tmp_path: Path) -> None:

@@ -370,7 +370,7 @@ def test_X4_a_model_on_which_the_engine_fails_harms_another_process(tmp_path, co
 
 def test_X2_a_named_file_is_compiled_by_another_process_first(tmp_path, monkeypatch):
     tried = []
-    monkeypatch.setattr("antennate.sim.scenes.registry.require_compiles", tried.append)
+    monkeypatch.setattr("antennate.sim.scenes.mjcf.require_compiles", tried.append)
     path = mjcf(tmp_path, SITES)
     assert make_scene(str(path)).random is False
     make_scene("flat")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from antennate.antenna import springs
+from antennate.antenna.load import SpringLoad, largest_load
 from antennate.errors import ConfigError
 from antennate.experiments.antenna.config import AntennaConfig
 from antennate.experiments.antenna.experiment import run, tables
@@ -139,8 +140,8 @@ def test_the_load_is_that_of_the_spring_with_the_largest_torque() -> None:
     t = np.linspace(0.0, 10.0, 2001)
     stiff, soft = -0.1 * (1.0 - np.cos(2 * np.pi * t)), 0.3 * np.sin(2 * np.pi * 7 * t)
     ripple = 0.002 * np.sin(2 * np.pi * 31 * t)
-    found = springs.largest_load(np.column_stack([stiff + ripple, soft]), (3.0, 1.0))
+    found = largest_load(np.column_stack([stiff + ripple, soft]), (3.0, 1.0))
     assert found.high == pytest.approx(0.6, rel=0.03)
     assert found.low == pytest.approx(0.0, abs=0.01)
     assert found.cycles == pytest.approx(10, abs=1)
-    assert springs.largest_load(np.zeros((5, 0)), (3.0,)) == springs.SpringLoad()
+    assert largest_load(np.zeros((5, 0)), (3.0,)) == SpringLoad()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antennate.control.gait import targets
-from antennate.control.twist_gait import AMPLITUDE_RATE, LEAD_RATE, TwistGait
+from antennate.control.geometric import AMPLITUDE_RATE, LEAD_RATE, TwistGait
 from antennate.errors import ConfigError
 from antennate.params.gaits import GaitParams
 from antennate.robots.mechanics import cycles, twist_map

@@ -16,7 +16,7 @@ from typing import Any
 
 from corridors import HERE, OURS, Rows, against, alone, row, rows_of, shares, written
 
-from antennate.sim.scenes.registry import HARD
+from antennate.sim.scenes.tunnel import HARD
 from antennate.studies.statistics import difference95, holm
 
 SIDE = "timed, knows side"

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from antennate import checks
-from antennate.colours import MANEUVER_COLOURS as MANEUVER_COLOURS
-from antennate.colours import MANEUVER_NAMES as MANEUVER_NAMES
-from antennate.colours import SERIES as SERIES
 from antennate.jackknife import ENOUGH as ENOUGH_TRIALS
+from antennate.types import Maneuver
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +24,25 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Keys = tuple[str, str]
+
+MANEUVER_COLOURS = {
+    Maneuver.FORWARD: "#0072B2",
+    Maneuver.TURN_L: "#009E73",
+    Maneuver.TURN_R: "#E69F00",
+    Maneuver.REVERSE: "#D55E00",
+    Maneuver.HOLD: "#000000",
+}
+"""After Okabe and Ito: apart for every kind of colour vision."""
+
+MANEUVER_NAMES = {
+    Maneuver.FORWARD: "forward",
+    Maneuver.TURN_L: "turn left",
+    Maneuver.TURN_R: "turn right",
+    Maneuver.REVERSE: "reverse",
+    Maneuver.HOLD: "hold",
+}
+SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#332288")
+"""For whatever has no colour of its own; after Okabe and Ito."""
 
 WIDTH = 4.5
 """Width of a figure [inches]: panels stand below one another, so that a phone shows its letters."""
@@ -224,3 +241,14 @@ def _settle(figure: Figure) -> None:
     for panel in figure.axes:
         left, low, right, high = (round(x, 4) for x in panel.get_position(original=True).extents)
         panel.set_position(Bbox.from_extents(left, low, right, high))
+
+
+def called(maneuver: int) -> str:
+    """A maneuver in words; a number that is none of ours, as a controller may say, stays one."""
+    return MANEUVER_NAMES[Maneuver(maneuver)] if maneuver in set(Maneuver) else str(maneuver)
+
+
+def rgba(colour: str) -> tuple[float, float, float, float]:
+    """Red, green, blue and opacity of `#RRGGBB`, 0 to 1."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue, 1.0

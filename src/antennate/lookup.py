@@ -7,7 +7,7 @@ import functools
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
@@ -66,6 +66,50 @@ class NotSent:
     reason: str
 
 
+class Shipped(Mapping[str, T]):
+    """Objects of this package by name, each declared in its own module alone.
+
+    A name is looked for in one module after the other, so that the modules behind it are not
+    loaded; to list all names loads all of them.
+
+    Args:
+        modules: Modules, those of the most usual names first.
+        declared: What a module declares, by name.
+        where: Whether an object is among these; all are if not given.
+        rank: What sorts the names where they are listed; as the modules have them if not given.
+    """
+
+    def __init__(
+        self,
+        modules: Sequence[str],
+        declared: Callable[[ModuleType], Mapping[str, T]],
+        where: Callable[[T], bool] = lambda found: True,
+        rank: Callable[[T], Any] = lambda found: 0,
+    ) -> None:
+        self._modules, self._declared = modules, declared
+        self._where, self._rank = where, rank
+
+    def _found(self) -> Iterator[tuple[str, T]]:
+        """Name and object, module by module."""
+        for module in self._modules:
+            for name, found in self._declared(importlib.import_module(module)).items():
+                if self._where(found):
+                    yield name, found
+
+    def __getitem__(self, name: str) -> T:
+        for each, found in self._found():
+            if each == name:
+                return found
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        listed = sorted(self._found(), key=lambda pair: self._rank(pair[1]))
+        return iter(dict(listed))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
 class Registry(Generic[T]):
     """Objects of one kind by name.
 
@@ -97,7 +141,7 @@ class Registry(Generic[T]):
     ) -> None:
         self._kind, self._group = kind, group
         self._files = files or {}
-        self._ours: dict[str, T] = dict(ours)
+        self._ours = ours
         self.added: dict[str, T] = ADDED.setdefault(group, {})
         self._found: dict[str, T] = {}
 

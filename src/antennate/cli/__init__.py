@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antennate import __version__
-from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
 from antennate.messages import COMMAND_GROUPS, command_words
 
 if TYPE_CHECKING:
-    from antennate.cli.help import Command
+    from antennate.cli.options import Command
 
 ROBOT_COMMANDS = {
     "twin": "A simulated robot on two ports: an antenna board and a servo bus",
@@ -74,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    from antennate.cli.terminal import safe_streams
+    from antennate.cli.terminal import BAD_INPUT, INTERRUPTED, safe_streams
     from antennate.sim.engine_setup import describe_only, dropped, keep_wish
 
     keep_wish()
@@ -167,6 +166,8 @@ def _page(name: str, words: Sequence[str]) -> str:
 
 
 def _run(name: str, words: Sequence[str], title: str) -> int:
+    from antennate.cli.terminal import BAD_INPUT, OK, write_result
+
     if page := _page(name, words):
         sys.stdout.write(page)
         if words:
@@ -174,7 +175,6 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         sys.stderr.write(f"{title}: error: expected a command, found none\n")
         return BAD_INPUT
     from antennate.cli.arguments import HelpRequest
-    from antennate.cli.terminal import write_result
     from antennate.errors import FAILURES, reason
     from antennate.messages import one_line, shortened
 

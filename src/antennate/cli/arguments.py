@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.help import Command, long_page, short_page
-from antennate.cli.options import Option, fields_of, flag_of, option, options_of
+from antennate.cli.options import Command, Option, fields_of, flag_of, option, options_of
 from antennate.errors import ConfigError
 from antennate.messages import command_words, nearest, shortened, shown
 from antennate.params.base import Config, Params, changes, put_over, read_file, stated
@@ -102,8 +101,12 @@ def _answer_questions(page: Command, argv: Sequence[str], unread: set[str]) -> N
         raise OptionsRequest(page)
     for word in argv:
         if word in ("-h", "--help"):
+            from antennate.cli.help import short_page  # only where it is asked for
+
             raise HelpRequest(short_page(page))
         if word == "--help-all":
+            from antennate.cli.help import long_page
+
             raise HelpRequest(long_page(page))
         if (flag := word.partition("=")[0].replace("_", "-")) in unread:
             name = command_words(page.name)

@@ -10,11 +10,10 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for
 from antennate.cli.robot import USUAL, PortOptions, at_hand, key_of, parse_robot, require_two_ports
-from antennate.cli.terminal import console, stop_signals, write_result
+from antennate.cli.terminal import BAD_INPUT, OK, console, stop_signals, write_result
 from antennate.errors import ConfigError
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Opener, Row, opener_of

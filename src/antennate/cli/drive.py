@@ -14,12 +14,12 @@ from pydantic.dataclasses import dataclass
 
 from antennate.antenna.calibration import Calibration
 from antennate.cli import viewer
-from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, pressed_keys, typed_keys
-from antennate.cli.options import option
-from antennate.cli.pages import PageOptions, page_of
+from antennate.cli.options import PageOptions, option
+from antennate.cli.pages import page_of
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
+from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.registry import BUILT_IN
 from antennate.errors import BadInputError, ConfigError, LogError, OutputError
 from antennate.hardware.config import DriveConfig, TeleopConfig

@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import as_typed, parse
-from antennate.cli.exit_codes import BAD_INPUT, INTERRUPTED, OK
-from antennate.cli.options import fields_of, flag_of, option
-from antennate.cli.pages import ViewOptions, say_by_hand, view_of
+from antennate.cli.options import ViewOptions, fields_of, flag_of, option
 from antennate.cli.results import ResultOptions, drawn_table, folder_for, show_result
-from antennate.cli.terminal import progress, stop_signals, told
+from antennate.cli.terminal import BAD_INPUT, INTERRUPTED, OK, progress, stop_signals, told
 from antennate.errors import (
     FAILURES,
     BadInputError,
@@ -215,7 +213,7 @@ def carry_out(
         raise BadInputError(f"expected shards of this version and code, found {changes}{hint}")
     with (
         stop_signals(),
-        view_of(options) as view,
+        _view(options) as view,
         _folder(experiment, argv, config, options, what, shards) as run,
     ):
         if view is not None:
@@ -239,8 +237,24 @@ def carry_out(
             run.kept = True
             sys.stderr.write(f"shard {options.shard}: {end.count} of {end.total} trials\n")
             return OK
-        say_by_hand(() if view is None else view.by_hand, run)
+        if view is not None:
+            from antennate.cli.pages import say_by_hand  # as below
+
+            say_by_hand(view.by_hand, run)
         return _end(experiment, config, options, run, outcome, None if shards else argv)
+
+
+def _view(options: Options) -> contextlib.AbstractContextManager[SimulationView | None]:
+    """The view that is wanted, None if none is.
+
+    Raises:
+        AntennateError: It cannot be served.
+    """
+    if not (options.view or options.foxglove):
+        return contextlib.nullcontext()
+    from antennate.cli.pages import view_of  # imports much, for a page that few runs want
+
+    return view_of(options)
 
 
 def _require_possible(options: Options, config: Params) -> None:

@@ -10,9 +10,9 @@ import shutil
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from antennate.cli.options import Option, fields_of, flag_of
+from antennate.cli.options import Command, Option, fields_of, flag_of
 from antennate.errors import BadInputError
 from antennate.messages import COMMAND_GROUPS, command_words, one_line, typed
 from antennate.params.base import meaning
@@ -32,24 +32,6 @@ _LATER += ("--readings", "--knows", "--json", "--overwrite")
 """Options that nobody uses first: they come last on the short page."""
 _FIRST = ("--config", "--esp32", "--bus", "--arm", "--until")
 """Options that the pages use: they come first on it, in this order."""
-
-
-class Command(NamedTuple):
-    """What the help of a command is made from.
-
-    Attributes:
-        name: Its name.
-        description: What it does; the short page shows what precedes the first empty line.
-        model: Its configuration.
-        parameters: Options of the configuration.
-        others: Its other options.
-    """
-
-    name: str
-    description: str
-    model: type
-    parameters: Sequence[Option]
-    others: Sequence[Option]
 
 
 def short_page(command: Command) -> str:

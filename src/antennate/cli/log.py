@@ -16,11 +16,10 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import BAD_INPUT, OK
-from antennate.cli.options import option
-from antennate.cli.pages import MODULE, FoxgloveOptions
+from antennate.cli.options import FoxgloveOptions, option
+from antennate.cli.pages import MODULE
 from antennate.cli.results import ResultOptions, log_of, show_result
-from antennate.cli.terminal import progress, stop_signals
+from antennate.cli.terminal import BAD_INPUT, OK, progress, stop_signals
 from antennate.control.readings import condition
 from antennate.errors import FAILURES, ConfigError, OutputError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole

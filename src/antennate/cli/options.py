@@ -6,13 +6,14 @@ its unit and its bounds come from the model, which also checks the values.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
+import pydantic.dataclasses
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
@@ -20,6 +21,7 @@ from antennate.errors import ConfigError
 from antennate.messages import shortened
 from antennate.params.base import meaning
 from antennate.params.faults import group_of
+from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -69,7 +71,7 @@ class Option:
     metavar: str
     kinds: frozenset[type]
     model: type
-    examples: tuple[str, ...]
+    examples: Collection[Any]
     many: bool = False
     choices: tuple[Any, ...] = ()
     limits: str = ""
@@ -110,7 +112,7 @@ class Option:
     @property
     def values(self) -> list[str]:
         """Known values."""
-        return [*map(str, self.choices)] or [*self.examples]
+        return [*map(str, self.choices or self.examples)]
 
     def value(self, word: str) -> Any:
         """The value of a word; what fits no type stays text and is refused by the model."""
@@ -183,14 +185,15 @@ def _option(path: tuple[str, ...], model: type, field: FieldInfo, default: Any) 
     kinds = frozenset(kind for kind in types if isinstance(kind, type)) | {type(c) for c in choices}
     known = next((text for kind, text in _METAVARS.items() if kind in kinds), "")
     if known or bool in kinds:
-        known = "NAME" if field.examples and str in kinds else known
+        offered = getattr(model, "offered", {}).get(path[-1], field.examples)
+        known = "NAME" if offered is not None and str in kinds else known
         metavar = "{" + ",".join(map(str, choices)) + "}" if choices else known
         yield Option(
             path=path,
             metavar="" if bool in kinds else str(extra.get("metavar", metavar)),
             many=many,
             choices=choices,
-            examples=tuple(map(str, field.examples or ())),
+            examples=() if offered is None else offered,
             model=model,
             limits=_limits(field),
             default=_words(default),
@@ -237,3 +240,68 @@ def _words(value: Any) -> str:
     if value is None or value is False:
         return ""
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+class Command(NamedTuple):
+    """What the help of a command is made from.
+
+    Attributes:
+        name: Its name.
+        description: What it does; the short page shows what precedes the first empty line.
+        model: Its configuration.
+        parameters: Options of the configuration.
+        others: Its other options.
+    """
+
+    name: str
+    description: str
+    model: type
+    parameters: Sequence[Option]
+    others: Sequence[Option]
+
+
+@pydantic.dataclasses.dataclass(frozen=True)
+class FoxgloveOptions:
+    """Whether other tools may read along."""
+
+    foxglove: bool = option(
+        False, "topics live for Foxglove and Lichtblick, without access control"
+    )
+    foxglove_port: int = option(
+        FOXGLOVE_PORT,
+        "port for these, 0 takes any",
+        "PORT",
+        needs=["--foxglove"],
+        ge=0,
+        le=65535,
+    )
+
+    @property
+    def port_for_foxglove(self) -> int | None:
+        """The port for Foxglove, None without it."""
+        return self.foxglove_port if self.foxglove else None
+
+
+@pydantic.dataclasses.dataclass(frozen=True)
+class PageOptions(FoxgloveOptions):
+    """Where the page is."""
+
+    view: bool = option(False, "show it on a page of this computer while it runs")
+    view_port: int = option(
+        PAGE_PORT, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
+    )
+
+
+@pydantic.dataclasses.dataclass(frozen=True)
+class ViewOptions(PageOptions):
+    """Where the page of a simulation is, and how fast it shows time."""
+
+    view_paused: bool = option(False, "start paused, so that nothing is missed", needs=["--view"])
+    view_speed: float = option(
+        1.0,
+        "times real time at which --view begins, 0 as fast as it goes",
+        "FLOAT",
+        needs=["--view", "--foxglove"],
+        ge=0,
+        le=100,
+    )

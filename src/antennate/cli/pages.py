@@ -1,4 +1,4 @@
-"""The page of a live view: the flags that ask for it, and the process that serves it.
+"""The page of a live view, and the process that serves it.
 
 Run as a module it is that process, which tells the address of the page and nothing else.
 """
@@ -12,15 +12,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from pydantic.dataclasses import dataclass
-
-from antennate.cli.options import option
+from antennate.cli.options import PageOptions, ViewOptions
 from antennate.cli.terminal import write
 from antennate.errors import AntennateError
 from antennate.host import STOPS, give_way
 from antennate.messages import one_line
 from antennate.studies.run_files import BY_HAND
-from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT
 from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 
 if TYPE_CHECKING:  # these import much, for a page that few runs want
@@ -33,53 +30,6 @@ if TYPE_CHECKING:  # these import much, for a page that few runs want
 MODULE = "antennate.cli.pages"
 """What Python runs as the process of a page."""
 _NONE = "-"
-
-
-@dataclass(frozen=True)
-class FoxgloveOptions:
-    """Whether other tools may read along."""
-
-    foxglove: bool = option(
-        False, "topics live for Foxglove and Lichtblick, without access control"
-    )
-    foxglove_port: int = option(
-        FOXGLOVE_PORT,
-        "port for these, 0 takes any",
-        "PORT",
-        needs=["--foxglove"],
-        ge=0,
-        le=65535,
-    )
-
-    @property
-    def port_for_foxglove(self) -> int | None:
-        """The port for Foxglove, None without it."""
-        return self.foxglove_port if self.foxglove else None
-
-
-@dataclass(frozen=True)
-class PageOptions(FoxgloveOptions):
-    """Where the page is."""
-
-    view: bool = option(False, "show it on a page of this computer while it runs")
-    view_port: int = option(
-        PAGE_PORT, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
-    )
-
-
-@dataclass(frozen=True)
-class ViewOptions(PageOptions):
-    """Where the page of a simulation is, and how fast it shows time."""
-
-    view_paused: bool = option(False, "start paused, so that nothing is missed", needs=["--view"])
-    view_speed: float = option(
-        1.0,
-        "times real time at which --view begins, 0 as fast as it goes",
-        "FLOAT",
-        needs=["--view", "--foxglove"],
-        ge=0,
-        le=100,
-    )
 
 
 def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:

@@ -13,8 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments, params
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import OK
-from antennate.cli.terminal import write_result
+from antennate.cli.terminal import OK, write_result
 from antennate.hardware import config as robot_file
 from antennate.messages import command_words
 from antennate.params.base import Params, meaning

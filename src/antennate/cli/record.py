@@ -16,10 +16,9 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from antennate.antenna.curves import plateau_of
-from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.robot import RobotOptions, at_hand, key_of, parse_robot
-from antennate.cli.terminal import StatusLine, stop_signals
+from antennate.cli.terminal import OK, StatusLine, stop_signals
 from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.config import RecordConfig, RobotFile
 from antennate.hardware.doctor.check import opener_of

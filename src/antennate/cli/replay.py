@@ -10,11 +10,11 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.arguments import parse
-from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.log import arena_of, complain
-from antennate.cli.options import option
-from antennate.cli.pages import ViewOptions, page_of, say_by_hand
+from antennate.cli.options import ViewOptions, option
+from antennate.cli.pages import page_of, say_by_hand
 from antennate.cli.results import ResultOptions, folder_for, log_of, show_result
+from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
 from antennate.messages import one_line, shortened

@@ -17,9 +17,8 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import FromFile, flags_and_words, parse, require_text
-from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
-from antennate.cli.terminal import console, write_result
+from antennate.cli.terminal import OK, console, write_result
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import write_whole
 from antennate.messages import command_words

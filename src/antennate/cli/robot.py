@@ -15,10 +15,9 @@ from pydantic.dataclasses import dataclass
 
 from antennate.cli import export
 from antennate.cli.arguments import FromFile, parse
-from antennate.cli.exit_codes import OK
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions, folder_for, show_result
-from antennate.cli.terminal import write
+from antennate.cli.terminal import OK, write
 from antennate.errors import ConfigError
 from antennate.hardware.config import RobotFile
 from antennate.hardware.doctor.check import same

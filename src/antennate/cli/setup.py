@@ -9,12 +9,11 @@ from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
-from antennate.cli.exit_codes import BAD_INPUT, OK
 from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
 from antennate.cli.options import option
 from antennate.cli.results import print_table
 from antennate.cli.robot import USUAL, BusOptions, parse_robot, parse_writer, require_bus
-from antennate.cli.terminal import StatusLine, stop_signals, today, write
+from antennate.cli.terminal import BAD_INPUT, OK, StatusLine, stop_signals, today, write
 from antennate.errors import ConfigError
 from antennate.hardware.config import JogConfig, SetupConfig, ZeroConfig
 from antennate.hardware.doctor.bus_survey import master

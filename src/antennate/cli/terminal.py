@@ -26,6 +26,8 @@ from typing import Any, TextIO
 from antennate.host import STOPS, StopOnce
 from antennate.messages import one_line
 
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+"""Exit codes of every command."""
 _ASCII = {"·": ".", "×": "x", "–": "-", "−": "-", "±": "+-", "²": "^2", "→": "->", "…": "..."}
 _PLAIN = "antennate.plain"
 _COLUMNS, _ROWS = 80, 24

@@ -19,11 +19,10 @@ from pydantic.dataclasses import dataclass
 
 from antennate.antenna.calibration import REACH
 from antennate.cli.arguments import as_typed
-from antennate.cli.exit_codes import OK
-from antennate.cli.options import fields_of, flag_of, option
-from antennate.cli.pages import PageOptions, page_of
+from antennate.cli.options import PageOptions, fields_of, flag_of, option
+from antennate.cli.pages import page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
-from antennate.cli.terminal import progress, stop_signals, today, write
+from antennate.cli.terminal import OK, progress, stop_signals, today, write
 from antennate.errors import ConfigError, LogError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile

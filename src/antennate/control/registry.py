@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 from antennate import checks
-from antennate.colours import SERIES
-from antennate.control import blind, controllers, geometric, steering
-from antennate.control.climbing import controllers as climbing
 from antennate.control.kind import ControllerFactory, ControllerKind, unread_of
 from antennate.control.readers import UNREAD_BY_POLICIES, unread_lift
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, MissingPackageError, raised
-from antennate.lookup import Registry
+from antennate.lookup import Registry, Shipped
 from antennate.params.base import paths_of
 from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
@@ -26,14 +23,26 @@ ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
 
 USUAL = ("open", "timed", "paper", "closed")
 """Controllers that are run if none is named; the others are further controls without touch."""
-_MODULES = (controllers, geometric, steering, blind, climbing)
-_ALL = {kind.name: kind for module in _MODULES for kind in module.KINDS}
-BUILT_IN = (*dict.fromkeys([*USUAL, *(name for name, kind in _ALL.items() if not kind.needs)]),)
-"""Names of ours that a robot may have."""
-PRIVILEGED = tuple(name for name, kind in _ALL.items() if kind.needs)
-"""Names of ours that need what only a simulation knows."""
-KINDS = {name: _ALL[name] for name in (*BUILT_IN, *PRIVILEGED)}
+_MODULES = ("controllers", "blind", "geometric", "steering", "climbing.controllers")
+"""Modules of `antennate.control` with a tuple `KINDS`, those of the usual controllers first."""
+
+
+def _shipped(where: Callable[[ControllerKind], bool]) -> Shipped[ControllerKind]:
+    """Controllers of ours, listed the usual ones first and last those that no robot may have."""
+
+    def declared(module: Any) -> dict[str, ControllerKind]:
+        return {kind.name: kind for kind in module.KINDS}
+
+    def rank(kind: ControllerKind) -> tuple[bool, int]:
+        return bool(kind.needs), USUAL.index(kind.name) if kind.name in USUAL else len(USUAL)
+
+    return Shipped([f"antennate.control.{name}" for name in _MODULES], declared, where, rank)
+
+
+KINDS = _shipped(lambda kind: True)
 """Controllers of ours by name."""
+BUILT_IN = _shipped(lambda kind: not kind.needs)
+"""Those of ours that a robot may have."""
 RIVAL = "timed"
 """The controller that results are compared with, wherever it was run beside others."""
 
@@ -52,13 +61,13 @@ CONTROLLERS: Registry[ControllerFactory] = Registry(
 """All controllers: ours, of installed packages, one's own as MODULE:NAME or FILE.py:NAME, and
 learned policies as FILE.onnx."""
 _FOR_ROBOTS: Registry[ControllerFactory] = Registry(
-    "controller", "antennate.controllers", {name: KINDS[name] for name in BUILT_IN}, _FILES
+    "controller", "antennate.controllers", BUILT_IN, _FILES
 )
 
 
 def check_for_robots(name: str) -> str:
     """Return the name of a controller if a robot may have it; no code of the user runs."""
-    if name in PRIVILEGED:
+    if name in KINDS and name not in BUILT_IN:
         raise ConfigError(
             f"expected a controller that lives on its readings, found {name!r}, which needs what "
             "only a simulation knows; `antennate tunnel` runs it"
@@ -67,7 +76,7 @@ def check_for_robots(name: str) -> str:
 
 
 def kind_of(name: str) -> ControllerKind | None:
-    """The kind of a controller, if it has one and this process knows it; no code is loaded."""
+    """The kind of a controller, if it has one and is known; no code of the user runs."""
     found = KINDS.get(name, CONTROLLERS.known(name))
     return found if isinstance(found, ControllerKind) else None
 
@@ -80,14 +89,20 @@ def looks(names: Iterable[str]) -> dict[str, tuple[str, Any]]:
     kinds = {name: kind_of(name) for name in names}
     coloured = {kind.colour: name for name, kind in [*kinds.items()][::-1] if kind is not None}
     own = {name: colour for colour, name in coloured.items() if colour}
-    ours = (kind.colour for kind in KINDS.values() if kind.colour)
-    palette = [*dict.fromkeys([*SERIES, *ours])]
-    free = [colour for colour in palette if colour not in own.values()] or palette
-    others = itertools.cycle(free)
+    others = _free(own.values())
     return {
         name: (own.get(name) or next(others), "solid" if kind is None else kind.line)
         for name, kind in kinds.items()
     }
+
+
+def _free(taken: Collection[str]) -> Iterator[str]:
+    """Colours in turn that none of these is; all colours if there is no other."""
+    from antennate.figures import SERIES  # only where they are drawn
+
+    ours = (kind.colour for kind in KINDS.values() if kind.colour)
+    palette = [*dict.fromkeys([*SERIES, *ours])]
+    yield from itertools.cycle([colour for colour in palette if colour not in taken] or palette)
 
 
 def about(names: Iterable[str]) -> str:
@@ -179,8 +194,8 @@ def unread(name: str, control: ControlParams, knows: Collection[str] = ()) -> se
     """
     if name == TELEOP:
         return unread_of(("gait.turn_offset",), False, control)
-    if name in KINDS:
-        return unread_of(KINDS[name].reads, KINDS[name].climbs, control, knows)
+    if (kind := KINDS.get(name)) is not None:
+        return unread_of(kind.reads, kind.climbs, control, knows)
     return set(UNREAD_BY_POLICIES) if name.endswith(".onnx") else set()
 
 
@@ -194,7 +209,7 @@ def unread_by_all(
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
     paths = set.intersection(*(unread(name, control, knows) for name in names))
     reasons = {f"control.{path}": who for path in sorted(paths)}
-    if not set(names) <= {*KINDS, TELEOP}:
+    if not all(name == TELEOP or name in KINDS for name in names):
         return reasons
     if not robot.has_imu:
         for path in paths_of(HeadingParams, "control.climb.heading"):
@@ -204,6 +219,7 @@ def unread_by_all(
 
 def unread_limits(names: Sequence[str]) -> dict[str, str]:
     """Limits of joints that none of these controllers keeps, and why."""
-    if not set(names) <= {TELEOP, *(name for name, kind in KINDS.items() if not kind.climbs)}:
+    kinds = [KINDS.get(name) for name in names if name != TELEOP]
+    if any(kind is None or kind.climbs for kind in kinds):
         return {}
     return dict.fromkeys(KEPT_BY_CLIMBERS, "only controllers that climb read it in a simulation")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -180,9 +180,10 @@ class DriveConfig(RobotConfig):
     """The robot, its controller, and how long it runs."""
 
     unread: ClassVar[tuple[str, ...]] = (*UNDRIVEN, "zeros.measured")
+    offered: ClassVar[Mapping[str, Collection[str]]] = {"controller": BUILT_IN}
 
-    controller: str = number("closed", "1", "assumed: our best", examples=[*BUILT_IN])
-    """{examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
+    controller: str = number("closed", "1", "assumed: our best")
+    """{offered}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)

@@ -8,7 +8,7 @@ import inspect
 import json
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -67,10 +67,13 @@ class Params(Strict):
         unread: Parameters of its groups, dotted, that a command with this configuration does not
             read. They are no flags, and a value other than the default is an error.
         shared: Whether its file serves other commands too, and so may hold what is not read here.
+        offered: Names that a field takes among others, by field, for help and completion. To list
+            them may load the modules of all, so nothing else does.
     """
 
     unread: ClassVar[tuple[str, ...]] = ()
     shared: ClassVar[bool] = False
+    offered: ClassVar[Mapping[str, Collection[str]]] = {}
 
     def unread_here(self) -> Mapping[str, str]:
         """Further ones that nothing reads because of other values, and why. They are flags."""
@@ -178,18 +181,21 @@ def number(
     return Field(default, json_schema_extra=extra, **bounds)
 
 
-def meaning(model: Any, name: str, unit: bool = True) -> str:
-    """What a parameter is, as a phrase without a full stop; `{examples}` in it are its examples.
+def meaning(model: Any, name: str, unit: bool = True, listed: bool = True) -> str:
+    """What a parameter is, as a phrase without a full stop; `{offered}` in it are `Params.offered`.
 
     Args:
         model: The group that it belongs to, or a pydantic dataclass.
         name: Its name.
         unit: Whether its unit is added in brackets.
+        listed: Whether the names that it takes are listed; that may load the modules of all.
     """
     field = getattr(model, "__pydantic_fields__")[name]  # noqa: B009  # also of dataclasses
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     text = field.description or _docstrings(model).get(name, "")
-    text = text.replace("{examples}", ", ".join(map(str, field.examples or ())))
+    if "{offered}" in text:
+        names = ", ".join(model.offered[name]) if listed else "NAME of ours"
+        text = text.replace("{offered}", names)
     words = " ".join(text.split()).removesuffix(".")
     first = words.partition(" ")[0]
     phrase = first.lower() + words[len(first) :] if first.istitle() else words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 from pydantic import model_validator
@@ -235,6 +236,18 @@ class GroundParams(Params):
                 f"start must rise from at least 0.25 to at most 10 m, found {near:g} and {far:g}"
             )
         return self
+
+
+GROUND_READS: Mapping[str, tuple[str, ...]] = {
+    "step_up": ("start", "height"),
+    "step_down": ("start", "height"),
+    "stairs": ("start", "height", "steps", "tread"),
+    "gap": ("start", "width", "depth"),
+    "ramp": ("start", "height", "slope"),
+    "rubble": ("start", "block", "density"),
+    "step_tunnel": ("height",),
+}
+"""Sizes that each scene of ground reads."""
 
 
 class PhysicsParams(Params):

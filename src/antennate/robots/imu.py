@@ -127,3 +127,16 @@ def measured(params: ImuParams, counts: Floats) -> tuple[Floats, Floats]:
     """
     values = counts * params.steps
     return values[:, :AXES], values[:, AXES:]
+
+
+def noise_of(params: ImuParams, rng: np.random.Generator, count: int, period: float) -> Floats:
+    """Noise of samples with this period [s]: [rad/s], then [m/s²], shape (count, 6).
+
+    A mean over a time T of white noise whose density is N has the standard deviation N / sqrt(2 T).
+    """
+    return params.noises / np.sqrt(2.0 * period) * rng.standard_normal((count, 2 * AXES))
+
+
+def bias_of(params: ImuParams, rng: np.random.Generator) -> Floats:
+    """Zeros of the axes in one trial: [rad/s], then [m/s²], shape (6,)."""
+    return params.biases * rng.standard_normal(2 * AXES)

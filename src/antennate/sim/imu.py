@@ -3,8 +3,7 @@
 A real one filters what it measures to half its sample rate. Here a sample is the mean since the one
 before: of the angular velocity, the turn over the time; of the specific force, the change of the
 velocity over the time, and gravity, in the mean attitude. So samples summed over time give the turn
-of the head, and the bounce of legs between two samples does not fold back. A mean over a time T of
-white noise whose density is N has the standard deviation N / sqrt(2 T).
+of the head, and the bounce of legs between two samples does not fold back.
 """
 
 from __future__ import annotations
@@ -16,10 +15,6 @@ import numpy as np
 from antennate.params.scene import GRAVITY
 from antennate.robots.imu import AXES, ImuParams
 from antennate.types import Bools, Floats
-
-STATE = 10
-"""Numbers that a sample is made of: quaternion, real part first, velocity in the axes of the world
-[m/s], angular velocity in those of the head [rad/s]."""
 
 
 class Imu:
@@ -46,7 +41,7 @@ class Imu:
 
         Args:
             t: Time of each row [s], shape (B,). Where it has not gone on, nothing new is measured.
-            state: As `STATE` says, shape (B, 10); zeros where there is no head.
+            state: As `states.HEAD` says, shape (B, 10); zeros where there is no head.
             error: Bias and noise, gyroscopes [rad/s] first, then [m/s²], shape (B, 6).
             rows: Rows that remember this sample, shape (B,); all if not given.
 
@@ -61,16 +56,6 @@ class Imu:
                 if rows is None or rows[i]:
                     self._mean[i], self._last[i] = means[i], now
         return np.clip(np.rint((means + error) / self._steps), -self._most, self._most)
-
-
-def noise_of(params: ImuParams, rng: np.random.Generator, count: int, period: float) -> Floats:
-    """Noise of samples with this period [s]: [rad/s], then [m/s²], shape (count, 6)."""
-    return params.noises / np.sqrt(2.0 * period) * rng.standard_normal((count, 2 * AXES))
-
-
-def bias_of(params: ImuParams, rng: np.random.Generator) -> Floats:
-    """Zeros of the axes in one trial: [rad/s], then [m/s²], shape (6,)."""
-    return params.biases * rng.standard_normal(2 * AXES)
 
 
 def _mean(before: tuple[float, list[float]], now: tuple[float, list[float]]) -> tuple[float, ...]:

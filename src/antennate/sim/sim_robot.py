@@ -7,18 +7,21 @@ antennae read NaN, which the controller takes for UNKNOWN. Rows never influence 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from antennate.antenna.sensor import SensorChain, reading_noise
 from antennate.errors import ConfigError, SimulationError
 from antennate.params.scene import VariationParams
-from antennate.robots.imu import AXES, measured
+from antennate.robots.imu import AXES, bias_of, measured, noise_of
 from antennate.robots.spec import RobotSpec
-from antennate.sim.imu import Imu, bias_of, noise_of
 from antennate.sim.states import States
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, joint_angles
+
+if TYPE_CHECKING:
+    from antennate.sim.imu import Imu
 
 NOISE_BLOCK = 1024
 """Ticks whose noise is drawn at once."""
@@ -95,6 +98,13 @@ class Disturbance:
         return np.clip(self._robot.leg_friction * factor, 0.02, 2.0)
 
 
+def _imu(robot: RobotSpec, batch: int) -> Imu:
+    """The inertial sensors of the heads of B robots."""
+    from antennate.sim.imu import Imu  # few robots have one
+
+    return Imu(robot.imu, batch)
+
+
 class _Row:
     """One world of the batch with its disturbance and its tick count."""
 
@@ -138,7 +148,7 @@ class SimRobot:
         self._bends: Floats = np.ones((batch, 2))
         self._noise: Floats = np.zeros((batch, NOISE_BLOCK, 2))
         self._imu_params = robot.imu
-        self._imu = Imu(robot.imu, batch) if robot.has_imu else None
+        self._imu = _imu(robot, batch) if robot.has_imu else None
         blocks = NOISE_BLOCK if robot.has_imu else 0
         self._imu_error: Floats = np.zeros((batch, blocks, 2 * AXES))
         self._every: Ints = np.arange(batch)

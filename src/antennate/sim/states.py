@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from antennate.sim.engine import mujoco
-from antennate.sim.imu import STATE
 from antennate.sim.places import ANGLE_LIMIT, DISTANCE_LIMIT, SPEED_LIMIT
 from antennate.sim.world import World
 from antennate.types import Floats, Ints
 
+HEAD = 10
+"""Numbers of a head: quaternion, real part first, velocity in the axes of the world [m/s], angular
+velocity in those of the head [rad/s]."""
 _STATE = int(
     mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
 )
@@ -47,7 +49,7 @@ class States:
         self._heights: Ints = np.zeros(batch, np.int64)
         self._hinges: Ints = np.zeros((batch, 2, hinges), np.int64)
         self._joints: Ints = np.zeros((batch, joints), np.int64)
-        self._heads: Ints = np.zeros((batch, STATE), np.int64)
+        self._heads: Ints = np.zeros((batch, HEAD), np.int64)
 
     def put(self, row: int, world: World) -> None:
         """Put a world into a row."""
@@ -119,5 +121,5 @@ class States:
 
     @property
     def heads(self) -> Floats:
-        """Attitudes and velocities of the heads as `imu.STATE` says, shape (B, 10)."""
+        """Attitudes and velocities of the heads as `HEAD` says, shape (B, 10)."""
         return self._all.take(self._heads)

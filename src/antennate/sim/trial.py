@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -17,6 +18,7 @@ from antennate.params.base import Params, changes, from_values, number, paths_of
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import (
+    GROUND_READS,
     CorridorsParams,
     GroundParams,
     PhysicsParams,
@@ -26,7 +28,6 @@ from antennate.params.scene import (
 from antennate.robots.antenna import require_own_curve
 from antennate.robots.spec import RobotSpec
 from antennate.sim.episode import Episode
-from antennate.sim.scenes.ground import READS
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.sim_robot import Disturbance
@@ -41,9 +42,11 @@ MEMBERS = ("start", "length", "exit", "build", "progress", "left")
 class TrialConfig(Params):
     """What decides how a trial starts."""
 
+    offered: ClassVar[Mapping[str, Collection[str]]] = {"scene": SHIPPED}
+
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
-    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel", examples=[*SHIPPED])
+    scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel")
     """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, step_up,
     step_down, stairs, gap, ramp, rubble, step_tunnel, a MJCF file.xml, MODULE:CLASS or
     file.py:CLASS."""
@@ -71,7 +74,7 @@ class TrialConfig(Params):
     def _unread_ground(self) -> Iterator[tuple[str, str]]:
         """Sizes of ground that the scene does not have, and whose they are."""
         for name in GroundParams.model_fields:
-            scenes = [scene for scene, read in READS.items() if name in read]
+            scenes = [scene for scene, read in GROUND_READS.items() if name in read]
             if self.scene not in scenes:
                 yield name, f"it belongs to the scenes {', '.join(scenes)}"
 

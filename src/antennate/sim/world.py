@@ -33,9 +33,9 @@ from antennate.sim.places import (
     Places,
     ServoDrives,
     broken,
+    outline,
 )
 from antennate.sim.scenes.scene import SceneInstance, add_floor
-from antennate.sim.shapes import outline
 from antennate.types import Bools, Floats, Ints
 
 drop_if_asked()

@@ -159,9 +159,9 @@ def _lines(group: Params, path: tuple[str, ...]) -> Iterator[str]:
         if isinstance(value, Params):
             groups.append((name, value))
         elif value is None:
-            yield f"# {name} is not set: {meaning(type(group), name)}"
+            yield f"# {name} is not set: {meaning(type(group), name, listed=False)}"
         else:
-            yield f"{name} = {_toml(value)}  # {meaning(type(group), name)}"
+            yield f"{name} = {_toml(value)}  # {meaning(type(group), name, listed=False)}"
     for name, value in groups:
         yield from _lines(value, (*path, name))
 

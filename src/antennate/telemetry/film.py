@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.errors import BadInputError, MissingPackageError
+from antennate.figures import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES, rgba
 from antennate.messages import extra
 from antennate.robots.spec import RobotSpec
 from antennate.sim import engine_setup

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, ValidationError
 
@@ -26,7 +26,9 @@ from antennate.params.control import ControlParams
 from antennate.params.faults import describe
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine_setup import engines
-from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS, Topic
+
+if TYPE_CHECKING:
+    from antennate.telemetry.topics import Topic
 
 TWIN = "twin"
 """The controller of a twin's log: what its client decides is not known."""
@@ -116,6 +118,8 @@ class Header(Strict):
 
     def messages(self) -> dict[Topic, bytes]:
         """Messages of the header in a log."""
+        from antennate.telemetry.topics import CALIBRATION, CONFIG, VERSIONS  # not without a log
+
         apart = {"calibration", "versions"}
         texts = {
             CONFIG: self.model_dump_json(exclude=apart),
@@ -132,6 +136,8 @@ class Header(Strict):
         Raises:
             LogError: One is missing or damaged.
         """
+        from antennate.telemetry.topics import CALIBRATION, CONFIG, HEADER_TOPICS, VERSIONS
+
         texts = {
             topic: topic.decode(messages[topic])["data"]
             for topic in HEADER_TOPICS

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import field_validator
@@ -23,7 +23,8 @@ from antennate.control.readings import (
     check_readings,
     make_readings,
 )
-from antennate.control.registry import BUILT_IN, PRIVILEGED, check_for_robots, make_controller
+from antennate.control.registry import BUILT_IN, check_for_robots, make_controller
+from antennate.control.registry import KINDS as OURS
 from antennate.errors import LogError, raised
 from antennate.messages import shortened
 from antennate.params.base import Params, number
@@ -37,8 +38,10 @@ from antennate.types import AntennaFrame, Controller, Floats, JointCommand
 class ReplayConfig(Params):
     """Which controller decides upon the readings of a log."""
 
-    controller: str | None = number(None, "1", "assumed: the one recorded", examples=[*BUILT_IN])
-    """{examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, in place of the
+    offered: ClassVar[Mapping[str, Collection[str]]] = {"controller": BUILT_IN}
+
+    controller: str | None = number(None, "1", "assumed: the one recorded")
+    """{offered}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, in place of the
     recorded."""
 
     readings: str = number(OWN, "1", "assumed: what was recorded", examples=[*KINDS])
@@ -306,7 +309,7 @@ def _when(header: Header) -> tuple[object, ...]:
 def recorded_controller(header: Header, name: str | None = None) -> Controller:
     """The controller of a log as it began, or one of another name with the same numbers."""
     wanted = header.controller if name is None else name
-    if name is None and wanted not in {*BUILT_IN, *PRIVILEGED}:
+    if name is None and wanted not in OURS:
         more = "closed, for example" if wanted == TWIN else "with its name if it may run"
         found = shortened(repr(wanted))
         raise LogError(

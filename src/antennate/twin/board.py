@@ -28,8 +28,7 @@ from antennate.errors import BadInputError
 from antennate.hardware.esp32 import datagram, frame
 from antennate.hardware.esp32.frame import FULL_SCALE
 from antennate.robots.antenna import AntennaSpec
-from antennate.robots.imu import AXES, ImuParams
-from antennate.sim.imu import noise_of
+from antennate.robots.imu import AXES, ImuParams, noise_of
 from antennate.types import Floats
 
 SIDES = ("left", "right")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import secrets
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
+from typing import ClassVar
 
 from pydantic import field_validator, model_validator
 
-from antennate.control.registry import BUILT_IN, CONTROLLERS, PRIVILEGED
+from antennate.control.registry import CONTROLLERS, KINDS
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import decoded, read_limited
 from antennate.params.base import LARGEST_SEED, Params, number, read_file, require_different
@@ -42,12 +43,13 @@ readings that are 15 ms late, which at 100 Hz are used two ticks later."""
 class CompeteConfig(Params):
     """Everything that decides the outcome of `antennate compete`."""
 
+    offered: ClassVar[Mapping[str, Collection[str]]] = {"controllers": KINDS, "scenes": SHIPPED}
+
     controllers: tuple[str, ...] = number(
         CONTROLLERS_OF_BOARD,
         "1",
         "assumed: rules by touch, blind ones, and one with a map",
         min_length=1,
-        examples=[*BUILT_IN, *PRIVILEGED],
     )
     """Controllers: names of `tunnel --controllers`, those of installed packages, MODULE:NAME,
     FILE.py:NAME, or FILE.onnx."""
@@ -56,7 +58,6 @@ class CompeteConfig(Params):
         "1",
         "assumed: those that our controllers do not all cross (docs/science/corridors.md)",
         min_length=1,
-        examples=[*SHIPPED],
     )
     """Scenes: names of `tunnel --scene`, each with other parameters behind a +, as
     uturn+variation.reading_noise=3."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from antennate.colours import called
 from antennate.experiments.gait.config import GaitStudyConfig, drawn
 from antennate.experiments.gait.optimise import optimise
 from antennate.experiments.gait.physics import Walk, walk_flat
@@ -24,6 +23,7 @@ from antennate.experiments.gait.result import (
     Optimised,
     summarise,
 )
+from antennate.figures import called
 from antennate.params.control import GaitParams
 from antennate.sim.world import World
 from antennate.studies.experiment import Done, Experiment, checked

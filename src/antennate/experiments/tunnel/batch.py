@@ -77,13 +77,13 @@ def _run(begin: Callable[[int], Lockstep], trials: Sequence[int], batch: int) ->
     try:
         rows.run(trials)
     except Restart:
-        rows.logs.drop()
+        rows.give_up()
         raise
     except ControllerError as error:
         if len(trials) == 1:
             rows.fail(0, f"controller: {error}")
             return
-        rows.logs.drop()
+        rows.give_up()
         for trial in rows.unfinished:
             _run(begin, [trial], 1)
 

@@ -14,7 +14,6 @@ from antennate.control.loop import CheckedController, run_loop, void_decisions
 from antennate.control.readings import YOKED, Given, Readings, Yoked, make_readings, parts_of
 from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
-from antennate.experiments.tunnel.logs import Logs
 from antennate.experiments.tunnel.physics import TrialMonitor, TrialResult, TunnelConfig
 from antennate.sim.episode import Episode
 from antennate.sim.knowledge import Truths, require_route
@@ -26,6 +25,7 @@ from antennate.telemetry.header import Header
 from antennate.types import AntennaFrame, Controller, Floats, JointCommand, Maneuver
 
 if TYPE_CHECKING:
+    from antennate.experiments.tunnel.logs import Logs
     from antennate.sim.warp.robot import WarpRobot
 
 SHOWN_TRIALS = 5
@@ -104,6 +104,13 @@ def lost_row(config: TunnelConfig, condition: str, trial: int, reason: str) -> T
     )
 
 
+def _logs(folder: Path, batch: int) -> Logs:
+    """Logs in a folder."""
+    from antennate.experiments.tunnel.logs import Logs  # imports the writer of logs
+
+    return Logs(folder, batch)
+
+
 class Lockstep:
     """The trials that run at once; a row takes the next trial when its own has ended.
 
@@ -117,7 +124,7 @@ class Lockstep:
         donors: Counts that yoked trials are given.
 
     Attributes:
-        logs: Logs of the trials that run.
+        logs: Logs of the trials that run, None without a folder.
     """
 
     _control: CheckedController
@@ -136,7 +143,7 @@ class Lockstep:
         self._config, self._condition, self._emit, self._batch = config, condition, emit, batch
         self._controller, self._given = parts_of(condition)
         self._apparatus, self._donors = apparatus, donors
-        self.logs = Logs(logs, batch)
+        self.logs = None if logs is None else _logs(logs, batch)
         self._scene, self._robot = (apparatus.bodies or cpu_bodies(config))(batch)
         self._monitors: dict[int, Monitor] = {}
         self._waiting: list[int] = []
@@ -150,6 +157,15 @@ class Lockstep:
         """Trials that were not emitted, in order."""
         running = [monitor.episode.number for monitor in self._monitors.values()]
         return sorted(running + self._waiting)
+
+    def give_up(self) -> None:
+        """Remove the logs of the trials that have not ended.
+
+        Raises:
+            LogError: A log cannot be written.
+        """
+        if self.logs is not None:
+            self.logs.drop()
 
     def run(self, trials: Sequence[int]) -> None:
         """Run trials of these numbers."""
@@ -168,7 +184,8 @@ class Lockstep:
 
         def go_on(frame: AntennaFrame, command: JointCommand) -> bool:
             frame = given.frame or frame
-            self.logs.take(frame, command)
+            if self.logs is not None:
+                self.logs.take(frame, command)
             self._show(frame, made)
             for row in self._tick():
                 self._reset(row, self._place(row))
@@ -240,7 +257,7 @@ class Lockstep:
         self._readings.reset(np.array([row]))
         if self._truths is not None:
             self._truths.begin(row, episode.scene)
-        if self.logs.folder is None:
+        if self.logs is None:
             return
         header = Header(
             controller=self._controller,
@@ -270,7 +287,8 @@ class Lockstep:
         world = self._robot.world(0)
         if isinstance(world, World):
             for text in watch(world, frame, controller):
-                self.logs.event(text)
+                if self.logs is not None:
+                    self.logs.event(text)
 
     def _tick(self) -> list[int]:
         """Let a control tick of all trials pass; the rows of those that have ended."""
@@ -289,7 +307,8 @@ class Lockstep:
 
     def _end(self, row: int) -> None:
         """Emit the trial of a row, and empty the row."""
-        self.logs.close(row)
+        if self.logs is not None:
+            self.logs.close(row)
         monitor, world = self._monitors.pop(row), self._robot.world(row)
         path = monitor.path(world) if monitor.episode.number < SHOWN_TRIALS else None
         result = monitor.result(world)

@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from antennate.control.loop import CheckedController
 from antennate.control.readings import condition
 from antennate.sim.world import World
 from antennate.telemetry.header import Header, log_name
+from antennate.telemetry.simulated import Decisions, SimulatedLog
 from antennate.types import AntennaFrame, JointCommand
-
-if TYPE_CHECKING:
-    from antennate.telemetry.simulated import Decisions, SimulatedLog
 
 
 class Logs:
-    """Logs of the trials that run at once, a file each; without a folder there are none.
+    """Logs of the trials that run at once, a file each.
 
     Args:
-        folder: Where they are written; None for no logs.
+        folder: Where they are written.
         batch: Trials at once.
-
-    Attributes:
-        folder: As given.
     """
 
-    def __init__(self, folder: Path | None, batch: int) -> None:
-        self.folder, self._batch = folder, batch
+    def __init__(self, folder: Path, batch: int) -> None:
+        self._folder, self._batch = folder, batch
         self._decisions: Decisions | None = None
         self._running: dict[int, SimulatedLog] = {}
 
@@ -40,14 +34,12 @@ class Logs:
             header: What the log begins with.
             control: Decides for all rows.
         """
-        if self.folder is None or not isinstance(world, World):
+        if not isinstance(world, World):
             return
-        from antennate.telemetry.simulated import Decisions, SimulatedLog  # not without logs
-
         if self._decisions is None:
             self._decisions = Decisions(header.robot, control, self._batch)
         name = condition(header.controller, header.readings)
-        path = self.folder / log_name(f"{name}-{header.trial}")
+        path = self._folder / log_name(f"{name}-{header.trial}")
         path.unlink(missing_ok=True)  # what a killed worker left of it
         self._running[row] = SimulatedLog(path, header, world, self._decisions, row)
 

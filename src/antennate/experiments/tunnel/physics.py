@@ -8,13 +8,14 @@ the episode ends, recovered, with the next such gain.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Union
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from antennate.control import registry
 from antennate.control.knowledge import KNOWABLE, Kind
 from antennate.control.readers import HARDWARE_ALONE
 from antennate.control.readings import (
@@ -26,10 +27,8 @@ from antennate.control.readings import (
     require_whole_delay,
 )
 from antennate.control.registry import (
-    BUILT_IN,
     CONTROLLERS,
     KEPT_BY_CLIMBERS,
-    PRIVILEGED,
     USUAL,
     unread_by_all,
     unread_limits,
@@ -48,7 +47,7 @@ from antennate.studies.pooling import largest, mean, smallest, total
 from antennate.types import Floats, Maneuver
 
 if TYPE_CHECKING:
-    from antennate.antenna.springs import SpringLoad
+    from antennate.antenna.load import SpringLoad
     from antennate.sim.warp.robot import WarpRow
 
 
@@ -58,6 +57,10 @@ class TunnelConfig(TrialConfig):
     unread: ClassVar[tuple[str, ...]] = tuple(
         path for path in HARDWARE_ALONE if path not in KEPT_BY_CLIMBERS
     )
+    offered: ClassVar[Mapping[str, Collection[str]]] = {
+        **TrialConfig.offered,
+        "controllers": registry.KINDS,
+    }
     trials: int = number(10, "1", "paper: 10 trials with feedback, 10 without", ge=1, le=100000)
     """Trials of every controller."""
     controllers: tuple[str, ...] = number(
@@ -65,9 +68,8 @@ class TunnelConfig(TrialConfig):
         "1",
         "assumed: without touch, with the published rule and with ours",
         min_length=1,
-        examples=[*BUILT_IN, *PRIVILEGED],
     )
-    """Controllers to run: {examples}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a
+    """Controllers to run: {offered}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a
     learned policy."""
     readings: tuple[str, ...] = number(
         (OWN,), "1", "assumed: what the robot reads", min_length=1, examples=[*KINDS]
@@ -301,7 +303,7 @@ class TrialMonitor:
 
     def _load(self, world: Watched) -> SpringLoad:
         """What the springs of the antennae bore; beyond a hinge's range its holders meet."""
-        from antennate.antenna.springs import SpringLoad, largest_load  # not for a bad flag
+        from antennate.antenna.load import SpringLoad, largest_load  # not for a bad flag
 
         hinges = len(world.bends())
         if not hinges:

@@ -123,3 +123,7 @@ class CorridorsScene:
             return ()
         depth = rng.uniform(*self._params.arm_depth)
         return (Arm(int(rng.choice(sharp)), params.free_width / 2 + depth),)
+
+
+SCENES = {"corridors": CorridorsScene}
+"""Scenes of this module by name."""

@@ -7,8 +7,9 @@ along x; the lowest is the floor at z = 0, so that a way down starts on a platfo
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -202,20 +203,6 @@ KINDS = {
     "ramp": _ramp,
     "rubble": _rubble,
 }
-"""Scenes of ground by name."""
-READS: Mapping[str, tuple[str, ...]] = {
-    "step_up": (
-        "start",
-        "height",
-    ),
-    "step_down": (
-        "start",
-        "height",
-    ),
-    "stairs": ("start", "height", "steps", "tread"),
-    "gap": ("start", "width", "depth"),
-    "ramp": ("start", "height", "slope"),
-    "rubble": ("start", "block", "density"),
-    "step_tunnel": ("height",),
-}
-"""Sizes that each of them reads."""
+"""What draws each kind of ground."""
+SCENES = {name: functools.partial(GroundScene, name) for name in KINDS}
+"""Scenes of this module by name."""

@@ -29,8 +29,8 @@ from antennate.messages import one_line
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.parts import FLOOR_BIT, OBSTACLE_BIT
+from antennate.sim.places import outline
 from antennate.sim.scenes.scene import Route, add_floor
-from antennate.sim.shapes import outline
 from antennate.types import Floats
 
 LARGEST_MODEL = 5_000_000

@@ -2,59 +2,30 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping
 from multiprocessing import parent_process
 from pathlib import Path
 
 from antennate.errors import FAILURES, ConfigError, SceneError, raised
-from antennate.lookup import Registry
-from antennate.params.scene import CorridorsParams, CylinderParams, GroundParams, TunnelParams
-from antennate.sim.scenes.corridors import CorridorsScene
-from antennate.sim.scenes.geometry import Arm, Room
-from antennate.sim.scenes.ground import KINDS, GroundScene
-from antennate.sim.scenes.mjcf import MjcfScene, require_compiles
-from antennate.sim.scenes.scene import TIME_LIMIT, FlatScene, Scene
-from antennate.sim.scenes.step_tunnel import StepTunnelScene
-from antennate.sim.scenes.tunnel import TunnelScene
-from antennate.sim.scenes.wall import WallScene
-
-_CORNER = TunnelParams(turns_deg=(120.0,))
-_U_TURN = TunnelParams(segments=(1.0, 0.8, 1.0), turns_deg=(90.0, 90.0))
-_ROOM = TunnelParams(segments=(1.0, 1.8), turns_deg=(90.0,), strewn=0)
-_DEAD_END = TunnelParams(segments=(0.7, 1.0), turns_deg=(90.0,), free_width=0.44, strewn=0)
-_HEAVY = TunnelParams(cylinder=CylinderParams(mass=0.5))
-
-HARD: Mapping[str, Callable[[], TunnelScene]] = {
-    "corner": functools.partial(TunnelScene, _CORNER),
-    "uturn": functools.partial(TunnelScene, _U_TURN),
-    "room": functools.partial(TunnelScene, _ROOM, rooms=(Room(1, 0.6, 1.6, 1.2, gap=0.5),)),
-    "deadend": functools.partial(TunnelScene, _DEAD_END, arms=(Arm(0, 1.1),)),
-    "heavy": functools.partial(TunnelScene, _HEAVY),
-    "noisy": functools.partial(TunnelScene, variation={"reading_noise": 3.0}),
-    "broken": functools.partial(TunnelScene, variation={"broken": "random"}),
-}
-"""A corner of 120 deg; two of 90 deg to the same side; a room behind a corner, 1 m long and 1.2 m
-wide, left by a gap of 0.5 m in the wall opposite; a way that goes on by a branch of 0.44 m at
-0.7 m, with a blind end at 1.8 m straight ahead; the tunnel with cylinders of 0.5 kg, with three
-times the noise of the readings, with one antenna broken off."""
-
+from antennate.lookup import Registry, Shipped
+from antennate.params.scene import (
+    GROUND_READS,
+    CorridorsParams,
+    GroundParams,
+    TunnelParams,
+)
+from antennate.sim.scenes.scene import TIME_LIMIT, Scene
 
 TUNNEL = "tunnel"
 CORRIDORS = "corridors"
-_SHIPPED: dict[str, Callable[[], Scene]] = {
-    TUNNEL: TunnelScene,
-    "flat": FlatScene,
-    CORRIDORS: CorridorsScene,
-    "wall": WallScene,
-    **HARD,
-    **{name: functools.partial(GroundScene, name) for name in KINDS},
-    "step_tunnel": StepTunnelScene,
-}
-SHIPPED = tuple(_SHIPPED)
-"""Scenes that need no file and no code of others."""
-SCENES: Registry[Callable[[], Scene]] = Registry("scene", "antennate.scenes", _SHIPPED)
+_MODULES = ("tunnel", "scene", "corridors", "wall", "ground", "step_tunnel")
+"""Modules of `antennate.sim.scenes` with a table `SCENES`, that of the tunnel first."""
+SHIPPED: Mapping[str, Callable[..., Scene]] = Shipped(
+    [f"antennate.sim.scenes.{name}" for name in _MODULES], lambda module: module.SCENES
+)
+"""Scenes that need no file and no code of others, by name."""
+SCENES: Registry[Callable[[], Scene]] = Registry("scene", "antennate.scenes", SHIPPED)
 
 
 def shared_limit(name: str) -> float:
@@ -83,15 +54,12 @@ def make_scene(
         corridors: Parameters of `corridors`, likewise.
         ground: Sizes of the scenes of ground that is not flat, likewise.
     """
-    if name == TUNNEL:
-        return TunnelScene(tunnel)
-    if name == CORRIDORS:
-        return CorridorsScene(corridors)
-    if name in KINDS:
-        return GroundScene(name, ground)
-    if name == "step_tunnel":
-        return StepTunnelScene(ground)
+    sizes = {TUNNEL: tunnel, CORRIDORS: corridors, **dict.fromkeys(GROUND_READS, ground)}
+    if name in sizes:
+        return SHIPPED[name](sizes[name])
     if _is_file(name):
+        from antennate.sim.scenes.mjcf import MjcfScene, require_compiles  # only where one is named
+
         if parent_process() is None:  # the process that started this worker has tried it
             require_compiles(Path(name))
         return MjcfScene(name)

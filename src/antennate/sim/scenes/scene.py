@@ -1,6 +1,6 @@
 """What a scene is: the protocols, a base for scenes with a route, and the simplest of them.
 
-A scene is a class with `random` and `draw`. One of ours has its name in `sim/scenes/registry.py`;
+A scene is a class with `random` and `draw`. One of ours has its name in the `SCENES` of its module;
 one of your own is given as FILE.py:CLASS (docs/scenes.md).
 """
 
@@ -167,3 +167,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         contype=FLOOR_BIT,
         conaffinity=0,
     )
+
+
+SCENES = {"flat": FlatScene}
+"""Scenes of this module by name."""

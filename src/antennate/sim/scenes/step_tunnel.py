@@ -96,3 +96,7 @@ class StepTunnelScene:
         off, radius = abs(cylinders[:, 0] - step), self._tunnel.cylinder.radius
         strewn = abs(cylinders[:, 1]) < self._tunnel.free_width / 2
         return (off < radius) | (strewn & (off < CLEAR))
+
+
+SCENES = {"step_tunnel": StepTunnelScene}
+"""Scenes of this module by name."""

@@ -8,8 +8,9 @@ there.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -271,3 +272,26 @@ def _add_cylinder(spec: mujoco.MjSpec, name: str, where: Floats, params: Cylinde
         contype=0,
         conaffinity=FLOOR_BIT,
     )
+
+
+_CORNER = TunnelParams(turns_deg=(120.0,))
+_U_TURN = TunnelParams(segments=(1.0, 0.8, 1.0), turns_deg=(90.0, 90.0))
+_ROOM = TunnelParams(segments=(1.0, 1.8), turns_deg=(90.0,), strewn=0)
+_DEAD_END = TunnelParams(segments=(0.7, 1.0), turns_deg=(90.0,), free_width=0.44, strewn=0)
+_HEAVY = TunnelParams(cylinder=CylinderParams(mass=0.5))
+
+HARD: Mapping[str, Callable[[], TunnelScene]] = {
+    "corner": functools.partial(TunnelScene, _CORNER),
+    "uturn": functools.partial(TunnelScene, _U_TURN),
+    "room": functools.partial(TunnelScene, _ROOM, rooms=(Room(1, 0.6, 1.6, 1.2, gap=0.5),)),
+    "deadend": functools.partial(TunnelScene, _DEAD_END, arms=(Arm(0, 1.1),)),
+    "heavy": functools.partial(TunnelScene, _HEAVY),
+    "noisy": functools.partial(TunnelScene, variation={"reading_noise": 3.0}),
+    "broken": functools.partial(TunnelScene, variation={"broken": "random"}),
+}
+"""A corner of 120 deg; two of 90 deg to the same side; a room behind a corner, 1 m long and 1.2 m
+wide, left by a gap of 0.5 m in the wall opposite; a way that goes on by a branch of 0.44 m at
+0.7 m, with a blind end at 1.8 m straight ahead; the tunnel with cylinders of 0.5 kg, with three
+times the noise of the readings, with one antenna broken off."""
+SCENES = {"tunnel": TunnelScene, **HARD}
+"""Scenes of this module by name."""

@@ -60,3 +60,7 @@ class WallScene:
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Wall:
         """Draw the side."""
         return Wall(self._length, robot.width, 1.0 if rng.random() < 0.5 else -1.0)
+
+
+SCENES = {"wall": WallScene}
+"""Scenes of this module by name."""

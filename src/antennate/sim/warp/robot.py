@@ -16,11 +16,12 @@ from antennate.errors import SceneError, SimulationError
 from antennate.robots.imu import AXES, measured
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
-from antennate.sim.imu import STATE, Imu
+from antennate.sim.imu import Imu
 from antennate.sim.places import Places, broken, sound
 from antennate.sim.scenes.scene import Scene, SceneInstance
 from antennate.sim.scenes.tunnel import Tunnel
 from antennate.sim.sim_robot import Disturbance, SimRobot
+from antennate.sim.states import HEAD
 from antennate.sim.warp.worlds import Limits, RobotWorlds
 from antennate.sim.world import World
 from antennate.types import AntennaFrame, Floats, JointCommand, joint_angles
@@ -182,7 +183,7 @@ class WarpRow:
 
 
 def _head(positions: Floats, speeds: Floats, places: Places) -> Floats:
-    """Attitude and velocity of heads as `imu.STATE` says, shape (..., 10)."""
+    """Attitude and velocity of heads as `states.HEAD` says, shape (..., 10)."""
     attitude = positions[..., places.root + 3 : places.root + 7]
     velocity = speeds[..., places.root_speed : places.root_speed + 6]
     return np.concatenate([attitude, velocity], axis=-1)
@@ -229,7 +230,7 @@ class WarpRobot:
         self._new, self._ended = set[int](), set[int]()
         self._imu_params = robot.imu
         self._imu = Imu(robot.imu, batch) if robot.has_imu else None
-        self._heads: Floats = np.zeros((batch, STATE))
+        self._heads: Floats = np.zeros((batch, HEAD))
         self._missing = np.ones(batch, dtype=bool)
         self._noise: Floats = np.zeros((batch, 2))
         self._ticks = 0

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from antennate.colours import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
+from antennate.figures import MANEUVER_COLOURS, MANEUVER_NAMES, SERIES
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes
 from antennate.telemetry.ticks import Tick

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from antennate.colours import SERIES, rgba
 from antennate.control.decision import Decision
+from antennate.figures import SERIES, rgba
 from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams
 from antennate.sim.shapes import VisibleModel

@@ -36,8 +36,8 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from antennate.colours import SERIES
 from antennate.errors import BadInputError
+from antennate.figures import SERIES
 from antennate.messages import extra
 
 HOSTS = ("localhost", "127.0.0.1", "[::1]")

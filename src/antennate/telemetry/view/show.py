@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from antennate.colours import SERIES, called, rgba
+from antennate.figures import SERIES, called, rgba
 from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick

@@ -10,8 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antennate.colours import SERIES, rgba
 from antennate.control.registry import make_controller
+from antennate.figures import SERIES, rgba
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
