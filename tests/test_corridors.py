@@ -19,7 +19,7 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.scene import CorridorsParams, VariationParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.judge import Judge, time_limit_of
+from antennate.sim.episode import Judge, time_limit_of
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.corridors import CorridorsScene
 from antennate.sim.scenes.geometry import Arm, Plan, Room

@@ -17,8 +17,7 @@ from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import GroundParams, PhysicsParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.episode import Episode
-from antennate.sim.judge import LOOK_EVERY, Judge
+from antennate.sim.episode import LOOK_EVERY, Episode, Judge
 from antennate.sim.places import HEIGHT_LIMIT
 from antennate.sim.scenes.ground import Edge, Ground, GroundScene
 from antennate.sim.scenes.registry import make_scene

@@ -12,7 +12,7 @@ import pytest
 from antennate.errors import SceneError
 from antennate.params.scene import TunnelParams
 from antennate.robots.spec import RobotSpec
-from antennate.sim.judge import Judge
+from antennate.sim.episode import Judge
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.mjcf import MjcfScene
 from antennate.sim.scenes.scene import Route, SceneInstance

@@ -10,8 +10,7 @@ import pytest
 
 from antennate.experiments.tunnel.physics import TrialMonitor
 from antennate.robots.spec import RobotSpec
-from antennate.sim.episode import Episode
-from antennate.sim.judge import LOOK_EVERY
+from antennate.sim.episode import LOOK_EVERY, Episode
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import Route
 

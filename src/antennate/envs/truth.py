@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from antennate.envs.reward import TERMS
-from antennate.sim.judge import Outcome
+from antennate.sim.episode import Outcome
 from antennate.types import Bools, Floats, Ints
 
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)

@@ -9,13 +9,50 @@ them, `envs/episodes.py` and `studies/simulate.py`; the robot of the twin walks 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from numbers import Real
+from typing import Any, Literal, Protocol
 
-from antennate.errors import SceneError
-from antennate.sim.judge import LOOK_EVERY, Judge, Walker, progress_of, time_limit_of
-from antennate.sim.scenes.scene import SceneInstance
+import numpy as np
+
+from antennate.errors import SceneError, raised
+from antennate.messages import shortened
+from antennate.sim.scenes.geometry import crossing
+from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.types import Floats
+
+Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
+"""How a trial ends. The judge says all but `invalid`, which is that of a trial without an end: the
+physics became invalid, the controller raised an exception, or the worker process died."""
+LOOK_EVERY = 10
+"""Ticks between two looks at a trial: 10 Hz at the usual rate."""
+FALL = 0.175
+"""How far below the ground at the start a link has to be to have fallen [m] (assumed: half the
+depth of a gap; robots walk down steps of 15 cm, docs/science/climb.md)."""
+
+
+class Walker(Protocol):
+    """A robot in its scene, on the CPU or in a batch on a device."""
+
+    @property
+    def t(self) -> float:
+        """Time since its start [s]."""
+        ...
+
+    @property
+    def head(self) -> Floats:
+        """Position of the tip of the head [m], first x and y."""
+        ...
+
+    @property
+    def overturned(self) -> bool:
+        """Whether the undersides of most links point up."""
+        ...
+
+    def link_places(self) -> Floats:
+        """Positions of the links, head first [m], shape (L, 3)."""
+        ...
 
 
 class Episode:
@@ -95,3 +132,136 @@ class Episode:
         """How far a head at this position, shape (2,), has come [m]; kept as `progress`."""
         self.progress = progress_of(self.scene, head)
         return self.progress
+
+
+class Judge:
+    """Judge of one episode: says how it ends, from one look at the robot to the next.
+
+    The head succeeds when it has crossed the exit between its ends more often outwards than
+    inwards. A scene with a rule of its own, `succeeded(head)`, is asked instead. In a scene
+    that has `ground` a robot on its back ends the episode, and so does a fall.
+
+    Args:
+        scene: The scene of the episode.
+        limit: Time after which it has failed [s].
+        on_its_back: Whether a robot on its back ends it on flat ground, too.
+
+    Attributes:
+        limit: As given.
+    """
+
+    def __init__(
+        self, scene: SceneInstance, limit: float = math.inf, on_its_back: bool = False
+    ) -> None:
+        self._scene, self.limit, self._on_its_back = scene, limit, on_its_back
+        self._head: Floats = np.array(scene.start[:2], float)
+        self._crossings = 0
+
+    def watch(self, world: Walker) -> Outcome | None:
+        """How the episode has ended with the robot as it is now; None if it goes on."""
+        seen = self.look(world.head[:2]) or self._mishap(world)
+        return in_time(seen, world.t, self.limit)
+
+    def look(self, head: Floats) -> Literal["success", "left"] | None:
+        """How the episode ended with the head at this position, shape (2,); None if it goes on."""
+        if self._succeeded(head):
+            return "success"
+        return "left" if _answer(self._scene, "left", head, "True or False", _is_bool) else None
+
+    def _succeeded(self, head: Floats) -> bool:
+        if hasattr(self._scene, "succeeded"):
+            return bool(_answer(self._scene, "succeeded", head, "True or False", _is_bool))
+        before, self._head = self._head, head.copy()
+        self._crossings += crossing(_exit_of(self._scene), before, head)
+        return self._crossings > 0
+
+    def _mishap(self, world: Walker) -> Literal["overturned", "fell"] | None:
+        """A robot on its back, or a fall."""
+        ground = getattr(self._scene, "ground", None)
+        if world.overturned and (self._on_its_back or ground is not None):
+            return "overturned"
+        fell = ground is not None and has_fallen(world.link_places(), float(ground))
+        return "fell" if fell else None
+
+
+def time_limit_of(scene: SceneInstance, wanted: float | None) -> float:
+    """Time after which a trial has failed [s]: the one that is wanted, or else the scene's own."""
+    if wanted is not None:
+        return wanted
+    limit = getattr(scene, "time_limit", TIME_LIMIT)
+    if not _is_finite(limit) or limit <= 0:
+        raise SceneError(
+            f"scene: expected time_limit to be a time above 0 s, found {shortened(repr(limit))}"
+        )
+    return float(limit)
+
+
+def in_time(outcome: Any, t: float, limit: float, late: Any = "timeout") -> Any:
+    """How a trial ends at time t [s], where a look at it says `outcome`; None if it goes on.
+
+    An outcome counts up to the limit [s], with t rounded to µs as tables have it. After the limit,
+    and from it on without an outcome, the trial ends as `late`.
+    """
+    if outcome is not None:
+        return outcome if round(t, 6) <= limit else late
+    return late if t >= limit else None
+
+
+def require_times(time: float, limit: float, close: float = 0.0) -> None:
+    """Check a time and a time limit of a table; the time may exceed the limit by `close` [s]."""
+    if not 0.0 < limit < math.inf:
+        raise ValueError(f"limit_s: expected a finite number above 0, found {limit}")
+    if not 0.0 <= time <= limit + close:
+        raise ValueError(
+            f"time_s: expected a finite number of 0 to limit_s, {limit:g}, found {time}"
+        )
+
+
+def has_fallen(links: Floats, ground: float) -> bool:
+    """Whether the centre of any link is lower than the ground at the start by more than FALL.
+
+    Args:
+        links: Places of the links [m], shape (L, 3).
+        ground: Height of that ground [m].
+    """
+    return bool(links[:, 2].min() < ground - FALL)
+
+
+def progress_of(scene: SceneInstance, head: Floats) -> float:
+    """What a scene says of how far a head at this position, shape (2,), has come [m]."""
+    return _answer(scene, "progress", head, "a finite number [m]", _is_finite)
+
+
+def _exit_of(scene: SceneInstance) -> Floats:
+    try:
+        line = np.asarray(scene.exit, float)
+    except Exception as error:
+        raise SceneError(f"scene: exit raised {raised(error)}") from error
+    if line.shape != (2, 2) or not np.isfinite(line).all():
+        raise SceneError(
+            "scene: expected exit to be two points, finite, shape (2, 2) [m], found "
+            f"{shortened(repr(line.tolist()))}"
+        )
+    return line
+
+
+def _answer(
+    scene: SceneInstance, name: str, head: Floats, wanted: str, fits: Callable[[Any], bool]
+) -> Any:
+    try:
+        answer = getattr(scene, name)(head.copy())
+    except Exception as error:
+        raise SceneError(f"scene: {name} raised {raised(error)}") from error
+    if not fits(answer):
+        raise SceneError(
+            f"scene: expected {name} to return {wanted}, found {shortened(repr(answer))}"
+        )
+    return answer
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_)

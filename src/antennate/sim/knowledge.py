@@ -16,7 +16,7 @@ from antennate.control.knowledge import EDGES, Kind, Knowledge
 from antennate.errors import SceneError, raised
 from antennate.messages import shortened
 from antennate.sim.engine import mujoco
-from antennate.sim.judge import LOOK_EVERY
+from antennate.sim.episode import LOOK_EVERY
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.world import World

@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar, cast
 
 from antennate.errors import ConfigError
+from antennate.params.base import Params
 from antennate.studies.columns import content, typed
 from antennate.studies.formats import strict
-from antennate.studies.plan import Planned
 from antennate.studies.pool import Workers
 from antennate.studies.report import View
 from antennate.studies.tables import Table
@@ -46,6 +46,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from antennate.telemetry.film import Film
+
+
+class Planned(Params):
+    """A configuration that a FILE of its own says, as that of a study or a search.
+
+    A run of it goes on with what its folder holds, and may run code that the file names.
+    """
 
 
 class Outcome(Protocol):

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Discriminator, model_validator
 
 from antennate.errors import ConfigError
-from antennate.params.base import Params, Strict
+from antennate.params.base import Strict
 from antennate.types import Floats, Ints
 
 Kind = Literal["grid", "list", "random", "sobol", "morris", "optuna"]
@@ -26,13 +26,6 @@ LEVELS = 4
 """Levels of each parameter in a Morris plan, as Morris proposes."""
 STEP = LEVELS / (2 * (LEVELS - 1))
 """How far one parameter moves in it, over its range: all levels are then equally likely."""
-
-
-class Planned(Params):
-    """A configuration that a FILE of its own says, as that of a study or a search.
-
-    A run of it goes on with what its folder holds, and may run code that the file names.
-    """
 
 
 class Range(Strict):

@@ -32,8 +32,8 @@ from antennate.studies.run_files import (
     REPORT,
     RESULT,
     TABLE,
+    when_run,
 )
-from antennate.studies.run_times import when_run
 from antennate.studies.tables import FEW, Table
 from antennate.studies.trial_file import TRIALS
 

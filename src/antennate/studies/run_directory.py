@@ -29,8 +29,7 @@ from antennate.errors import AntennateError, BadInputError, OutputError
 from antennate.files import writing, writing_whole
 from antennate.params.base import Config, Params, read_file
 from antennate.studies import formats, run_files
-from antennate.studies.run_files import FILES, LOGS, REPORT, RESULT, ROOM, TABLE, read_as
-from antennate.studies.run_times import date_line
+from antennate.studies.run_files import FILES, LOGS, REPORT, RESULT, ROOM, TABLE, date_line, read_as
 from antennate.studies.trial_file import TRIALS, Tasks, TrialFile, locked, read_trials
 from antennate.studies.work import processor
 from antennate.telemetry.header import versions

@@ -1,4 +1,4 @@
-"""Files of a run, by name, and the list of those that a run has written.
+"""Files of a run, by name, the list of those that a run has written, and the dates of the run.
 
 `files.txt` lists the files that a run writes, each before it is made. Without that list a folder
 holds no run of this program, and what it does not list is somebody else's: it is neither removed
@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
+import re
 from collections.abc import Callable, Iterable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +23,9 @@ from antennate.studies.trial_file import TRIALS, locked
 from antennate.telemetry.header import MOST_PARTS, part
 
 T = TypeVar("T")
+_DATE = "%Y-%m-%d %H:%M:%S UTC"
+_DATES = re.compile(r"^# (begun|resumed|ended) (.*)$", re.MULTILINE)
+"""When a run was begun, resumed and ended, as it stands below its command."""
 
 RESULT, TABLE = "result.json", "trials.csv"
 SHARD = "shard.json"
@@ -191,3 +196,32 @@ def inside(place: Path, name: str) -> Path:
     if path.is_absolute() or ".." in path.parts:
         raise ConfigError(f"name: expected one within the run, found {name}")
     return place / path
+
+
+def date_line(what: str) -> str:
+    """The line of a run that is `begun`, `resumed` or `ended` now."""
+    return f"# {what} {datetime.now(UTC).strftime(_DATE)}\n"
+
+
+def when_run(text: str) -> str:
+    """When, and for how long; empty if it does not tell."""
+    try:
+        dates = {what: datetime.strptime(when, _DATE) for what, when in _DATES.findall(text)}
+    except ValueError:
+        return ""
+    for what, words, it in (("begun", "Run on", "it"), ("resumed", "Resumed on", "the rest")):
+        if what in dates:
+            took = dates["ended"] - dates[what] if "ended" in dates else None
+            day = f"{words} {dates[what]:%Y-%m-%d at %H:%M} UTC"
+            return f"{day}." if took is None else f"{day}; {it} took {span(took.total_seconds())}."
+    return ""
+
+
+def span(seconds: float) -> str:
+    """A time [s] in words, in the unit that suits it."""
+    minutes, hours = seconds / 60, seconds / 3600
+    if seconds < 1:
+        return "less than 1 s"
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{minutes:.0f} min" if minutes < 100 else f"{hours:.1f} h"

@@ -18,7 +18,7 @@ import numpy as np
 
 from antennate.robots.imu import AXES
 from antennate.robots.spec import RobotSpec
-from antennate.sim.judge import LOOK_EVERY
+from antennate.sim.episode import LOOK_EVERY
 from antennate.sim.places import Contacts
 from antennate.sim.world import World
 from antennate.telemetry.header import Header

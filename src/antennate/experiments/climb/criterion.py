@@ -8,8 +8,7 @@ from antennate.control.climbing.rule import Ground as Felt
 from antennate.experiments.climb.config import CLIFF, LEVEL, Cell
 from antennate.experiments.climb.grounds import FLAT
 from antennate.experiments.climb.sensing import Verdict
-from antennate.sim.episode import Episode
-from antennate.sim.judge import has_fallen, in_time
+from antennate.sim.episode import Episode, has_fallen, in_time
 from antennate.sim.world import World
 from antennate.types import Floats
 

@@ -20,7 +20,7 @@ from antennate.files import read_limited
 from antennate.messages import nearest, shown
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
-from antennate.sim.judge import require_times
+from antennate.sim.episode import require_times
 
 CLOSE = 5e-7
 """Times [s] and ways [m] that differ by less are the same: tables have six decimals."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from antennate.experiments.compete.checking import CLOSE
 from antennate.experiments.compete.episodes import EpisodeRow, restricted
-from antennate.sim.judge import Outcome
+from antennate.sim.episode import Outcome
 from antennate.studies.columns import tabular
 from antennate.studies.statistics import sign_flips, signed_rank
 from antennate.types import Floats, Ints

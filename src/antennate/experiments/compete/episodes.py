@@ -24,7 +24,7 @@ from antennate.experiments.compete.scenes import tunnel_config
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TrialResult
-from antennate.sim.judge import Outcome, time_limit_of
+from antennate.sim.episode import Outcome, time_limit_of
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import draw_scene, scene_of
 from antennate.studies.columns import tabular

@@ -26,13 +26,13 @@ from antennate.experiments.compete.scenes import require_different_scenes, tunne
 from antennate.experiments.compete.standings import standing
 from antennate.experiments.tunnel.batch import BATCH
 from antennate.experiments.tunnel.physics import TunnelConfig
-from antennate.sim.judge import time_limit_of
+from antennate.sim.episode import time_limit_of
 from antennate.sim.knowledge import require_route
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.studies.experiment import Done, Experiment
 from antennate.studies.pool import Workers, core_count, gather, places_of, workers_from
 from antennate.studies.processes import Processes
-from antennate.studies.run_times import span
+from antennate.studies.run_files import span
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.studies.work import Failure, Together
 from antennate.types import AntennaFrame, Controller

@@ -17,7 +17,7 @@ from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import shown
 from antennate.params.base import from_values
-from antennate.sim.judge import time_limit_of
+from antennate.sim.episode import time_limit_of
 from antennate.sim.trial import draw_scene, scene_of
 
 _NEXT = re.compile(r"\+(?=[a-z0-9_.]+=)")

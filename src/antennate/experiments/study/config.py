@@ -12,11 +12,11 @@ from pydantic.fields import FieldInfo
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shortened, without_group
 from antennate.params.base import Params, number
+from antennate.studies.experiment import Planned
 from antennate.studies.plan import (
     RANGE_OR_CHOICES,
     Axes,
     Kind,
-    Planned,
     Point,
     Range,
     make_points,

@@ -152,3 +152,15 @@ def _donors(config: TunnelConfig, controller: str, trials: Sequence[int], batch:
     apparatus = Apparatus(make, monitor=lambda row, episode: _Donor(row, episode, tapes))
     run_trials(config, controller, [*following.values()], take, batch, apparatus=apparatus)
     return {trial: read[donor] for trial, donor in following.items() if donor in read}
+
+
+def on_cpu(
+    config: TunnelConfig,
+    condition: str,
+    trials: Sequence[int],
+    emit: Emit,
+    logs: Path | None = None,
+    view: SimulationView | None = None,
+) -> None:
+    """Run trials of one condition; see `run_trials`. A page may show them."""
+    run_trials(config, condition, trials, emit, logs=logs, apparatus=watched(view))

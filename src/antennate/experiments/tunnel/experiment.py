@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antennate.control.knowledge import Kind, given_to
 from antennate.control.readings import YOKED, parts_of, short_names
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
-from antennate.experiments.tunnel.batch import BATCH, run_trials
-from antennate.experiments.tunnel.batches import on_cpu, on_warp
-from antennate.experiments.tunnel.lockstep import Apparatus, lost_row
+from antennate.experiments.tunnel.batch import BATCH, on_cpu, run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus, Emit, lost_row
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.experiments.tunnel.result import TunnelResult, summarise
 from antennate.experiments.tunnel.tables import sentence, tables
-from antennate.sim.knowledge import require_route
 from antennate.sim.scenes.registry import TUNNEL
 from antennate.sim.trial import check_start, draw_scene, scene_of
 from antennate.sim.world import World
@@ -40,6 +39,8 @@ def check(config: TunnelConfig) -> None:
             raise ConfigError(f"--controllers: {error}") from error
         given |= dict.fromkeys(given_to(made, name, config.knows))
     if given:
+        from antennate.sim.knowledge import require_route  # not of robots that know nothing
+
         require_route(config.scene, draw_scene(config, scene_of(config), 0), list(given))
 
 
@@ -116,6 +117,24 @@ CAPTIONS = {
     "summary": "Success of each controller with its Wilson 95 % interval, time in the scene, and "
     "restricted mean time, with a 95 % interval from five trials on.",
 }
+
+
+def on_warp(
+    config: TunnelConfig,
+    condition: str,
+    trials: Sequence[int],
+    emit: Emit,
+    device: str | None,
+    logs: Path | None,
+) -> None:
+    """Run trials of one condition in batches on a GPU."""
+    if logs is not None:
+        raise ConfigError("--log: expected another engine, found warp, which keeps no logs")
+    if YOKED in config.readings:
+        raise ConfigError(f"--readings {YOKED}: expected another engine, found warp")
+    from antennate.experiments.tunnel.warp import run_trials_on_warp  # needs a GPU
+
+    run_trials_on_warp(config, condition, trials, emit, device=device)
 
 
 def _result_of(found: Found[TunnelConfig, TunnelResult, object]) -> TunnelResult:

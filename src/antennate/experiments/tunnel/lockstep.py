@@ -16,7 +16,6 @@ from antennate.control.registry import ControllerMaker, make_controller
 from antennate.errors import ConfigError, ControllerError, SceneError
 from antennate.experiments.tunnel.physics import TrialMonitor, TrialResult, TunnelConfig
 from antennate.sim.episode import Episode
-from antennate.sim.knowledge import Truths, require_route
 from antennate.sim.scenes.scene import TIME_LIMIT, Scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import draw_trial, require_room, scene_of
@@ -26,6 +25,7 @@ from antennate.types import AntennaFrame, Controller, Floats, JointCommand, Mane
 
 if TYPE_CHECKING:
     from antennate.experiments.tunnel.logs import Logs
+    from antennate.sim.knowledge import Truths
     from antennate.sim.warp.robot import WarpRobot
 
 SHOWN_TRIALS = 5
@@ -208,6 +208,8 @@ class Lockstep:
         except ConfigError as error:
             raise ControllerError(str(error)) from error
         if self._known:
+            from antennate.sim.knowledge import Truths  # not of robots that know nothing
+
             cycle = 1.0 / (config.control.gait.frequency * config.control.period)
             self._truths = Truths(self._known, self._batch, cycle)
         return made
@@ -230,7 +232,10 @@ class Lockstep:
             raise SceneError(f"{YOKED}: expected readings of trial {other}, found none")
         gait, period = config.control.gait, config.control.period
         start = draw_trial(config, self._scene, trial, gait, period)
-        require_route(config.scene, start.scene, self._known)
+        if self._known:
+            from antennate.sim.knowledge import require_route  # as above
+
+            require_route(config.scene, start.scene, self._known)
         episode = start.episode(config.time_limit)
         self._robot.load(row, start.world, start.chance)
         self._monitors[row] = (self._apparatus.monitor or self._usual)(row, episode)

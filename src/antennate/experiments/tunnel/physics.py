@@ -36,8 +36,7 @@ from antennate.control.registry import (
 from antennate.errors import SceneError
 from antennate.params.base import number, require_different, require_whole_steps
 from antennate.params.control import ControlParams
-from antennate.sim.episode import Episode
-from antennate.sim.judge import Outcome, require_times
+from antennate.sim.episode import Episode, Outcome, require_times
 from antennate.sim.scenes import geometry
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.sim.trial import TrialConfig, require_own_curves
