@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.control.climbing.rule import Ground, Stage
 from antennate.experiments.climb.config import (
     Cell,

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.control.climbing.body import line, pitch_angles
 from antennate.control.climbing.rule import Ground, Stage
 from antennate.control.knowledge import Knowledge

@@ -19,7 +19,8 @@ import pytest
 from scipy.stats import binomtest
 
 import antennate
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.compete import apart, experiment
 from antennate.experiments.compete.checking import read_rows

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.errors import SimulationError
 from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig

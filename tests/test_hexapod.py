@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from antennate.cli import OK, main
+from antennate.cli import main
+from antennate.cli.terminal import OK
 from antennate.control.gait import targets
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import ConfigError

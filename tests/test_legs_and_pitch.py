@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from driven_rig import driven, simulated_alike
 
-from antennate.cli import BAD_INPUT, OK, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.gait import Gait
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
 from antennate.experiments.gait.experiment import GaitStudyConfig, walk_flat

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.hardware.ports.errors import explain, holders
 from antennate.hardware.ports.serial_line import SerialPort
 from antennate.messages import command_words

@@ -13,8 +13,9 @@ import pytest
 from doctor_rig import Patient, wrong
 from test_bad_calibrations import GOOD
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
 from antennate.cli.robot import RobotOptions, parse_robot
+from antennate.cli.terminal import BAD_INPUT
 from antennate.hardware.config import DoctorConfig, DriveConfig, RecordConfig, RobotFile
 from antennate.hardware.doctor.checkup import examine
 from antennate.messages import command_words

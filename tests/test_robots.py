@@ -11,7 +11,8 @@ import pytest
 from driven_rig import driven, simulated_alike
 from twin_rig import on_twin, simulated
 
-from antennate.cli import BAD_INPUT, main
+from antennate.cli import main
+from antennate.cli.terminal import BAD_INPUT
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import RobotFile
 from antennate.hardware.joints import Joints
