@@ -1,6 +1,7 @@
 """What flows between a robot and its controller, and the protocols of both.
 
-A robot is simulated (`sim/sim_robot.py`), real (`hardware/driving/`) or replayed from a log
+A robot is simulated (`sim/sim_robot.py`), real (`Session` of
+`hardware/safety/session.py`) or replayed from a log
 (`telemetry/replay.py`); a controller is not told which. Arrays carry a leading batch axis of B
 robots; B is 1 for a single one. "The paper" is arXiv 2603.07795.
 """
@@ -158,8 +159,10 @@ class Robot(Protocol):
 class Controller(Protocol):
     """Control of B robots at once: row i of every array belongs to robot i.
 
-    The rows never influence one another. A row with NaN in `counts`, of either antenna, answers
-    HOLD and keeps its joint targets; NaN elsewhere is no reason to. See docs/controllers.md.
+    The rows never influence one another. A controller answers HOLD in a row where a count of
+    either antenna is NaN, and keeps its joint targets; ours also where one is at an end of the
+    converter's range (`control/conditioning.py`). NaN elsewhere is no reason to. See
+    docs/controllers.md.
     """
 
     @property

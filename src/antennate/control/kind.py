@@ -41,14 +41,15 @@ _SHARED = tuple(
 class ControllerKind:
     """Controller with a name. The module of a controller lists its kinds as a tuple `KINDS`.
 
-    One in a file of your own is taken, too. Its `reads` and `needs` are not used: it may read all
-    parameters, and what it needs is asked of its controller (docs/controllers.md).
+    One in a file of your own is taken, too. Its `reads`, `needs` and `climbs` are not used: it may
+    read all parameters, and what it needs is asked of its controller (docs/controllers.md).
 
     Attributes:
         name: Name, as commands take it.
         about: Sentence on what it does, for somebody who meets it for the first time.
         make: Makes it of (control, robot, batch).
-        reads: Parameters of the control that it reads; others are refused. All read the rate, the
+        reads: Parameters of the control that it reads; one that no controller of a run reads is
+            refused. All read the rate, the
             conditioning, the rule's threshold and hysteresis, and the gait but for `turn_offset`;
             those that climb read no sweep of the antenna bases either.
         colour: Colour in figures, #RRGGBB; where it is empty, one that no other controller has.

@@ -2,9 +2,10 @@
 
 It follows from a seed and a number, and a controller moves the robot. In `tunnel`, `climb` and
 `compete` it is a trial, a row of the table; other experiments have trials of another kind, as a
-push or a passage. `Trial.episode` makes it. Who lets time pass tells it of every control tick, and
-stops when it has ended: `experiments/tunnel/lockstep.py` for many trials at once, climbs among
-them, `envs/episodes.py` and `studies/simulate.py`; the robot of the twin walks on.
+push or a passage. `Trial.episode` of `sim/trial.py` makes it; the twin makes its own, without a
+time limit. Who lets time pass tells it of every control tick, and stops when it has ended:
+`experiments/tunnel/lockstep.py` for many trials at once, climbs among them, `envs/episodes.py` and
+`studies/simulate.py`; the robot of the twin walks on.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from antennate.sim.scenes.scene import TIME_LIMIT, SceneInstance
 from antennate.types import Floats
 
 Outcome = Literal["success", "timeout", "left", "overturned", "fell", "invalid"]
-"""How a trial ends. The judge says all but `invalid`, which is that of a trial without an end: the
-physics became invalid, the controller raised an exception, or the worker process died."""
+"""How a trial ends. The judge says all but `invalid`: the physics, the controller or the scene
+failed, or the worker process died. An environment says `timeout` also after its most steps."""
 LOOK_EVERY = 10
 """Ticks between two looks at a trial: 10 Hz at the usual rate."""
 FALL = 0.175
@@ -59,8 +60,9 @@ class Episode:
     """One robot in one drawn scene, until it has ended.
 
     The robot is looked at in every LOOK_EVERY-th tick, and from the time limit on in each. A scene
-    with `ground` ends it for a robot on its back. Elsewhere trials of tables let such a robot lie
-    until the time limit, and environments end its episode: `on_its_back`.
+    with `ground` ends it for a robot on its back. In other scenes `tunnel`, `compete` and
+    `simulate` let such a robot lie until the time limit; environments end its episode by
+    `on_its_back`, and `climb` by a criterion of its own.
 
     Args:
         scene: The scene as it was drawn.
@@ -75,7 +77,8 @@ class Episode:
         judge: Says how it ends.
         ticks: Control ticks so far.
         progress: How far the head had come when that was last asked [m].
-        outcome: How it ended, an `Outcome` unless another judge was asked; None while it goes on.
+        outcome: How it ended, an `Outcome`, or what `look` of `tick` returned, as in
+            `climb`; None while it goes on.
         reason: Why it is invalid, empty unless it is.
         error: What the scene did not answer; None if it did.
     """
@@ -144,7 +147,7 @@ class Judge:
     Args:
         scene: The scene of the episode.
         limit: Time after which it has failed [s].
-        on_its_back: Whether a robot on its back ends it on flat ground, too.
+        on_its_back: Whether a robot on its back ends it in scenes without `ground`, too.
 
     Attributes:
         limit: As given.

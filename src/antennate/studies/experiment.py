@@ -1,14 +1,16 @@
 """What an experiment is: a configuration, a function that runs it, and how to tell what came out.
 
-An experiment is one object. `antennate NAME` parses its configuration and runs it. A run leaves a
-folder (`studies/run_directory.py`): the configuration, a row for each trial, the result, figures
-and a report. Then its tables and its closing sentence are printed.
+An experiment is one object. `antennate NAME` parses its configuration and runs it. A run of the
+command leaves a folder (`studies/run_directory.py`), one from Python only if it is given one: the
+configuration, a row for each trial, the result, figures and a report. Then its tables and its
+closing sentence are printed.
 
 A *trial* has a condition, such as a controller or a profile, and a number; its row is an object of
 a class whose fields are the columns of trials.csv. The result is an object, too: result.json and
 the printed tables have its fields. So a column is a field of one of these classes, or of the class
-that both inherit (`studies/columns.py`). A trial whose worker process dies is run again twice, then
-its row is that of an invalid trial (`studies/trials.py`, `studies/work.py`).
+that both inherit (`studies/columns.py`). A trial whose worker process dies is run again, up to
+twice. Then `invalid` of its `Trials` gives its row; without that the run ends with an error
+(`studies/trials.py`, `studies/work.py`).
 
 Ours are folders of `experiments/` with an object EXPERIMENT in their module `experiment`; one of
 your own is named by an entry point (docs/experiments.md).
@@ -49,7 +51,7 @@ if TYPE_CHECKING:
 
 
 class Planned(Params):
-    """A configuration that a FILE of its own says, as that of a study or a search.
+    """Configuration that is written in a file, as that of a study.
 
     A run of it goes on with what its folder holds, and may run code that the file names.
     """
