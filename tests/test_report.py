@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -66,6 +67,22 @@ class Rows(HTMLParser):
 pytestmark = pytest.mark.usefixtures("there")
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run of `antenna` with `--coil-mm 4`, which nobody changes."""
+    folder = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as at:
+        at.chdir(folder)
+        assert main(["antenna", "--coil-mm", "4", "--out", "run"]) == 0
+    return folder / "run"
+
+
+@pytest.fixture
+def run(finished: Path, there: Path) -> Path:
+    """A copy of it as `run`, in the empty folder where a test runs."""
+    return Path(shutil.copytree(finished, "run"))
+
+
 def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one line with which `report` refuses."""
     capsys.readouterr()
@@ -76,9 +93,10 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     return err
 
 
-def test_a_run_leaves_a_page_with_everything(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "--coil-mm", "4", "--out", "run"]) == 0
-    sentence = capsys.readouterr().out.splitlines()[0]
+@pytest.mark.usefixtures("run")
+def test_a_run_leaves_a_page_with_everything() -> None:
+    data = json.loads(Path("run/result.json").read_text())
+    sentence = experiments.load("antenna").view.sentence(data)
     page = Page(Path("run/report.html"))
     assert page.alone
     assert sentence in page.text
@@ -128,8 +146,8 @@ def test_every_figure_has_a_sentence() -> None:
     assert view.caption("speed_over_time") == "Speed over time"
 
 
+@pytest.mark.usefixtures("run")
 def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "--out", "run"]) == 0
     first = Path("run/report.html").read_bytes()
     Path("run/report.html").unlink()
     assert main(["report", "run"]) == 0
@@ -140,8 +158,8 @@ def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -
     assert main(["report", "run", "--out", "page.html", "--overwrite"]) == 0
 
 
+@pytest.mark.usefixtures("run")
 def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "--out", "run"]) == 0
     before = Path("run/result.json").read_bytes()
     for words in (["run"], ["--compare", "run", "run"]):
         said = refusal(capsys, *words, "--out", "run/result.json", "--overwrite")
@@ -149,8 +167,8 @@ def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixt
     assert Path("run/result.json").read_bytes() == before
 
 
+@pytest.mark.usefixtures("run")
 def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["antenna", "--out", "run"]) == 0
     os.mkfifo("pipe")
     Path("null").symlink_to("/dev/null")
     for name in ("pipe", "null"):
@@ -163,8 +181,8 @@ def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]
     assert "expected a file or a new name" in refusal(capsys, "run")
 
 
+@pytest.mark.usefixtures("run")
 def test_a_link_is_written_through() -> None:
-    assert main(["antenna", "--out", "run"]) == 0
     Path("page.html").write_text("old")
     Path("link.html").symlink_to("page.html")
     assert main(["report", "run", "--out", "link.html", "--overwrite"]) == 0
@@ -211,9 +229,9 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
     assert "Over half of the trials jam" in page.text
 
 
-def test_two_runs_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
-    for coil in ("3.6", "4"):
-        assert main(["antenna", "--coil-mm", coil, "--out", f"coil-{coil}"]) == 0
+def test_two_runs_stand_side_by_side(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run.rename("coil-4")
+    assert main(["antenna", "--coil-mm", "3.6", "--out", "coil-3.6"]) == 0
     assert main(["report", "--compare", "coil-3.6", "coil-4"]) == 0
     page = Page(Path("comparison.html"))
     assert page.alone
