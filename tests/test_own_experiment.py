@@ -273,3 +273,16 @@ def test_a_disk_that_is_full_at_the_end_keeps_and_shows_what_was_measured(
     assert "eyes, mean" in out
     assert "No space left on device" in err
     assert [row["trial"] for row in RunDirectory.open("run").rows()] == [0, 1]
+
+
+def test_a_file_that_a_trial_misses_is_told_with_the_line_that_asked(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program = dice / "site" / "dice_study.py"
+    text = program.read_text().replace("    rng = ", '    open("missing.csv")\n    rng = ', 1)
+    program.write_text(text)
+    place = text.splitlines().index('    open("missing.csv")') + 1
+    assert main(["dice", "--trials", "1", *ONE, "--out", "run"]) == 2
+    (line,) = [each for each in capsys.readouterr().err.splitlines() if "error:" in each]
+    assert "missing.csv" in line
+    assert f"dice_study.py:{place}" in line

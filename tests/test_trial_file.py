@@ -15,6 +15,7 @@ from antennate.cli import main
 from antennate.errors import BadInputError, OutputError
 from antennate.studies.pool import Workers, gather
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.trial_file import line
 
 WALL = ["bench", "wall", "--trials", "2", "--profiles", "stiff", "--wall.travel", "0.03"]
 SWEEP = ["bench", "sweep", "--profiles", "stiff", "descending", "--distances", "0.4"]
@@ -185,3 +186,9 @@ def test_a_row_that_is_none_is_refused_and_one_after_the_end() -> None:
         with pytest.raises(OutputError, match="found a finished one"):
             run.append({"trial": 1})
     assert not Path("dice/trials.jsonl").exists()
+
+
+def test_rows_as_the_version_before_kept_them_are_read(tmp_path: Path) -> None:
+    lines = [line({"row": i, "values": {"a": i}}) for i in (1, 2)]
+    (tmp_path / "trials.jsonl").write_bytes(b"".join(lines))
+    assert RunDirectory.open(tmp_path).rows() == [{"a": 1}, {"a": 2}]

@@ -118,7 +118,7 @@ def reason(error: BaseException) -> str:
 
 def raised(error: BaseException) -> str:
     """What a user's code raised, and the file and line of it, in one line."""
-    return f"{in_one_line(error)}{_where(error)}"
+    return f"{in_one_line(error)}{where_of(error)}"
 
 
 _MODULES = (__file__, dynamixel_bus.errors.__file__, geometric_locomotion.errors.__file__)
@@ -126,17 +126,21 @@ _OURS = [Path(file).parent for file in _MODULES]
 _PYTHON = Path(traceback.__file__).parent
 
 
-def _where(error: BaseException) -> str:
+def where_of(error: BaseException, in_packages: bool = True) -> str:
     """` (FILE:LINE)` of the user's code that raised an error; empty if it was none of the user's.
 
     It is the last place outside this package, and outside installed packages if there is one.
+
+    Args:
+        error: What was raised.
+        in_packages: Whether a place in an installed package is told where there is no other.
     """
     places = [(Path(f.filename), f.lineno) for f in traceback.extract_tb(error.__traceback__)]
     files = [at for at in places if at[0].is_file()]
     outside = [at for at in files if not any(map(at[0].is_relative_to, _OURS))]
     installed = [at for at in outside if "site-packages" in at[0].parts]
     own = [at for at in outside if at not in installed and not at[0].is_relative_to(_PYTHON)]
-    own = own or installed
+    own = own or (installed if in_packages else [])
     if not own:
         return ""
     path, line = own[-1]

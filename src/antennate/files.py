@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from antennate.errors import AntennateError, BadInputError, ConfigError, OutputError
+from antennate.errors import FAILURES, BadInputError, ConfigError, OutputError
 
 _RANDOM = 8
 """Random bytes in the name of a file that is not whole yet."""
@@ -153,7 +153,7 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
                 os.link(fresh, place)  # unlike replace it fails if the file exists by now
         finally:
             fresh.unlink(missing_ok=True)
-    except AntennateError:
+    except FAILURES:
         raise
     except FileExistsError:
         raise OutputError(

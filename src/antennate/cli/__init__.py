@@ -175,7 +175,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         sys.stderr.write(f"{title}: error: expected a command, found none\n")
         return BAD_INPUT
     from antennate.cli.arguments import HelpRequest
-    from antennate.errors import FAILURES, reason
+    from antennate.errors import FAILURES, reason, where_of
     from antennate.messages import one_line, shortened
 
     try:
@@ -195,7 +195,8 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         return BAD_INPUT
     except OSError as error:
         where = f"{shortened(str(error.filename))}: " if error.filename is not None else ""
-        sys.stderr.write(f"{title}: error: {one_line(where + reason(error))}\n")
+        place = where_of(error, in_packages=False)
+        sys.stderr.write(f"{title}: error: {one_line(where + reason(error) + place)}\n")
         return BAD_INPUT
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from antennate.cli.options import PageOptions, ViewOptions
 from antennate.cli.terminal import write
-from antennate.errors import AntennateError
+from antennate.errors import FAILURES
 from antennate.host import STOPS, give_way
 from antennate.messages import one_line
 from antennate.studies.run_files import BY_HAND
@@ -84,7 +84,7 @@ def main() -> int:
             None if foxglove == _NONE else int(foxglove),
             IDLE in more,
         )
-    except AntennateError as error:
+    except FAILURES as error:
         channel.send(FAILED, one_line(str(error)).encode())
         return 1
     return 0

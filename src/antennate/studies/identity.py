@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import antennate
+import dynamixel_bus
+import geometric_locomotion
 from antennate.lookup import ADDED
 from antennate.messages import shortened
 from antennate.params.base import Params
@@ -75,14 +77,14 @@ def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 @functools.cache
 def code() -> dict[str, str]:
-    """Checksum of every file of this package, but those that only talk to people."""
-    root = Path(antennate.__file__ or "").parent
-    files = [path.relative_to(root) for path in sorted(root.rglob("*.py"))]
-    return {
-        f"antennate/{file.as_posix()}": _checksum(root / file)
-        for file in files
-        if file.parts[0] != "cli"
-    }
+    """Checksum of every file of our packages, but those that only talk to people."""
+    checksums = {}
+    for room in (antennate, dynamixel_bus, geometric_locomotion):
+        root = Path(room.__file__ or "").parent
+        for path in sorted(root.rglob("*.py")):
+            if (file := path.relative_to(root)).parts[0] not in ("cli", "command.py"):
+                checksums[f"{root.name}/{file.as_posix()}"] = _checksum(path)
+    return checksums
 
 
 def code_named(values: Any) -> dict[str, str]:

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from antennate import checks
-from antennate.errors import AntennateError, BadInputError, OutputError
+from antennate.errors import FAILURES, BadInputError, OutputError
 from antennate.files import writing, writing_whole
 from antennate.params.base import Config, Params, read_file
 from antennate.studies import formats, run_files
@@ -339,7 +339,7 @@ class RunDirectory:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         complete = kind is None and self._complete  # else what is missing can be written again
-        failed = kind is not None and issubclass(kind, AntennateError)
+        failed = kind is not None and issubclass(kind, (*FAILURES, OSError))
         stays = self.kept or self.can_go_on or (failed and bool(self.made(LOGS, ".mcap")))
         self._leave(stays, spent=complete and not self.keeps_trials)
 

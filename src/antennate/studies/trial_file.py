@@ -71,6 +71,8 @@ class Content:
                     self._turn_to(identity, content.get("keys"))
                 case {"key": key}:
                     self.records[key] = content
+                case {"row": number, "values": values}:  # as versions before kept it
+                    self.records[f"{_ROW}{number}"] = {"key": f"{_ROW}{number}", "rows": [values]}
                 case {"processor": model}:
                     self.processors.append(model)
                 case _:
