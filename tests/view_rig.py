@@ -99,9 +99,14 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
 
 
 def child_of(process: int) -> int:
-    """The one process that another one has started."""
-    [child] = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    return int(child)
+    """The process of the page that a program has started; a drive has one that keeps its log, too."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    [page] = [
+        child
+        for child in children
+        if b"antennate.cli.pages" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    return int(page)
 
 
 def told(view: Shown, what: str) -> None:
