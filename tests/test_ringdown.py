@@ -14,7 +14,7 @@ import pytest
 from antennate.antenna.dynamics import LinearChain, least_damping
 from antennate.cli import main
 from antennate.experiments.antenna.config import AntennaConfig
-from antennate.experiments.antenna.physics import ringdown_of
+from antennate.experiments.antenna.physics import Trace, ringdown_of
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.bench import compile_bench
@@ -66,6 +66,7 @@ def test_the_mass_matrix_is_that_of_the_engine(coils: tuple[float, ...]) -> None
         {},
         {"damping_time": 0.005},
         {"damping_time": 0.1},
+        {"active_coils": (3.0,)},
         {"active_coils": (3.0, 6.0, 6.0, 6.0, 9.0, 9.0, 9.0, 9.0, *(12.0,) * 6)},
         {"active_coils": (6.0, 9.0, 9.0), "length": 0.09},
     ],
@@ -128,6 +129,39 @@ def test_the_quick_antenna_stands_beside_the_default_one(
     drawn = (tmp_path / "out" / "figures" / "ringdown.svg").read_text()
     assert result["engine"]["natural_hz"] < 3.0
     assert all(name in drawn for name in ("this antenna", "quick antenna"))
+
+
+@pytest.mark.parametrize("places", [("a", "b"), ("a", "a")])
+def test_antennae_of_files_of_one_name_stand_beside_each_other(
+    places: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for place in places:
+        Path(place).mkdir(exist_ok=True)
+        Path(place, "robot.toml").write_text("[antenna]\nactive_coils = [3.0, 5.0]\n")
+    files = [f"{place}/robot.toml" for place in places]
+    assert main(["antenna", "--beside", *files, "--no-figures", "--out", "out"]) == 0
+    beside = json.loads(Path("out/result.json").read_text())["ringdown"]["beside"]
+    assert [*beside] == (files if places[0] != places[1] else ["robot"])
+
+
+def test_one_hinge_that_creeps_back_has_no_swing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One cycle is then that of the swing without damping."""
+    words = ["--antenna.active-coils", "3", "--no-figures", "--out", str(tmp_path / "out")]
+    assert main(["antenna", *words]) == 0, capsys.readouterr().err
+    found = json.loads((tmp_path / "out" / "result.json").read_text())["ringdown"]
+    engine = found["engine"]
+    assert (engine["swing_hz"], engine["damping"]) == (0.0, 1.0)
+    assert engine["cycle_s"] * engine["natural_hz"] == pytest.approx(1.0)
+    assert 0 < found["rejected_in_animal_cycle"] < found["rejected"] < 1
+
+
+def test_after_the_last_sample_what_it_has_lost_counts() -> None:
+    trace = Trace(np.array([0.0, 0.1, 0.2]), np.array([1.0, -0.5, 0.25]))
+    assert trace.rejected(0.1) == 0.5
+    assert trace.rejected(0.3) == 0.75
 
 
 def test_a_stiff_stop_holds_a_hinge_that_a_soft_one_lets_go_on() -> None:

@@ -33,10 +33,6 @@ def test_the_animal_falls_a_thousandfold_and_the_robot_threefold() -> None:
     assert result.ladder.base_over_tip == pytest.approx(3)
 
 
-def test_a_round_section_of_one_millimetre() -> None:
-    assert springs.second_moment(np.array([1e-3]))[0] == pytest.approx(4.909e-14, rel=1e-3)
-
-
 def test_springs_in_a_row_give_as_much_as_the_segments_they_stand_for() -> None:
     values = np.random.default_rng(0).uniform(0.1, 1.0, 14)
     for bins in (1, 2, 6, 7, 14):

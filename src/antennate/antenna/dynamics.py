@@ -126,7 +126,7 @@ def least_damping(left: float) -> float:
 
 
 def fitted_mode(mode: Mode, t: Floats, angles: Floats, speeds: Floats) -> Mode:
-    """A mode with the eigenvalue that a recorded ring-down has.
+    """A mode with the eigenvalue that a recorded ring-down has; one that creeps back has no swing.
 
     Args:
         mode: The mode of the chain.
@@ -138,7 +138,7 @@ def fitted_mode(mode: Mode, t: Floats, angles: Floats, speeds: Floats) -> Mode:
     weight = abs(size) / abs(size).max()
     grown = np.log(abs(size)) + 1j * np.unwrap(np.angle(size))
     decay, swing = (np.polyfit(t, part, 1, w=weight)[0] for part in (grown.real, grown.imag))
-    return Mode(complex(decay, swing), mode.left, mode.share)
+    return Mode(complex(decay, swing if mode.swing_hz else 0.0), mode.left, mode.share)
 
 
 def _rods(joints: Floats, starts: Floats, lengths: Floats, mass: Floats, inertia: Floats) -> Floats:

@@ -267,11 +267,6 @@ def diameters(params: TaperParams) -> Floats:
     return np.geomspace(*ends, count) if params.law == "geometric" else np.linspace(*ends, count)
 
 
-def second_moment(diameter: Floats) -> Floats:
-    """Second moment of area of round sections [m⁴], same shape as their diameters [m]."""
-    return math.pi * diameter**4 / 64.0
-
-
 def proxy(diameter: Floats) -> Floats:
     """Stiffness over that of the base, (d / d_1)^4, shape (n,)."""
     return (diameter / diameter[0]) ** 4

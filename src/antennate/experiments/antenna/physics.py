@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,8 +69,8 @@ class Trace(NamedTuple):
     tip: Floats
 
     def rejected(self, since: float) -> float:
-        """Share of the deflection that the tip has lost for good after a time [s]."""
-        return float(1.0 - abs(self.tip[self.t >= since]).max())
+        """Share of the deflection that the tip has lost for good after a time [s] or at the end."""
+        return float(1.0 - abs(self.tip[self.t >= min(since, self.t[-1])]).max())
 
 
 def springs_of(config: AntennaConfig) -> Springs:
@@ -219,8 +220,8 @@ def _hold(config: AntennaConfig) -> Floats:
 def ringdown_of(config: AntennaConfig) -> tuple[Ringdown, Trace]:
     """The ring-down of an antenna, its modes, and the path of its tip."""
     others = {
-        Path(name).stem.replace("_", " "): read_file(Path(name), RobotSpec).antenna
-        for name in config.beside
+        title: read_file(Path(file), RobotSpec).antenna
+        for title, file in _titled(config.beside).items()
     }
     chain = LinearChain.of(config.antenna)
     trace, engine = _let_go(config)
@@ -233,6 +234,16 @@ def ringdown_of(config: AntennaConfig) -> tuple[Ringdown, Trace]:
         beside={name: _swing(LinearChain.of(other).first_mode()) for name, other in others.items()},
     )
     return found, trace
+
+
+def _titled(files: Sequence[str]) -> dict[str, str]:
+    """Different files by their names in words, or as given where two would have the same name."""
+    files = [*dict.fromkeys(files)]
+    titles = [Path(file).stem.replace("_", " ") for file in files]
+    return {
+        file if titles.count(title) > 1 else title: file
+        for title, file in zip(titles, files, strict=True)
+    }
 
 
 def _swing(mode: Mode) -> Swing:

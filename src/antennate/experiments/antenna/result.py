@@ -173,7 +173,8 @@ class Ringdown:
     modes: list[Swing]
     """All modes of the chain with its servo, the slowest first."""
     beside: dict[str, Swing]
-    """First modes of the chains of other antennae (`--beside`), by the name of their file."""
+    """First modes of the chains of other antennae (`--beside`), by the name of their file; its
+    path where two files have the same name."""
 
 
 @tabular
