@@ -48,7 +48,7 @@ def options(page: Command) -> dict[str, str]:
 
 def section(page: Command, shared: set[str], before: Sequence[Command]) -> Iterator[str]:
     """The lines of one command; rows that are shared are named alone."""
-    free = "".join(f" {option.free}" for option in page.others if option.free)
+    free = "".join(f" {option.usage}" for option in page.others if option.free)
     name = command_words(page.name)
     yield f"## `antennate {name}`"
     yield page.description

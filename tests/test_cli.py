@@ -119,6 +119,14 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
 
 
 @pytest.mark.parametrize(
+    ("command", "words"), [("antenna", "[FILE]"), ("robot", "[FOLDER]"), ("study", "FILE")]
+)
+def test_the_usage_has_what_may_be_left_out_in_brackets(capsys, command, words):
+    assert main([command, "--help"]) == 0
+    assert capsys.readouterr().out.startswith(f"usage: antennate {command} {words} [OPTIONS]\n")
+
+
+@pytest.mark.parametrize(
     ("command", "flags"),
     [
         ("tunnel", "--trials --seed --controllers --scene --robot --time-limit --out --workers"),

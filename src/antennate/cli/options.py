@@ -38,9 +38,11 @@ def option(
         metavar: What stands for its value in the help, such as FILE.
         needs: Flags, one of which must be given beside it, as `--video`; with the begin of its
             value where not all do, as `--engine slurm`.
-        more: As for pydantic's Field; `positional` is for a value without a flag.
+        more: As for pydantic's Field; `positional` is for a value without a flag, `optional` for
+            one of these that may be left out.
     """
-    extra = {"metavar": metavar, "needs": list(needs), "positional": more.pop("positional", False)}
+    extra = {"metavar": metavar, "needs": list(needs)}
+    extra |= {name: more.pop(name, False) for name in ("positional", "optional")}
     return Field(
         default,
         description=meaning,
@@ -64,6 +66,7 @@ class Option:
         limits: Bounds in words, such as `at least 1`.
         default: Its default in words, empty if there is none to show.
         positional: Whether it is given without a flag.
+        optional: Whether it may be left out then.
         needs: Flags, one of which must be given beside it.
     """
 
@@ -77,6 +80,7 @@ class Option:
     limits: str = ""
     default: str = ""
     positional: bool = False
+    optional: bool = False
     needs: tuple[str, ...] = ()
 
     @property
@@ -99,8 +103,13 @@ class Option:
 
     @property
     def free(self) -> str:
-        """What stands for it in the usage of its command, if it is given without a flag."""
+        """What stands for it in the help, if it is given without a flag."""
         return f"{self.metavar}{'...' if self.many else ''}" if self.positional else ""
+
+    @property
+    def usage(self) -> str:
+        """What stands for it in the usage of its command: in brackets if it may be left out."""
+        return f"[{self.free}]" if self.optional else self.free
 
     @property
     def meaning(self) -> str:
@@ -199,6 +208,7 @@ def _option(path: tuple[str, ...], model: type, field: FieldInfo, default: Any) 
             default=_words(default),
             kinds=kinds,
             positional=bool(extra.get("positional")),
+            optional=bool(extra.get("optional")),
             needs=tuple(extra.get("needs", ())),
         )
 

@@ -234,7 +234,11 @@ class Options(ResultOptions, RobotFileOptions):
     """Where the results go, which file describes the robot, and what is exported."""
 
     out: Path | None = option(
-        None, "folder for the results, else runs/COMMAND-N", "FOLDER", positional=True
+        None,
+        "folder for the results, else runs/COMMAND-N",
+        "FOLDER",
+        positional=True,
+        optional=True,
     )
     export: Literal["mjcf", "urdf"] | None = option(
         None, "write the robot for other programs instead"
