@@ -1,8 +1,8 @@
-"""Write docs/parameters.md: what `antennate parameters` prints."""
+"""Write docs/parameters.md: what `antennate parameters` prints, less what docs/options.md has."""
 
 from generated import finish
 
 from antennate.cli.parameters import page
 
 if __name__ == "__main__":
-    finish(__file__, page(), source="`src/antennate/params/` and `robots/`")
+    finish(__file__, page(beside_commands=True), source="`src/antennate/params/` and `robots/`")

@@ -167,3 +167,15 @@ def test_the_page_of_parameters_has_every_command(capsys: pytest.CaptureFixture[
     titles = {line[3:] for line in capsys.readouterr().out.splitlines()}
     ours = [name for name in experiments.names() if experiments.is_ours(name)]
     assert {experiments.load(name).config.__name__ for name in ours} <= titles
+
+
+def test_the_command_has_all_of_a_commands_own_parameters(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Who reads a terminal has no other page."""
+    assert main(["parameters"]) == 0
+    said = capsys.readouterr().out
+    antenna = said.partition("## AntennaConfig\n")[2].partition("\n## ")[0]
+    assert "| name | default | meaning | source |" in antenna
+    assert "| `hold_time` | `30` s | time for which the sensor is held bent | assumed: " in antenna
+    assert "options.md" not in said

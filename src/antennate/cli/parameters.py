@@ -90,8 +90,8 @@ def _cells(group: type[Params], name: str) -> tuple[object, ...]:
 def _table(group: type[Params], known: Collection[type[Params]], command: str = "") -> str:
     """A section: what the class says of itself, and a row for each number in it.
 
-    Numbers that are those of a class on the page stand there. Of a command's own parameters the
-    page of commands has default and meaning.
+    Numbers that are those of a class on the page stand there. With the name of a command its
+    section of the page of commands has default and meaning.
     """
     base = next((base for base in group.__mro__[1:] if base in known), None)
     rows, groups = list[str](), list[str]()
@@ -120,8 +120,13 @@ def _table(group: type[Params], known: Collection[type[Params]], command: str = 
     return "\n\n".join(parts) + "\n"
 
 
-def page() -> str:
-    """All tables, those of physical numbers first, then those of each command."""
+def page(beside_commands: bool = False) -> str:
+    """All tables, those of physical numbers first, then those of each command.
+
+    Args:
+        beside_commands: Whether docs/options.md stands beside it, which has default and meaning
+            of each command's own parameters; here they then have name and source alone.
+    """
     numbers = [
         f"antennate.params.{module.name}" for module in pkgutil.iter_modules(params.__path__)
     ]
@@ -129,7 +134,8 @@ def page() -> str:
     modules = map(importlib.import_module, numbers + robots)
     physical = [group for module in modules for group in _groups(module)]
     known = [*physical, *_commands()]
-    own = {experiments.load(name).config: name for name in experiments.names()}
+    names = experiments.names() if beside_commands else ()
+    own = {experiments.load(name).config: name for name in names}
     parts = [_table(group, known) for group in physical]
     tables = (_table(group, known, own.get(group, "")) for group in _commands())
     return "\n".join([_HEAD, *parts, _COMMANDS, *tables]).rstrip("\n") + "\n"
