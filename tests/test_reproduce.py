@@ -479,6 +479,27 @@ def test_parts_count_by_their_work(quick: bool, monkeypatch: pytest.MonkeyPatch)
     assert 55 <= ends["tunnel"] <= 75
 
 
+def test_the_bar_says_that_it_counts_per_cent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    load = experiments.load
+
+    def stub(name: str) -> Any:
+        def run(*_: Any) -> Any:
+            return SimpleNamespace(result=dict)
+
+        return (
+            EXPERIMENT
+            if name == "reproduce"
+            else SimpleNamespace(config=load(name).config, run=run)
+        )
+
+    monkeypatch.setattr(experiments, "load", stub)
+    monkeypatch.setattr(reproduce, "CLAIMS", ())
+    assert main(["reproduce", "--quick", "--no-figures", "--out", str(tmp_path / "out")]) == 0
+    assert "% of reproduce: 100 of 100 after" in capsys.readouterr().err
+
+
 def test_claims_of_what_ran_are_kept_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reproduce, "QUICK", {"antenna": {}})
     whole = EXPERIMENT.run(ReproduceConfig(quick=True), 1, lambda *_: None, lambda row: None)

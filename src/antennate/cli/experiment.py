@@ -122,6 +122,7 @@ class AntennaOptions(Options):
         f"word {FITTED}: numbers that the paper does not give; flags override it",
         "FILE",
         positional=True,
+        optional=True,
         examples=[*ROBOTS, FITTED],
     )
 
@@ -351,7 +352,7 @@ def _outcome(
         rows = interim.table()
         return None if rows is None else drawn_table(rows)
 
-    with progress(experiment.name, table) as step, told():
+    with progress(experiment.counted or experiment.name, table) as step, told():
         return experiment.run(config, workers, step, on_row, **how)
 
 

@@ -137,6 +137,7 @@ class Experiment(Generic[Config, Out]):
             have the same, so a finished run can take more. None: that of its `Trials`.
         of_file: of_file(path) -> the configuration of a FILE that is given without a flag; None
             where only --config takes one.
+        counted: What its steps are, beside the bar; else the name of the command stands there.
     """
 
     name: str
@@ -157,6 +158,7 @@ class Experiment(Generic[Config, Out]):
     workers: Literal["none", "here", "whole", "anywhere"] = "anywhere"
     tasks: Callable[[Config], Sequence[Any]] | None = None
     of_file: Callable[[Path], Config] | None = None
+    counted: str = ""
 
     def __post_init__(self) -> None:
         if self.trials is not None:

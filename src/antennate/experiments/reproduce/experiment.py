@@ -335,5 +335,6 @@ EXPERIMENT = Experiment.of_folder(
     result=ReproduceResult,
     row=Row,
     body=body,
+    counted="% of reproduce",
     captions={claim.name: f"{claim.claim}." for claim in CLAIMS},
 )
