@@ -99,7 +99,7 @@ def shown(*words: str, folder: Path) -> Iterator[Shown]:
 
 
 def child_of(process: int) -> int:
-    """The process of the page that a program has started; a drive has one that keeps its log, too."""
+    """The process of the page that a program has started. A drive begins one for its log, too."""
     children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
     [page] = [
         child
