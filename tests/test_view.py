@@ -96,6 +96,14 @@ def charts(tab: Tab) -> str:
     )
 
 
+def coloured(tab: Tab) -> None:
+    """Return once the scene is drawn: a slow page draws it late."""
+    end = time.monotonic() + PATIENCE
+    while (found := colours(tab)) <= 50:
+        assert time.monotonic() < end, found
+        time.sleep(0.2)
+
+
 def charts_move(tab: Tab, before: str) -> None:
     """Return once the charts have drawn something else: a slow page draws them late."""
     end = time.monotonic() + PATIENCE
@@ -145,7 +153,7 @@ def test_a_person_changes_what_a_simulation_decides(tab: Tab, keep: Keep, tmp_pa
         charts_move(tab, before)
         tab.click("label", "pause")
         tab.until("!!document.querySelector('svg polyline')")
-        assert colours(tab) > 50
+        coloured(tab)
         red, _, blue = middle(tab).T  # sand-coloured obstacles differ by 56, washed out ones by 8
         assert (red - blue > 24).mean() > 0.05
         tab.fill("θ: level that is contact", "0.3")
@@ -272,7 +280,7 @@ def settled(tab: Tab) -> float:
 
 def looked_at(tab: Tab, view: Shown) -> None:
     """The page of a robot: read only, with a scene, and nothing from elsewhere."""
-    assert colours(tab) > 50
+    coloured(tab)
     assert not tab.run("/pause|one step|restart|θ: level/.test(document.body.innerText)")
     stays_here(tab, view)
     tab.requests.clear()
