@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -55,6 +56,13 @@ def test_faults_begin_on_demand() -> None:
 
 
 @pytest.mark.ci
+def test_a_fault_may_stand_before_the_servos_and_be_given_twice() -> None:
+    words = ("--fault", "servo:2=silent", "1:xl330-m288", "2:xl330-m288", "3:xl330-m288")
+    with served(*words, "--fault", "servo:3=silent") as bus:
+        assert [status.id for status in bus.scan()] == [1]
+
+
+@pytest.mark.ci
 def test_a_list_says_the_speed_of_a_servo() -> None:
     """57600 bit/s are 1 in the register Baud Rate, 1000000 are 3, by the manual."""
     with served("5:xl430-w250@1000000", "6:xl330-m288") as bus:
@@ -77,6 +85,12 @@ def test_a_list_says_the_speed_of_a_servo() -> None:
         ("1:xl330-m288x0", "expected servos, found none"),
         ("253:xl330-m288", "expected an id from 0 to 252, found 253"),
         ("1:xl330-m288 --fault servo:2=silent", "--fault: expected a servo of 1, found 2"),
+        (
+            "1:xl330-m288 --fault servo:9=silent --fault bus=echo",
+            "--fault: expected a servo of 1, found 9",
+        ),
+        ("--fault bus=echo", "the following arguments are required"),
+        ("1:xl330-m288 --dur 1", "unrecognized arguments: --dur"),
         ("1:xl330-m288 --fault servo:1=late", "--fault: expected seconds from 0 on"),
         ("1:xl330-m288 --fault esp32=silent", "--fault: expected TARGET=WHAT"),
         ("1:xl330-m288 --fault bus=frozen", "--fault: expected one of loss, silent"),
@@ -105,3 +119,30 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
 def test_it_ends_by_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["1:xl330-m288", "--duration", "0.05"]) == 0
     assert json.loads(capsys.readouterr().out)["bus"].startswith("/dev/")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("redirected", "code", "said"),
+    [
+        ("> /dev/full", 2, "No space left on device"),
+        (">&-", 2, "it is closed"),
+        ("| true; exit ${PIPESTATUS[0]}", 0, ""),
+    ],
+)
+def test_standard_output_that_fails_gives_no_traceback(
+    redirected: str, code: int, said: str
+) -> None:
+    """A reader that has ended is no error, as for other programs in a pipe."""
+    command = f"{sys.executable} -m dynamixel_bus 1:xl330-m288 --duration 0.05 {redirected}"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60)
+    lines = [f"dynamixel-bus: error: cannot write to standard output: {said}"] if said else []
+    assert (ran.returncode, ran.stderr.splitlines()) == (code, lines)
+
+
+@pytest.mark.ci
+def test_a_version_that_cannot_be_told_is_an_error() -> None:
+    with Path("/dev/full").open("w") as full:
+        words = [sys.executable, "-m", "dynamixel_bus", "--version"]
+        ran = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert (ran.returncode, ran.stderr.count("\n")) == (2, 1)

@@ -5,17 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import NoReturn
 
 from dynamixel_bus import __version__, demands, servo_list
 from dynamixel_bus.demands import Demand
 from dynamixel_bus.endpoints import Endpoint, TcpEndpoint
-from dynamixel_bus.errors import BadInputError, BusError, ConfigError
+from dynamixel_bus.errors import BadInputError, BusError, ConfigError, reason
 from dynamixel_bus.messages import one_line
 from dynamixel_bus.models import MODELS
 from dynamixel_bus.server import Server
@@ -84,7 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 after bad input, 130 if interrupted.
     """
     try:
-        return _serve(_parser().parse_args(argv))
+        with _output():
+            return _serve(_read(argv))
     except BusError as error:
         sys.stderr.write(f"dynamixel-bus: error: {one_line(str(error))}\n")
         return BAD_INPUT
@@ -92,18 +94,61 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+@contextmanager
+def _output() -> Iterator[None]:
+    """Standard output, all of it written at the end, also what argparse prints."""
+    try:
+        yield
+    finally:
+        if sys.stdout is not None:
+            _print("")
+
+
+def _print(text: str) -> None:
+    """Write to standard output at once; a reader that has ended is no error."""
+    if sys.stdout is None:
+        raise BadInputError("cannot write to standard output: it is closed")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as error:
+        with suppress(OSError):  # the buffer keeps the text, and Python flushes it at exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            raise BadInputError(f"cannot write to standard output: {reason(error)}") from None
+
+
+def _read(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Words of the command; servos behind `--fault` are servos."""
+    parser = _parser()
+    given = parser.parse_args(argv)
+    given.servos += filter(servo_list.is_listed, given.fault)
+    given.fault = [word for word in given.fault if not servo_list.is_listed(word)]
+    if not given.servos:
+        parser.error(f"the following arguments are required: {servo_list.FORM}")
+    return given
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="dynamixel-bus",
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     parser.add_argument(
-        "servos", nargs="+", metavar=servo_list.FORM, help="as 1:xl330-m288 2:xl430-w250@1000000"
+        "servos", nargs="*", metavar=servo_list.FORM, help="as 1:xl330-m288 2:xl430-w250@1000000"
     )
     parser.add_argument("--tcp", metavar="[HOST:]PORT", help="a TCP port, 0 for any that is free")
     parser.add_argument("--duration", metavar="SECONDS", help="end by itself")
-    parser.add_argument("--fault", metavar="FAULT", nargs="+", default=[], help="what goes wrong")
+    parser.add_argument(
+        "--fault",
+        metavar="FAULT",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="what goes wrong; may be given several times",
+    )
     parser.add_argument("--version", action="version", version=__version__)
     return parser
 
@@ -170,8 +215,7 @@ def _until(duration: float, paths: dict[str, str], stops: Sequence[int]) -> Call
         nonlocal ready
         if not ready:
             ready = True
-            sys.stdout.write(json.dumps(paths) + "\n")
-            sys.stdout.flush()
+            _print(json.dumps(paths) + "\n")
         return t < duration and not stops
 
     return go_on
