@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,22 @@ ROOMS = {
 }
 """Distributions in the folder `packages`, and all that is in an environment with one of them."""
 EXAMPLE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FOLDERS = (
+    ".ci",
+    "benchmarks",
+    "docs",
+    "entries",
+    "examples",
+    "packages",
+    "src",
+    "studies",
+    "tests",
+)
+SUFFIXES = {"", ".ipynb", ".md", ".py", ".sh", ".toml"}
+"""Where something may tell how to install."""
+PIP = re.compile(r"(?<!uv )pip install ([^\n`#]*)")
+OWN_FOLDER = re.compile(r"(^|\s)['\"]?\.(/antennate)?(['\"\s\[]|$)")
+"""A word for the folder of `antennate`, perhaps with extras."""
 SDK = """
 import json, subprocess, sys
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler, port_handler
@@ -45,6 +62,15 @@ with subprocess.Popen([sys.argv[1], *words, "--duration", "60"], stdout=subproce
 def first_example(room: str) -> str:
     text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
     return EXAMPLE.findall(text)[0]
+
+
+def installed_by_pip() -> Iterator[tuple[Path, str]]:
+    """Files of the repository and what they tell pip to install."""
+    files = [*ROOT.glob("*"), *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*"))]
+    for path in files:
+        if path.suffix in SUFFIXES and path.is_file():
+            for words in PIP.findall(path.read_text(encoding="utf-8", errors="ignore")):
+                yield path.relative_to(ROOT), words
 
 
 def done(*words: object, folder: Path | None = None) -> str:
@@ -91,6 +117,20 @@ def test_a_readme_says_in_ten_lines_what_it_is(room: str) -> None:
     assert text.startswith(f"# {room}\n")
     head = text.partition("```python")[0].strip().splitlines()
     assert len([line for line in head[1:] if line]) <= 10
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_readme_has_no_link_into_the_repository(room: str) -> None:
+    """A package index shows the page without the repository around it."""
+    text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"\]\((?!https?://|#)[^)]*\)", text) == []
+
+
+def test_all_that_tells_pip_to_install_antennate_names_the_others() -> None:
+    """They are on no index, so pip finds them in the folder alone; uv knows where they are."""
+    told = [(path, words) for path, words in installed_by_pip() if OWN_FOLDER.search(words)]
+    assert Path("docs", "install.md") in dict(told)
+    assert [(path, words) for path, words in told if "/packages/*" not in words] == []
 
 
 def test_purcells_swimmer_takes_eight_lines() -> None:

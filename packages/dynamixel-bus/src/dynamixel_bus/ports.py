@@ -36,7 +36,7 @@ class SerialPort(Port):
         except ModuleNotFoundError as error:
             raise MissingPackageError(
                 f"expected pyserial for serial lines, found no module {error.name}; install it by "
-                "`pip install pyserial`"
+                "`pip install pyserial`, the extra `serial` of dynamixel-bus"
             ) from None
         self._path = path
         with self._mapped("open"):
