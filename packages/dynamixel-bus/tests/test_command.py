@@ -86,11 +86,11 @@ def test_a_list_says_the_speed_of_a_servo() -> None:
         ("253:xl330-m288", "expected an id from 0 to 252, found 253"),
         ("1:xl330-m288 --fault servo:2=silent", "--fault: expected a servo of 1, found 2"),
         (
-            "1:xl330-m288 --fault servo:9=silent --fault bus=echo",
+            "1:xl330-m288 --fault servo:9=silent --fault bus=echo --duration 0.05",
             "--fault: expected a servo of 1, found 9",
         ),
         ("--fault bus=echo", "the following arguments are required"),
-        ("1:xl330-m288 --dur 1", "unrecognized arguments: --dur"),
+        ("1:xl330-m288 --dur 0.05", "unrecognized arguments: --dur"),
         ("1:xl330-m288 --fault servo:1=late", "--fault: expected seconds from 0 on"),
         ("1:xl330-m288 --fault esp32=silent", "--fault: expected TARGET=WHAT"),
         ("1:xl330-m288 --fault bus=frozen", "--fault: expected one of loss, silent"),
