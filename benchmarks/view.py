@@ -1,7 +1,7 @@
 """What a live view and a log cost: a simulated trial, and the pace of `antennate drive`.
 
 - `log`, `view`, `view_and_log`: wall time of trials with them over that without, at full speed,
-  interleaved in one process; `cpu` the same of the CPU time of that process.
+  interleaved in one process; `cpu` the same of the CPU time of that process. At most 1.05 is asked.
 - `in_turn`: the same of log and page together, from trials in which both rest in every other block
   of 150 ticks: each block over the mean of its neighbours. It has less noise.
 - `missed_share`, `walking_missed_share`: cycles that a drive against a twin missed, with a page and

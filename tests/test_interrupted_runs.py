@@ -217,8 +217,8 @@ def test_a_refused_command_leaves_a_finished_run_as_it_is(
     run = tmp_path / "run"
     assert main(["antenna", "--out", str(run)]) == 0
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    refused = ["--shard 1/2", "--engine slurm-local", "--trial-timeout 3", "--workers 3", "--retry"]
-    for words in map(str.split, refused):
+    refused = ["--shard 1/2", "--engine slurm-local", "--workers 3", "--retry"]
+    for words in map(str.split, [*refused, "--trial-timeout 3", "--trial-timeout 3600"]):
         capsys.readouterr()
         assert main(["antenna", "--out", str(run), "--overwrite", *words]) == 2
         assert f"expected a known flag, found '{words[0]}'" in capsys.readouterr().err
