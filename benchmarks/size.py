@@ -1,7 +1,7 @@
 """How large the program is: `python benchmarks/size.py [FOLDER]`, by package.
 
 Lines, and lines of code: those that hold a token of Python other than a docstring, a comment or
-part of an import. FOLDER is that of a package, `src/antennate` unless given.
+part of an import. FOLDER is that of a package, `packages/antennate/src/antennate` unless given.
 """
 
 from __future__ import annotations
@@ -56,4 +56,5 @@ def main(package: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "src" / "antennate")
+    own = ROOT / "packages" / "antennate" / "src" / "antennate"
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else own)

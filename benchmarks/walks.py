@@ -24,7 +24,7 @@ from types import FrameType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = [ROOT / "src" / "antennate", *ROOT.glob("packages/*/src/*")]
+PACKAGES = [*ROOT.glob("packages/*/src/*")]
 SOURCES = tuple(f"{package}/" for package in PACKAGES)
 WIRES = ("lockstep.py", "simulated_wire.py")
 TICK = 150

@@ -5,4 +5,8 @@ from generated import finish
 from antennate.cli.parameters import page
 
 if __name__ == "__main__":
-    finish(__file__, page(beside_commands=True), source="`src/antennate/params/` and `robots/`")
+    finish(
+        __file__,
+        page(beside_commands=True),
+        source="`packages/antennate/src/antennate/params/` and `robots/`",
+    )

@@ -14,7 +14,8 @@ from antennate.sim.engine_setup import ENGINES, engines
 
 pytestmark = pytest.mark.ci
 
-PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+PACKAGE = Path(__file__).parents[1] / "packages" / "antennate"
+PYPROJECT = tomllib.loads((PACKAGE / "pyproject.toml").read_text())
 (PIN,) = (each for each in PYPROJECT["project"]["dependencies"] if each.startswith("mujoco"))
 TUNNEL = ["tunnel", "--trials", "1", "--time-limit", "1", "--no-figures", "--out", "run"]
 BROKEN = "libmujoco.so.3.17.0: cannot open shared object file"

@@ -175,7 +175,7 @@ def test_letters_of_the_pictures_of_the_docs_are_read_on_a_phone():
 
 
 def test_no_figure_asks_for_smaller_letters():
-    for path in [*ROOT.glob("src/antennate/**/*.py"), *ROOT.glob("docs/science/*.py")]:
+    for path in [*ROOT.glob("packages/*/src/**/*.py"), *ROOT.glob("docs/science/*.py")]:
         least = LETTERS["tunnel.png"] if path.parent.name == "tunnel" else 7.0
         for size in re.findall(r"fontsize=([0-9.]+)", path.read_text()):
             assert float(size) >= least, path

@@ -269,11 +269,12 @@ def test_E1_each_boot_has_its_own_number(program: Program) -> None:
 
 def test_one_copy_of_the_frame_code_and_the_docs_say_where() -> None:
     source = Path(frame.__file__)
-    assert source.read_bytes() == (ROOT / "src/antennate/hardware/esp32/frame.py").read_bytes()
+    there = ROOT / "packages/antennate/src/antennate/hardware/esp32/frame.py"
+    assert source.read_bytes() == there.read_bytes()
     copies = [path for path in FIRMWARE.glob("*.py") if "COBS" in path.read_text()]
     assert copies == []
     page = (ROOT / "docs" / "firmware.md").read_text()
-    assert "cp src/antennate/hardware/esp32/frame.py :antenna_frame.py" in page
+    assert "cp packages/antennate/src/antennate/hardware/esp32/frame.py :antenna_frame.py" in page
 
 
 def on_micropython(folder: Path, script: str) -> bytes:

@@ -18,7 +18,7 @@ from pages import made_pages
 from antennate.errors import MissingPackageError
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = [ROOT / "src" / "antennate", *ROOT.glob("packages/*/src/*")]
+PACKAGES = [*ROOT.glob("packages/*/src/*")]
 OURS = [package.name for package in PACKAGES]
 PAGES = [
     *(p for p in sorted((ROOT / "docs").rglob("*.md")) if p.name != "changelog.md"),
@@ -28,7 +28,6 @@ PAGES = [
 ]
 """Pages that tell how things are; the changelog tells how they were."""
 FOLDERS = (
-    "src",
     "packages",
     "docs",
     "tests",
@@ -266,7 +265,7 @@ def test_docstrings_name_what_is_there() -> None:
         "search.SearchRule",
         "Bench.no_such_method()",
         "control.no_such_group",
-        "src/antennate/control/search.py",
+        "packages/antennate/src/antennate/control/search.py",
         "cli/no_such_file.py",
         "no_such_module.py",
         "no_such_result.json",

@@ -207,13 +207,17 @@ def test_a_policy_is_called_by_folder_or_file_and_a_long_name_is_cut_in_the_midd
 def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     """docs/install.md says how extras are installed: the package is on no index."""
     pages = (ROOT / "docs" / "install.md").read_text()
-    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    own, all_rooms = (
+        tomllib.loads((folder / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+        for folder in (ROOT / "packages" / "antennate", ROOT)
+    )
+    assert [*own] == [*all_rooms]
     named = set()
-    for file in sorted((ROOT / "src").rglob("*.py")):
+    for file in sorted((ROOT / "packages" / "antennate" / "src").rglob("*.py")):
         text = file.read_text()
         assert not re.search(r"pip install '?antennate\[", text), file
         named |= set(re.findall(r"\{extra\([\"'](\w+)[\"']\)\}", text))
-    assert {"view", "video", "hardware"} <= named <= set(known)
+    assert {"view", "video", "hardware"} <= named <= set(own)
     uv, pip = re.findall(r"`([^`]*)`", extra("video"))
     assert uv.removesuffix(" ...") in pages
     assert pip in pages

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-PACKAGES = [TESTS.parent / "src" / "antennate", *TESTS.parent.glob("packages/*/src/*")]
+PACKAGES = [*TESTS.parent.glob("packages/*/src/*")]
 OURS = tuple(package.name for package in PACKAGES)
 PRIVATE = re.compile(r"_[A-Za-z]\w*(?<!_)")
 """Names that end with an underscore, too, are those that notebooks ask for."""

@@ -18,7 +18,7 @@ import dynamixel_bus
 import geometric_locomotion
 
 ROOT = Path(__file__).parents[1]
-OWN = ROOT
+OWN = ROOT / "packages" / "antennate"
 """Folder of `antennate` itself."""
 ROOMS = {
     "dynamixel-bus": {"numpy"},
@@ -108,7 +108,7 @@ def test_all_have_one_version() -> None:
     assert dynamixel_bus.__version__ == geometric_locomotion.__version__ == version
     needed = tomllib.loads((OWN / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {f"{room}=={version}" for room in ROOMS} <= set(needed)
-    assert {path.name for path in (ROOT / "packages").iterdir()} == set(ROOMS)
+    assert {path.name for path in (ROOT / "packages").iterdir()} == {*ROOMS, "antennate"}
 
 
 @pytest.mark.parametrize("room", ROOMS)
@@ -191,7 +191,7 @@ def test_pip_installs_all_of_them(tmp_path: Path) -> None:
     done(sys.executable, "-m", "venv", tmp_path / "all")
     programs = tmp_path / "all" / "bin"
     rooms = sorted((ROOT / "packages").iterdir())
-    done(programs / "pip", "install", "--quiet", *rooms, ROOT, folder=tmp_path)
+    done(programs / "pip", "install", "--quiet", *rooms, folder=tmp_path)
     said = done(programs / "antennate", "tunnel", "--help", folder=tmp_path)
     assert said.startswith("usage: antennate tunnel")
     for word in ("dynamixel_bus", "geometric_locomotion", "antennate"):

@@ -359,4 +359,4 @@ def test_without_h5py_the_extra_is_named(
     path = sleap(tmp_path / "a.h5", animal(dwelling(10, 20)))
     monkeypatch.setitem(sys.modules, "h5py", None)
     err = message(capsys, "--files", path, "--rate", 100, *FLAGS)
-    assert "pip install ./antennate/packages/* './antennate[tracks]'" in err
+    assert "pip install ./antennate/packages/* './antennate/packages/antennate[tracks]'" in err

@@ -95,7 +95,7 @@ def extra(name: str) -> str:
     """How to get an extra of this package; it follows words such as `install it with`."""
     return (
         f"`uv run --extra {name} antennate ...` in a clone, or, with the clone as ./antennate, by "
-        f"`pip install ./antennate/packages/* './antennate[{name}]'`"
+        f"`pip install ./antennate/packages/* './antennate/packages/antennate[{name}]'`"
     )
 
 
