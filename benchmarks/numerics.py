@@ -20,8 +20,6 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from antennate.experiments.gait import physics as gait
-from antennate.experiments.gait.physics import measure
 from antennate.experiments.tunnel import experiment as experiment
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import GaitParams
@@ -34,6 +32,8 @@ from antennate.sim.world import World, compile_world
 from antennate.studies.pool import core_count, gather
 from antennate.studies.trials import no_step
 from antennate.types import Floats, Maneuver
+from antennate_lab.gait import physics as gait
+from antennate_lab.gait.physics import measure
 
 _CHOSEN = PhysicsParams()
 _PUSH = 0.3

@@ -13,7 +13,7 @@ from generated import finish, heads, row
 
 from antennate.cli import LOG_COMMANDS, ROBOT_COMMANDS, commands, described
 from antennate.cli.options import Command, Option
-from antennate.experiments import is_ours
+from antennate.experiments import names
 from antennate.messages import command_words
 
 HEAD = """\
@@ -112,8 +112,8 @@ def line(option: Option) -> str:
 
 
 def is_own(name: str) -> bool:
-    """Whether a command is of this package."""
-    return name in ("study merge", "parameters") or is_ours(name.split()[-1])
+    """Whether a command is an experiment, or one that belongs to them."""
+    return name in ("study merge", "parameters") or name.split()[-1] in names()
 
 
 def index(title: str, named: dict[str, str]) -> str:

@@ -15,13 +15,13 @@ from pathlib import Path
 from generated import finish
 
 from antennate.errors import ConfigError
-from antennate.experiments.compete.checking import read_rows
-from antennate.experiments.compete.config import CompeteConfig
-from antennate.experiments.compete.episodes import EpisodeRow
-from antennate.experiments.compete.page import apart, markdown, sentence
-from antennate.experiments.compete.result import Standing
-from antennate.experiments.compete.standings import standing
 from antennate.studies.formats import to_csv
+from antennate_lab.compete.checking import read_rows
+from antennate_lab.compete.config import CompeteConfig
+from antennate_lab.compete.episodes import EpisodeRow
+from antennate_lab.compete.page import apart, markdown, sentence
+from antennate_lab.compete.result import Standing
+from antennate_lab.compete.standings import standing
 
 HERE = Path(__file__).parent
 ROWS = Path(__file__).with_suffix(".csv")
@@ -94,8 +94,8 @@ def main() -> None:
     result = standing(rows, CompeteConfig().tie)
     text = f"{before}{BEGIN}\n{board(rows, result)}\n{END}{after}"
     if "--check" not in sys.argv[1:]:
-        from antennate.experiments.compete.figure import drawn
         from antennate.figures import render
+        from antennate_lab.compete.figure import drawn
 
         for name, figure in drawn(result, rows).items():
             (HERE / "images" / f"leaderboard-{name}.png").write_bytes(render(figure)["png"])

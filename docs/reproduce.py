@@ -18,7 +18,11 @@ from typing import Any
 from generated import finish, heads, row
 
 from antennate.experiments import load
-from antennate.experiments.reproduce.experiment import (
+from antennate.messages import command_words
+from antennate.studies.columns import content
+from antennate.studies.formats import to_json
+from antennate.studies.run_directory import RunDirectory
+from antennate_lab.reproduce.experiment import (
     CLAIMS,
     FULL,
     ReproduceConfig,
@@ -28,12 +32,8 @@ from antennate.experiments.reproduce.experiment import (
     configured,
     is_fitted,
 )
-from antennate.experiments.reproduce.experiment import judge as found_of
-from antennate.experiments.reproduce.verdict import MEANINGS, VERDICTS
-from antennate.messages import command_words
-from antennate.studies.columns import content
-from antennate.studies.formats import to_json
-from antennate.studies.run_directory import RunDirectory
+from antennate_lab.reproduce.experiment import judge as found_of
+from antennate_lab.reproduce.verdict import MEANINGS, VERDICTS
 
 ROOT = Path(__file__).parent
 SETTINGS = (ReproduceConfig(), ReproduceConfig(setting="fitted"))

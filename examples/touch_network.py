@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from antennate.experiments.dataset.estimates import by_episode
 from antennate.studies.statistics import mean95
+from antennate_lab.dataset.estimates import by_episode
 
 STEPS, HIDDEN, ROUNDS, RATE = 20, 32, 1000, 3e-3
 """Means that a window becomes, size of the hidden layer, steps of Adam, and how large they are."""

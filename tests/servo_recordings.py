@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import antennate
-from antennate.experiments.servo.result import ServoResult
+from antennate_lab.servo.result import ServoResult
 from dynamixel_bus.model import POSITION_UNIT
 from dynamixel_bus.models import MODELS_BY_NUMBER
 from dynamixel_bus.servo import Servo

@@ -576,7 +576,7 @@ def test_gait_runs_and_writes_its_result(capsys, tmp_path):
 
 
 def test_gait_interrupted_leaves_nothing(capsys, tmp_path, monkeypatch):
-    from antennate.experiments.gait import experiment as gait
+    from antennate_lab.gait import experiment as gait
 
     def interrupted(*args):
         raise KeyboardInterrupt

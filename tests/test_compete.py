@@ -22,24 +22,24 @@ import antennate
 from antennate.cli import main
 from antennate.cli.terminal import BAD_INPUT
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.experiments.compete import apart, experiment
-from antennate.experiments.compete.checking import read_rows
-from antennate.experiments.compete.comparison import compared, refusal
-from antennate.experiments.compete.config import (
+from antennate.studies.formats import to_csv
+from antennate.studies.pool import Workers
+from antennate.studies.run_directory import RunDirectory
+from antennate_lab.compete import apart, experiment
+from antennate_lab.compete.checking import read_rows
+from antennate_lab.compete.comparison import compared, refusal
+from antennate_lab.compete.config import (
     DEVELOPMENT,
     RESERVED,
     CompeteConfig,
     hidden_seed,
     settled,
 )
-from antennate.experiments.compete.episodes import Draw, EpisodeRow, run_episodes
-from antennate.experiments.compete.experiment import run
-from antennate.experiments.compete.page import sentence
-from antennate.experiments.compete.scenes import label, tunnel_config
-from antennate.experiments.compete.standings import standing
-from antennate.studies.formats import to_csv
-from antennate.studies.pool import Workers
-from antennate.studies.run_directory import RunDirectory
+from antennate_lab.compete.episodes import Draw, EpisodeRow, run_episodes
+from antennate_lab.compete.experiment import run
+from antennate_lab.compete.page import sentence
+from antennate_lab.compete.scenes import label, tunnel_config
+from antennate_lab.compete.standings import standing
 
 SHORT = "flat+time_limit=0.3"
 ENTRIES = '''
@@ -667,7 +667,7 @@ def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     assert main(["compete", *words, "--out", "whole"]) == 0
     for number in "12":
         assert main(["compete", *words, "--shard", f"{number}/2", "--out", f"part{number}"]) == 0
-    monkeypatch.setattr(antennate.experiments.compete.episodes, "processor", lambda: "another")
+    monkeypatch.setattr(antennate_lab.compete.episodes, "processor", lambda: "another")
     assert main(["study", "merge", "part1", "part2", "--no-figures", "--out", "all"]) == 0
     for name in ("trials.csv", "result.json", "README.md", "config.toml"):
         assert Path("all", name).read_bytes() == Path("whole", name).read_bytes()

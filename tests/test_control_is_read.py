@@ -17,7 +17,6 @@ from antennate.control.registry import (
     unread_by_all,
 )
 from antennate.experiments import load
-from antennate.experiments.gait.config import GaitStudyConfig
 from antennate.experiments.study import run as study
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -27,6 +26,7 @@ from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.view.pace import Tuning
+from antennate_lab.gait.config import GaitStudyConfig
 
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'own_controller.py'}:OwnController"
 LIFTING = {"legs": {"kind": "lifting"}}

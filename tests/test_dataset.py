@@ -18,14 +18,19 @@ from antennate.antenna.sensor import counts
 from antennate.cli import main
 from antennate.control.gait import targets
 from antennate.errors import SimulationError
-from antennate.experiments.dataset import experiment
-from antennate.experiments.dataset import features as looks
-from antennate.experiments.dataset.card import card
-from antennate.experiments.dataset.closed_form import closed_form, contact_places
-from antennate.experiments.dataset.columns import TASKS, Windows, columns_of
-from antennate.experiments.dataset.config import HISTORY, KINDS, SPLITS, DatasetConfig, split_of
-from antennate.experiments.dataset.episodes import Draw, HeadTurn, drawn, gap_windows, setting
-from antennate.experiments.dataset.estimates import (
+from antennate.params.gaits import GaitParams
+from antennate.robots.antenna import AntennaSpec
+from antennate.robots.spec import RobotSpec
+from antennate.sim.scenes.scene import FlatScene
+from antennate.sim.trial import make_world
+from antennate_lab.dataset import experiment
+from antennate_lab.dataset import features as looks
+from antennate_lab.dataset.card import card
+from antennate_lab.dataset.closed_form import closed_form, contact_places
+from antennate_lab.dataset.columns import TASKS, Windows, columns_of
+from antennate_lab.dataset.config import HISTORY, KINDS, SPLITS, DatasetConfig, split_of
+from antennate_lab.dataset.episodes import Draw, HeadTurn, drawn, gap_windows, setting
+from antennate_lab.dataset.estimates import (
     BASELINES,
     LengthErrors,
     by_episode,
@@ -34,13 +39,8 @@ from antennate.experiments.dataset.estimates import (
     polynomial,
     score,
 )
-from antennate.experiments.dataset.experiment import EXPERIMENT, KindSummary, by_kind
-from antennate.experiments.dataset.walk import axis_of, walk_windows
-from antennate.params.gaits import GaitParams
-from antennate.robots.antenna import AntennaSpec
-from antennate.robots.spec import RobotSpec
-from antennate.sim.scenes.scene import FlatScene
-from antennate.sim.trial import make_world
+from antennate_lab.dataset.experiment import EXPERIMENT, KindSummary, by_kind
+from antennate_lab.dataset.walk import axis_of, walk_windows
 
 SMALL: dict[str, Any] = {
     "trials": 10,

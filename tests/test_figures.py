@@ -23,11 +23,6 @@ from antennate.control.registry import BUILT_IN, USUAL, looks
 from antennate.experiments.antenna import figure as antenna
 from antennate.experiments.antenna.config import AntennaConfig
 from antennate.experiments.antenna.experiment import run as run_antenna
-from antennate.experiments.compete import figure as compete
-from antennate.experiments.compete.episodes import EpisodeRow
-from antennate.experiments.gait import figure as gait
-from antennate.experiments.gait.physics import Pace
-from antennate.experiments.gait.result import CostOfPhase, GaitResult, PhasePoint, WaveOff
 from antennate.experiments.tunnel import figure as tunnel
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.lockstep import SHOWN_TRIALS
@@ -37,6 +32,11 @@ from antennate.experiments.wall.physics import Traverse
 from antennate.robots.spec import RobotSpec
 from antennate.robots.wiring import wiring
 from antennate.types import Maneuver
+from antennate_lab.compete import figure as compete
+from antennate_lab.compete.episodes import EpisodeRow
+from antennate_lab.gait import figure as gait
+from antennate_lab.gait.physics import Pace
+from antennate_lab.gait.result import CostOfPhase, GaitResult, PhasePoint, WaveOff
 
 ROOT = Path(__file__).parent.parent
 LETTERS = {"tunnel.png": 8.0}

@@ -15,8 +15,8 @@ from tracked import NAMES, POINTS, animal, classified, dwelling, write
 
 import antennate
 from antennate.cli import main
-from antennate.experiments.tracks.config import ColumnsParams
-from antennate.experiments.tracks.readers import read
+from antennate_lab.tracks.config import ColumnsParams
+from antennate_lab.tracks.readers import read
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 BEES = DATA / "antenna_bee_swarmsight"

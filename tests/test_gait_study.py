@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from antennate.experiments.gait import experiment as study
-from antennate.experiments.gait.physics import Walk, measure, rolling_speed
-from antennate.experiments.gait.result import summarise
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Maneuver
+from antennate_lab.gait import experiment as study
+from antennate_lab.gait.physics import Walk, measure, rolling_speed
+from antennate_lab.gait.result import summarise
 
 SHORT = study.GaitStudyConfig(cycles=2, settling_cycles=1, sweep_points=2)
 

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from antennate.cli import main
-from antennate.experiments.gait.optimise import optimise
-from antennate.experiments.gait.physics import rolling_speed
-from antennate.experiments.geometry import experiment
-from antennate.experiments.geometry.figure import leads
-from antennate.experiments.geometry.physics import (
+from antennate.params.gaits import GAITS, GaitParams
+from antennate.robots.mechanics import cycles, peaks, wave_of
+from antennate.robots.spec import RobotSpec
+from antennate_lab.gait.optimise import optimise
+from antennate_lab.gait.physics import rolling_speed
+from antennate_lab.geometry import experiment
+from antennate_lab.geometry.figure import leads
+from antennate_lab.geometry.physics import (
     LARGEST_OFFSET,
     LEAST_AMPLITUDE,
     GeometryConfig,
     random_waves,
     walk,
 )
-from antennate.experiments.geometry.result import BestLead, Walked
-from antennate.experiments.geometry.torus import Torus
-from antennate.params.gaits import GAITS, GaitParams
-from antennate.robots.mechanics import cycles, peaks, wave_of
-from antennate.robots.spec import RobotSpec
+from antennate_lab.geometry.result import BestLead, Walked
+from antennate_lab.geometry.torus import Torus
 from geometric_locomotion.twist import Wave
 
 LEADS = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3)

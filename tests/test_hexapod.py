@@ -19,11 +19,6 @@ from antennate.cli.terminal import OK
 from antennate.control.gait import targets
 from antennate.control.registry import CONTROLLERS
 from antennate.errors import ConfigError
-from antennate.experiments.gait import experiment as study
-from antennate.experiments.gait import figure
-from antennate.experiments.gait.config import Unknown, drawn
-from antennate.experiments.gait.physics import measure
-from antennate.experiments.gait.result import UnknownNumber, UnknownNumbers
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.parts import bill
@@ -31,6 +26,11 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.testing import check_robot
 from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
+from antennate_lab.gait import experiment as study
+from antennate_lab.gait import figure
+from antennate_lab.gait.config import Unknown, drawn
+from antennate_lab.gait.physics import measure
+from antennate_lab.gait.result import UnknownNumber, UnknownNumbers
 
 ROBOT = RobotSpec.named("hexapod")
 CONFIG = Path(__file__).parent.parent / "examples" / "hexapod.toml"

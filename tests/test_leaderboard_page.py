@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from antennate.experiments.compete.config import DEVELOPMENT, SCENES_OF_BOARD
-from antennate.experiments.compete.episodes import EpisodeRow
 from antennate.studies.formats import to_csv
+from antennate_lab.compete.config import DEVELOPMENT, SCENES_OF_BOARD
+from antennate_lab.compete.episodes import EpisodeRow
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -14,7 +14,6 @@ from antennate.cli import main
 from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.gait import Gait
 from antennate.control.registry import BUILT_IN, CONTROLLERS, make_controller
-from antennate.experiments.gait.experiment import GaitStudyConfig, walk_flat
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import ControlParams, GaitParams
 from antennate.params.scene import PhysicsParams
@@ -24,6 +23,7 @@ from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import make_world, place_at_start
 from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
+from antennate_lab.gait.experiment import GaitStudyConfig, walk_flat
 
 NODDING = RobotSpec.model_validate({"pitch": {"kind": "actuated"}})
 LIFTING = RobotSpec.model_validate({"links": 3, "legs": {"kind": "lifting"}})

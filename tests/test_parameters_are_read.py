@@ -19,7 +19,7 @@ from antennate import experiments
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
-from antennate.experiments.reproduce import experiment as reproduce
+from antennate_lab.reproduce import experiment as reproduce
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
     f"{0.01 * i:.2f},{1600 + 60 * np.log((k + 1) / (20 - k)):.0f},{k / 19},{trial},0.1\n"

@@ -29,9 +29,6 @@ from antennate.control.policy.writer import add_contract, write_policy
 from antennate.control.readers import UNREAD_BY_POLICIES
 from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError, OutputError
-from antennate.experiments.compete.episodes import Draw, run_episodes
-from antennate.experiments.compete.page import sentence
-from antennate.experiments.compete.standings import standing
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.hardware.config import DriveConfig
@@ -43,6 +40,9 @@ from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
 from antennate.twin.config import TwinConfig, watched
 from antennate.types import AntennaFrame, Maneuver, State
+from antennate_lab.compete.episodes import Draw, run_episodes
+from antennate_lab.compete.page import sentence
+from antennate_lab.compete.standings import standing
 
 MODES = ("maneuver", "gait", "joints")
 

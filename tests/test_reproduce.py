@@ -21,18 +21,18 @@ from antennate.cli import main
 from antennate.cli.experiment import parsed
 from antennate.control.registry import RIVAL
 from antennate.experiments import fitted
-from antennate.experiments.reproduce import experiment as reproduce
-from antennate.experiments.reproduce.experiment import (
+from antennate.messages import command_words
+from antennate.studies.columns import Ends
+from antennate_lab.reproduce import experiment as reproduce
+from antennate_lab.reproduce.experiment import (
     CLAIMS,
     EXPERIMENT,
     ReproduceConfig,
     ReproduceOutcome,
     ReproduceResult,
 )
-from antennate.experiments.reproduce.figure import draw
-from antennate.experiments.reproduce.verdict import VERDICTS, Finding, Row, all_of, difference
-from antennate.messages import command_words
-from antennate.studies.columns import Ends
+from antennate_lab.reproduce.figure import draw
+from antennate_lab.reproduce.verdict import VERDICTS, Finding, Row, all_of, difference
 
 BY_NAME = {claim.name: claim for claim in CLAIMS}
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from antennate.experiments.reproduce.experiment import CLAIMS, ReproduceConfig, configured
 from antennate.experiments.wall.experiment import Border, Pair, Passed, ProfileSummary, WallResult
 from antennate.studies.columns import content
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.statistics import Discordance
+from antennate_lab.reproduce.experiment import CLAIMS, ReproduceConfig, configured
 
 pytestmark = pytest.mark.ci
 
@@ -29,7 +29,7 @@ def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
 
 WALL_ALONE = """\
 import runpy, sys
-from antennate.experiments.reproduce import experiment
+from antennate_lab.reproduce import experiment
 every = experiment.fitted()
 experiment.fitted = lambda: {"wall": every["wall"]}
 sys.path.insert(0, sys.argv[1].removesuffix("reproduce.py"))

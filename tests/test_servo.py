@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from servo_recordings import RATE, found_of, of_twin, written
 
-from antennate.experiments.servo.experiment import sentence
 from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, ServosParams, XL330Params, replay
 from antennate.types import Floats
+from antennate_lab.servo.experiment import sentence
 
 REAL = Path(__file__).parents[2] / "shared/data/servo_xl330_bam/raw"
 GRAVITY_TORQUE = 0.4

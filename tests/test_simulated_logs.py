@@ -24,7 +24,6 @@ from log_ticks import HEADER, tick
 import antennate
 from antennate.cli import main
 from antennate.errors import AntennateError, LogError
-from antennate.experiments.gait.experiment import GaitStudyConfig, run
 from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.params.control import GaitParams
@@ -40,6 +39,7 @@ from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.telemetry.twin_log import LogQueue
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
+from antennate_lab.gait.experiment import GaitStudyConfig, run
 from dynamixel_bus import packets
 
 TICKS = 60

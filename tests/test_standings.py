@@ -13,15 +13,6 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, wilcoxon
 
-from antennate.experiments.compete.checking import read_rows
-from antennate.experiments.compete.comparison import compared
-from antennate.experiments.compete.config import CompeteConfig
-from antennate.experiments.compete.episodes import EpisodeRow
-from antennate.experiments.compete.experiment import summarise
-from antennate.experiments.compete.figure import drawn
-from antennate.experiments.compete.page import apart, markdown, ordered, readme, sentence, tables
-from antennate.experiments.compete.result import CompeteResult, Standing
-from antennate.experiments.compete.standings import profiles, standing
 from antennate.studies.columns import content, typed
 from antennate.studies.formats import to_json
 from antennate.studies.statistics import (
@@ -31,6 +22,15 @@ from antennate.studies.statistics import (
     wilson95,
     wilson95_by_draw,
 )
+from antennate_lab.compete.checking import read_rows
+from antennate_lab.compete.comparison import compared
+from antennate_lab.compete.config import CompeteConfig
+from antennate_lab.compete.episodes import EpisodeRow
+from antennate_lab.compete.experiment import summarise
+from antennate_lab.compete.figure import drawn
+from antennate_lab.compete.page import apart, markdown, ordered, readme, sentence, tables
+from antennate_lab.compete.result import CompeteResult, Standing
+from antennate_lab.compete.standings import profiles, standing
 
 LIMIT = 100.0
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from antennate.experiments.swimmers import swimmer_figure
 from antennate.figures import render
+from antennate_lab.swimmers import swimmer_figure
 from geometric_locomotion.chain import purcell
 from geometric_locomotion.maps import curvature_map
 

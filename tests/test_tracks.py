@@ -20,10 +20,10 @@ from antennate.cli import main
 from antennate.experiments.sweep import experiment as sweep
 from antennate.experiments.sweep.experiment import EXPERIMENT
 from antennate.experiments.sweep.physics import SweepConfig
-from antennate.experiments.tracks.config import TrackWallParams
-from antennate.experiments.tracks.experiment import EXPERIMENT as TRACKS
-from antennate.experiments.tracks.measures import wall_of
 from antennate.params.scene import BenchPhysicsParams
+from antennate_lab.tracks.config import TrackWallParams
+from antennate_lab.tracks.experiment import EXPERIMENT as TRACKS
+from antennate_lab.tracks.measures import wall_of
 
 ERRORS = (
     Path(__file__).parents[2]

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wilcoxon
 
-from antennate.experiments.compete.checking import read_rows
 from antennate.sim.scenes.scene import TIME_LIMIT
 from antennate.studies.statistics import difference95, holm, mcnemar, signed_rank
+from antennate_lab.compete.checking import read_rows
 
 ROWS, SEED = Path(__file__).with_suffix(".csv"), "67957488"
 STUDENT = "taught"

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.experiments.swimmers import swimmer_figure
 from antennate.figures import render
 from antennate.types import Floats
+from antennate_lab.swimmers import swimmer_figure
 from geometric_locomotion.chain import PlanarChain, purcell
 from geometric_locomotion.coordinates import minimum_perturbation, square
 from geometric_locomotion.curvature import corrected_integral, velocity_integral

@@ -91,11 +91,11 @@ def former(words: Sequence[str]) -> str:
     return ""
 
 
-def extra(name: str) -> str:
-    """How to get an extra of this package; it follows words such as `install it with`."""
+def extra(name: str, package: str = "antennate") -> str:
+    """How to get an extra of a package of ours; it follows words such as `install it with`."""
     return (
         f"`uv run --extra {name} antennate ...` in a clone, or, with the clone as ./antennate, by "
-        f"`pip install ./antennate/packages/* './antennate/packages/antennate[{name}]'`"
+        f"`pip install ./antennate/packages/* './antennate/packages/{package}[{name}]'`"
     )
 
 

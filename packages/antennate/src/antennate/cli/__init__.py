@@ -61,6 +61,8 @@ _EXPERIMENTS = (
     *("study", "dataset", "reproduce", "tracks", "servo"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
+_OF_LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo")
+"""Commands of the distribution `antennate-lab`."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}
 
 
@@ -219,6 +221,8 @@ def _unknown(group: str, word: str) -> str:
 
     if command_words(word) != word:
         return f"{word} is `{typed(word)}` now"
+    if word in _OF_LABORATORY:
+        return f"{word}: expected the package antennate-lab, which has this command, found none"
     known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"
     return f"expected a command{choices}, found {shortened(word)}"

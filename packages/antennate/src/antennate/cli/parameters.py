@@ -60,20 +60,20 @@ def _groups(module: ModuleType) -> list[type[Params]]:
 
 def _commands() -> list[type[Params]]:
     """Classes that hold the top level of a command's parameters."""
-    ours = sorted(name for name in experiments.names() if experiments.is_ours(name))
-    found = [group for name in ours for group in _nested(experiments.load(name).config)]
+    known = map(experiments.load, sorted(experiments.names()))
+    found = [group for each in known for group in _nested(each.config, experiments.home(each))]
     found += _HARDWARE
     found += [group for name in _OTHERS for group in _groups(importlib.import_module(name))]
     return list(dict.fromkeys(found))
 
 
-def _nested(config: type[Params]) -> list[type[Params]]:
-    """A configuration and the groups in it that belong to an experiment alone."""
-    found = [config] if "experiments" in config.__module__ else []
+def _nested(config: type[Params], package: str) -> list[type[Params]]:
+    """A configuration and the groups in it that belong to the package of an experiment."""
+    found = [config]
     for field in config.model_fields.values():
         default = field.get_default(call_default_factory=True)
-        if isinstance(default, Params) and "experiments" in type(default).__module__:
-            found += _nested(type(default))
+        if isinstance(default, Params) and type(default).__module__.startswith(f"{package}."):
+            found += _nested(type(default), package)
     return found
 
 

@@ -1,7 +1,8 @@
 """The experiments. Every folder here is one; other packages add theirs by an entry point.
 
 A folder holds a module `experiment` with an object `EXPERIMENT`; the first line of its docstring is
-the summary. An entry point in the group `antennate.experiments` names such an object.
+the summary. An entry point in the group `antennate.experiments` names such an object; its summary
+is found in the same place, so that a list of commands loads no experiment.
 """
 
 from __future__ import annotations
@@ -31,6 +32,11 @@ def is_ours(name: str) -> bool:
     return name in _folders()
 
 
+def home(experiment: Experiment[Any, Any]) -> str:
+    """Package whose modules belong to an experiment alone."""
+    return experiment.config.__module__.rpartition(".")[0]
+
+
 def names() -> list[str]:
     """Names of all experiments, ours first."""
     return list(dict.fromkeys([*_folders(), *_entries()]))
@@ -38,20 +44,18 @@ def names() -> list[str]:
 
 def fitted() -> dict[str, Path]:
     """Files of numbers that the paper does not give, fitted to it, by name of the experiment."""
-    files = Path(__file__).parent.glob(f"reproduce/{FITTED}/*.toml")
+    files = Path(__file__).parent.glob(f"{FITTED}/*.toml")
     return {file.stem: file for file in sorted(files)}
 
 
 def summaries() -> dict[str, str]:
     """Name and summary of every experiment; ours are not loaded for it."""
-    texts = {}
-    for name in _folders():
-        text = importlib.import_module(f"{__name__}.{name}").__doc__ or ""
-        texts[name] = text.splitlines()[0].rstrip(".")
-    for name in names():
+    texts = {name: _first_line(f"{__name__}.{name}") for name in _folders()}
+    for name, entry in _entries().items():
         if name not in texts:
             try:
-                texts[name] = load(name).description.strip().partition(".")[0]
+                place, _, last = entry.module.rpartition(".")
+                texts[name] = (last == "experiment" and _first_line(place)) or _described(name)
             except BadInputError as error:
                 texts[name] = f"({error})"
     return texts
@@ -77,6 +81,19 @@ def unknown(name: str) -> str:
     known = names()
     hint = nearest(name, known)
     return f"expected an experiment{hint}, one of {', '.join(known)}, found {shortened(name)}"
+
+
+def _first_line(package: str) -> str:
+    """What the docstring of a package begins with; empty where it cannot be imported."""
+    try:
+        text = importlib.import_module(package).__doc__ or ""
+    except (Exception, SystemExit):  # what is wrong is said where the experiment is loaded
+        return ""
+    return text.partition("\n")[0].rstrip(".")
+
+
+def _described(name: str) -> str:
+    return load(name).description.strip().partition(".")[0]
 
 
 @functools.cache
