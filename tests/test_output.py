@@ -207,11 +207,13 @@ def test_a_policy_is_called_by_folder_or_file_and_a_long_name_is_cut_in_the_midd
 def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     """docs/install.md says how extras are installed: the package is on no index."""
     pages = (ROOT / "docs" / "install.md").read_text()
-    own, all_rooms = (
+    own, laboratory, together = (
         tomllib.loads((folder / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-        for folder in (ROOT / "packages" / "antennate", ROOT)
+        for folder in (ROOT / "packages" / "antennate", ROOT / "packages" / "antennate-lab", ROOT)
     )
-    assert [*own] == [*all_rooms]
+    assert together == {name: [f"antennate[{name}]"] for name in own} | {
+        name: [f"antennate-lab[{name}]"] for name in laboratory
+    }
     named = set()
     for file in sorted((ROOT / "packages" / "antennate" / "src").rglob("*.py")):
         text = file.read_text()

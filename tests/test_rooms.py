@@ -14,17 +14,21 @@ from pathlib import Path
 import pytest
 
 import antennate
+import antennate_lab
 import dynamixel_bus
 import geometric_locomotion
 
 ROOT = Path(__file__).parents[1]
-OWN = ROOT / "packages" / "antennate"
-"""Folder of `antennate` itself."""
 ROOMS = {
     "dynamixel-bus": {"numpy"},
     "geometric-locomotion": {"numpy", "scipy"},
 }
-"""Distributions in the folder `packages`, and all that is in an environment with one of them."""
+"""Distributions that need none of ours, and all that is in an environment with one of them."""
+UPPER = {
+    "antennate": {*ROOMS},
+    "antennate-lab": {*ROOMS, "antennate"},
+}
+"""Distributions that need others of ours, and those."""
 EXAMPLE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FOLDERS = (
     ".ci",
@@ -33,15 +37,14 @@ FOLDERS = (
     "entries",
     "examples",
     "packages",
-    "src",
     "studies",
     "tests",
 )
 SUFFIXES = {"", ".ipynb", ".md", ".py", ".sh", ".toml"}
 """Where something may tell how to install."""
 PIP = re.compile(r"(?<!uv )pip install ([^\n`#]*)")
-OWN_FOLDER = re.compile(r"(^|\s)['\"]?\.(/antennate)?(['\"\s\[]|$)")
-"""A word for the folder of `antennate`, perhaps with extras."""
+OWN_FOLDER = re.compile(r"(^|\s)['\"]?\.(/antennate)?(/packages/antennate\S*)?(['\"\s\[]|$)")
+"""A word for the repository or the folder of a distribution in UPPER, perhaps with extras."""
 SDK = """
 import json, subprocess, sys
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler, port_handler
@@ -105,13 +108,19 @@ def packages_of(uv: str, programs: Path) -> set[str]:
 def test_all_have_one_version() -> None:
     """The version of `antennate` is that of the others, which it asks for."""
     version = antennate.__version__
+    assert antennate_lab.__version__ == version
     assert dynamixel_bus.__version__ == geometric_locomotion.__version__ == version
-    needed = tomllib.loads((OWN / "pyproject.toml").read_text())["project"]["dependencies"]
-    assert {f"{room}=={version}" for room in ROOMS} <= set(needed)
-    assert {path.name for path in (ROOT / "packages").iterdir()} == {*ROOMS, "antennate"}
+    assert {path.name for path in (ROOT / "packages").iterdir()} == {*ROOMS, *UPPER}
 
 
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", UPPER)
+def test_one_asks_for_the_others_that_it_needs_in_that_version(room: str) -> None:
+    project = tomllib.loads((ROOT / "packages" / room / "pyproject.toml").read_text())["project"]
+    needed = {need for need in project["dependencies"] if "==" in need}
+    assert needed == {f"{other}=={antennate.__version__}" for other in UPPER[room]}
+
+
+@pytest.mark.parametrize("room", [*ROOMS, *UPPER])
 def test_a_readme_says_in_ten_lines_what_it_is(room: str) -> None:
     text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
     assert text.startswith(f"# {room}\n")
@@ -119,7 +128,7 @@ def test_a_readme_says_in_ten_lines_what_it_is(room: str) -> None:
     assert len([line for line in head[1:] if line]) <= 10
 
 
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", [*ROOMS, *UPPER])
 def test_a_readme_has_no_link_into_the_repository(room: str) -> None:
     """A package index shows the page without the repository around it."""
     text = (ROOT / "packages" / room / "README.md").read_text(encoding="utf-8")
@@ -160,17 +169,23 @@ def test_one_alone_runs_its_first_example(room: str, kind: str, uv: str, tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["whl", "tar.gz"])
-def test_antennate_runs_its_first_example_beside_the_others(
-    kind: str, uv: str, tmp_path: Path
+@pytest.mark.parametrize(("room", "expected"), [("antennate", "success"), ("antennate-lab", "m/s")])
+def test_one_runs_its_first_example_beside_those_that_it_needs(
+    room: str, expected: str, kind: str, uv: str, tmp_path: Path
 ) -> None:
-    built = tmp_path / "built"
-    done(uv, "build", "--wheel" if kind == "whl" else "--sdist", OWN, "--out-dir", built)
-    (file,) = built.glob(f"antennate-*.{kind}")
-    others = [ROOT / "packages" / room for room in ROOMS]
+    built, folder = tmp_path / "built", ROOT / "packages" / room
+    done(uv, "build", "--wheel" if kind == "whl" else "--sdist", folder, "--out-dir", built)
+    (file,) = built.glob(f"{room.replace('-', '_')}-*.{kind}")
+    others = [ROOT / "packages" / other for other in UPPER[room]]
     programs = environment(uv, tmp_path / "alone", file, *others)
     script = tmp_path / "example.py"
-    script.write_text(EXAMPLE.findall((OWN / "README.md").read_text())[0])
-    assert "success" in done(programs / "python", script, folder=tmp_path)
+    script.write_text(first_example(room))
+    assert expected in done(programs / "python", script, folder=tmp_path)
+    if room == "antennate":
+        words = [programs / "antennate", "compete", "--help"]
+        refused = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert (refused.returncode, refused.stdout) == (2, "")
+        assert "compete: expected the package antennate-lab" in refused.stderr
 
 
 @pytest.mark.slow

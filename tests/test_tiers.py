@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[1]
 TESTS = """\
 import multiprocessing, os, subprocess, sys
 import pytest
@@ -58,7 +58,7 @@ def test_slow():
 
 @pytest.mark.ci
 def test_a_process_in_a_test_of_every_run_is_refused_unless_it_is_marked(tmp_path: Path) -> None:
-    shutil.copy(HERE / "conftest.py", tmp_path)
+    shutil.copy(ROOT / "conftest.py", tmp_path)
     (tmp_path / "test_them.py").write_text(TESTS)
     words = [
         "-n",
@@ -68,7 +68,7 @@ def test_a_process_in_a_test_of_every_run_is_refused_unless_it_is_marked(tmp_pat
         "-m",
         "",
         "-c",
-        str(HERE.parent / "pyproject.toml"),
+        str(ROOT / "pyproject.toml"),
     ]
     words += ["--rootdir", str(tmp_path), "test_them.py"]
     done = subprocess.run(

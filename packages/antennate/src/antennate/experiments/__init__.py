@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,10 +86,9 @@ def unknown(name: str) -> str:
 
 def _first_line(package: str) -> str:
     """What the docstring of a package begins with; empty where it cannot be imported."""
-    try:
+    text = ""
+    with suppress(Exception, SystemExit):  # what is wrong is said where the experiment is loaded
         text = importlib.import_module(package).__doc__ or ""
-    except (Exception, SystemExit):  # what is wrong is said where the experiment is loaded
-        return ""
     return text.partition("\n")[0].rstrip(".")
 
 

@@ -18,7 +18,7 @@ from antennate.cli import main
 from antennate_lab.tracks.config import ColumnsParams
 from antennate_lab.tracks.readers import read
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 BEES = DATA / "antenna_bee_swarmsight"
 here = pytest.mark.skipif(not BEES.exists(), reason="recordings are not here")
 HAND = {

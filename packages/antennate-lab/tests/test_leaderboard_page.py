@@ -15,7 +15,7 @@ from antennate.studies.formats import to_csv
 from antennate_lab.compete.config import DEVELOPMENT, SCENES_OF_BOARD
 from antennate_lab.compete.episodes import EpisodeRow
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:

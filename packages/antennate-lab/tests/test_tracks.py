@@ -26,7 +26,7 @@ from antennate_lab.tracks.experiment import EXPERIMENT as TRACKS
 from antennate_lab.tracks.measures import wall_of
 
 ERRORS = (
-    Path(__file__).parents[2]
+    Path(__file__).parents[4]
     / "shared/data/antenna_ant_labels_metrics/derived/harpegnathos_node_error_px.csv"
 )
 

@@ -17,7 +17,7 @@ from antennate.robots.servos import MODEL_NUMBERS, STEP, Course, ServosParams, X
 from antennate.types import Floats
 from antennate_lab.servo.experiment import sentence
 
-REAL = Path(__file__).parents[2] / "shared/data/servo_xl330_bam/raw"
+REAL = Path(__file__).parents[4] / "shared/data/servo_xl330_bam/raw"
 GRAVITY_TORQUE = 0.4
 LOAD = 0.005
 HELD = {"friction": 0.0, "load_friction": 0.0}

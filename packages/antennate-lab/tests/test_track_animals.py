@@ -14,7 +14,7 @@ from tracked import NAMES, POINTS, animal, classified, dwelling, write
 from antennate.cli import main
 
 GIVEN = (
-    Path(__file__).parents[2] / "shared" / "data" / "inputs_turn4" / "three_animals_no_track.csv"
+    Path(__file__).parents[4] / "shared" / "data" / "inputs_turn4" / "three_animals_no_track.csv"
 )
 FRAMES = 40
 FLAGS = [

@@ -186,7 +186,7 @@ def test_the_mean_of_draws_of_several_values_has_the_interval_of_draws() -> None
 
 def test_times_of_the_board_are_ranked_as_fractions_have_them() -> None:
     """Means of the shares of each draw, in exact fractions, and of these SciPy's Pratt."""
-    rows = read_rows(Path(__file__).parents[1] / "docs" / "leaderboard.csv")
+    rows = read_rows(Path(__file__).parents[3] / "docs" / "leaderboard.csv")
     names = ("follow", "centre")
     draws: dict[tuple[int, int], dict[str, list[Fraction]]] = {}
     for row in (row for row in rows if row.controller in names):

@@ -19,7 +19,7 @@ from antennate_lab.reproduce.experiment import CLAIMS, ReproduceConfig, configur
 
 pytestmark = pytest.mark.ci
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:

@@ -15,7 +15,7 @@ import antennate
 from antennate.robots.servos import ServosParams, XL330Params
 from antennate.telemetry.reader import LogReader
 
-PAGE = Path(__file__).parents[1] / "docs/science/servo.md"
+PAGE = Path(__file__).parents[3] / "docs/science/servo.md"
 JOINT = "antenna_l_base"
 PERIOD = 0.01
 TICK = 2 * math.pi / 4096

@@ -667,7 +667,7 @@ def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     assert main(["compete", *words, "--out", "whole"]) == 0
     for number in "12":
         assert main(["compete", *words, "--shard", f"{number}/2", "--out", f"part{number}"]) == 0
-    monkeypatch.setattr(antennate_lab.compete.episodes, "processor", lambda: "another")
+    monkeypatch.setattr("antennate_lab.compete.episodes.processor", lambda: "another")
     assert main(["study", "merge", "part1", "part2", "--no-figures", "--out", "all"]) == 0
     for name in ("trials.csv", "result.json", "README.md", "config.toml"):
         assert Path("all", name).read_bytes() == Path("whole", name).read_bytes()
@@ -799,7 +799,7 @@ def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> N
 
 @pytest.mark.ci
 def test_a_rival_at_1_hz_walks_as_by_the_parameter() -> None:
-    file = Path(__file__).parents[1] / "docs" / "science" / "one_hertz.py"
+    file = Path(__file__).parents[3] / "docs" / "science" / "one_hertz.py"
     (row,) = episodes(f"{file}:geometric", scene="uturn+time_limit=6")
     settings: dict[str, Any] = {"controllers": ["geometric"], "scene": "uturn", "trials": 1}
     settings |= {"control": {"gait": {"frequency": 1.0}}, "time_limit": 6.0}

@@ -16,7 +16,7 @@ import antennate
 from antennate.cli import main
 
 h5py = pytest.importorskip("h5py")
-DATA = Path(__file__).parents[2] / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 LOCUSTS = DATA / "antenna_locust_arena_trex"
 BEES = DATA / "antenna_bee_swarmsight" / "derived" / "reencoded"
 MOSQUITO = DATA / "pose_dlc_h5_mosquito" / "raw"
@@ -359,4 +359,4 @@ def test_without_h5py_the_extra_is_named(
     path = sleap(tmp_path / "a.h5", animal(dwelling(10, 20)))
     monkeypatch.setitem(sys.modules, "h5py", None)
     err = message(capsys, "--files", path, "--rate", 100, *FLAGS)
-    assert "pip install ./antennate/packages/* './antennate/packages/antennate[tracks]'" in err
+    assert "./antennate/packages/* './antennate/packages/antennate-lab[tracks]'" in err

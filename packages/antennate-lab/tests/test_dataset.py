@@ -300,7 +300,7 @@ def test_the_network_of_the_examples_learns_from_it(outcome: Any, tmp_path: Path
     data = EXPERIMENT.files(outcome.config)["push.parquet"](outcome)
     assert isinstance(data, bytes)
     (tmp_path / "push.parquet").write_bytes(data)
-    path = Path(__file__).parents[1] / "examples" / "touch_network.py"
+    path = Path(__file__).parents[3] / "examples" / "touch_network.py"
     words = [sys.executable, "-W", "error", str(path), str(tmp_path), "place"]
     done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=300)
     lines = [line.split() for line in done.stdout.splitlines()]

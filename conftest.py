@@ -157,19 +157,19 @@ def _the_engine_leaves_no_log() -> Iterator[None]:
 
 
 OPTIONAL = {
-    "test_design.py": "optuna",
-    "test_design_measures.py": "optuna",
-    "test_design_resume.py": "optuna",
-    "test_envs.py": "gymnasium",
-    "test_foxglove.py": "foxglove",
-    "test_pages.py": "websockets",
-    "test_policies.py": "onnx",
-    "test_training.py": "gymnasium",
-    "test_view.py": "viser",
-    "test_view_charts.py": "viser",
-    "test_view_end.py": "viser",
-    "test_view_gate.py": "viser",
-    "test_view_program.py": "viser",
+    "tests/test_design.py": "optuna",
+    "tests/test_design_measures.py": "optuna",
+    "tests/test_design_resume.py": "optuna",
+    "tests/test_envs.py": "gymnasium",
+    "tests/test_foxglove.py": "foxglove",
+    "tests/test_pages.py": "websockets",
+    "tests/test_policies.py": "onnx",
+    "tests/test_training.py": "gymnasium",
+    "tests/test_view.py": "viser",
+    "tests/test_view_charts.py": "viser",
+    "tests/test_view_end.py": "viser",
+    "tests/test_view_gate.py": "viser",
+    "tests/test_view_program.py": "viser",
 }
 """What tests of optional parts need: `uv run --group optional pytest` installs it."""
 collect_ignore = [name for name, package in OPTIONAL.items() if find_spec(package) is None]
