@@ -274,7 +274,10 @@ def test_one_copy_of_the_frame_code_and_the_docs_say_where() -> None:
     copies = [path for path in FIRMWARE.glob("*.py") if "COBS" in path.read_text()]
     assert copies == []
     page = (ROOT / "docs" / "firmware.md").read_text()
-    assert "cp packages/antennate/src/antennate/hardware/esp32/frame.py :antenna_frame.py" in page
+    assert (
+        "cp \\\n    packages/antennate/src/antennate/hardware/esp32/frame.py :antenna_frame.py"
+        in page
+    )
 
 
 def on_micropython(folder: Path, script: str) -> bytes:
