@@ -126,7 +126,7 @@ the [contract](#policy-files) of a policy.
 {interface}
 
 Further arguments: `control`, `robot`, `variation`, `tunnel`, `corridors` and `physics`, as of
-`antennate tunnel` ([parameters](parameters.md)), each an object of ours or a table, not a name
+`antennate tunnel` (`antennate parameters`), each an object of ours or a table, not a name
 (`robot=RobotSpec.named(...)`), and `readings`: `own`, `none` or `swapped`. Nothing is drawn: films
 are made by `tunnel --controllers FILE.onnx --video`. After its first reset an
 environment can be neither copied nor pickled, and one line says so: make another by `gym.make`, and

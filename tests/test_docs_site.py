@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 import time
 import tomllib
 from collections.abc import Iterator
@@ -19,6 +21,7 @@ from antennate.cli import commands
 TUTORIALS = ("controllers.md", "first-tunnel.md", "log.md", "robots.md", "studies.md")
 """Pages whose commands run as they stand, but for those in real time before a twin."""
 SCENES = "scenes.md"
+_LINK = re.compile(r"\]\(([^)\s#]+)")
 WIDEST = 96
 """Letters of code in a line on a screen of 1280 pixels."""
 
@@ -112,6 +115,30 @@ def test_every_page_has_its_own_name_in_the_navigation_or_is_linked_from_the_ref
     reference = re.findall(r"\]\((\S+\.md)\)", (DOCS / "reference.md").read_text())
     assert {*dict(menu), *reference} == {*titles}
     assert dict(menu) == {page: titles[page] for page in dict(menu)}
+
+
+@pytest.mark.ci
+def test_a_page_in_git_links_only_to_files_in_git() -> None:
+    """Pages that docs/pages.py makes are missing where the repository is read."""
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=DOCS.parent, check=True, capture_output=True, text=True
+    )
+    files = listed.stdout.splitlines()
+    known = {*files, *(str(folder) for file in files for folder in Path(file).parents)}
+    links = [
+        (page, link)
+        for page in files
+        if page.endswith(".md")
+        for link in _LINK.findall((DOCS.parent / page).read_text(encoding="utf-8"))
+        if not re.match(r"\w+:", link)
+    ]
+    assert len(links) > 100
+    dead = [
+        (page, link)
+        for page, link in links
+        if os.path.normpath(Path(page).parent / link) not in known
+    ]
+    assert dead == []
 
 
 @pytest.mark.ci
