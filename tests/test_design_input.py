@@ -26,6 +26,9 @@ FORCE; maximize = ["force_mean_n"]; GOOD :: force_mean_n: expected an objective 
 settings.antenna.friction = 0.4; FORCE; GOOD :: settings.antenna.friction: expected a parameter that does not vary
 FORCE; response = "force_mean_n"; GOOD :: response: expected plan other than optuna beside it, found optuna
 seeds = 1; FORCE; GOOD :: seeds
+proposals = 8; FORCE; GOOD :: bad.toml: proposals: expected a known key (did you mean points?), found 'proposals'
+FORCE; GOOD; [search]; wall.overlap = [0.1] :: search: expected a known key (did you mean vary?), found 'search'
+GOOD; [evaluate.wall]; FORCE :: evaluate: expected a known key (did you mean experiment or trials or settings or maximize or minimize?)
 FORCE; [vary]; wall.gravity = ['down', 'sideways'] :: found 'sideways'
 """
 """Lines of a file, and what is said of it."""

@@ -107,8 +107,11 @@ def shown(value: Any) -> str:
 _RENAMED = {
     "arms": ("controllers", "profiles"),
     **dict.fromkeys(_OF_ANTENNA, ("antenna",)),
+    "proposals": ("points",),
+    "search": ("vary",),
+    "evaluate": ("experiment", "trials", "settings", "maximize", "minimize"),
 }
-"""New names of what had another one in version 1."""
+"""New names of what had another one in an earlier version."""
 _GONE = ("solver",)
 """Parameters that are no more; all is done as with their defaults."""
 
