@@ -42,13 +42,14 @@ _MANY = 3
 def options(page: Command) -> dict[str, str]:
     """Options on a command's first level, and the row of each."""
     top = [option for option in page.parameters if len(option.path) == 1]
-    others = sorted(page.others, key=lambda option: not option.positional)
-    return {option.free or option.offered: line(option) for option in [*others, *top]}
+    every = sorted([*page.others, *top], key=lambda option: not option.positional)
+    return {option.free or option.offered: line(option) for option in every}
 
 
 def section(page: Command, shared: set[str], before: Sequence[Command]) -> Iterator[str]:
     """The lines of one command; rows that are shared are named alone."""
-    free = "".join(f" {option.usage}" for option in page.others if option.free)
+    every = [*page.others, *page.parameters]
+    free = "".join(f" {option.usage}" for option in every if option.free)
     name = command_words(page.name)
     yield f"## `antennate {name}`"
     yield page.description

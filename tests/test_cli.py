@@ -119,7 +119,7 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
 
 
 @pytest.mark.parametrize(
-    ("command", "words"), [("antenna", "[FILE]"), ("robot", "[FOLDER]"), ("study", "FILE")]
+    ("command", "words"), [("antenna", "[FILE]"), ("robot", "[NAME|FILE]"), ("study", "FILE")]
 )
 def test_the_usage_has_what_may_be_left_out_in_brackets(capsys, command, words):
     assert main([command, "--help"]) == 0
@@ -217,10 +217,10 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
         assert not {*_HEAVY, *unneeded} & set(loaded), said
 
 
-@pytest.mark.parametrize("words", ["one --out two", "--out two one"])
-def test_a_folder_given_in_two_ways_is_refused(words: str, capsys) -> None:
+@pytest.mark.parametrize("words", ["scuttle --robot hexapod", "--robot hexapod scuttle"])
+def test_a_robot_given_in_two_ways_is_refused(words: str, capsys) -> None:
     line = refusal(capsys, "robot", *words.split())
-    assert "--out: expected it once, found also FOLDER without" in line
+    assert "--robot: expected it once, found also NAME|FILE without" in line
 
 
 @pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])

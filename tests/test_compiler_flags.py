@@ -161,14 +161,12 @@ def test_a_scene_refuses_numerics_and_sizes(element: str, name: str, tmp_path: P
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("words", [["tunnel", "--trials", "1"], ["robot", "--export", "mjcf", "x"]])
+@pytest.mark.parametrize("words", [["tunnel", "--trials", "1"], ["robot", "--export", "mjcf"]])
 def test_commands_refuse_a_total_mass_in_one_line(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = scene(tmp_path, '<compiler settotalmass="3"/>')
-    out = [] if words[0] == "robot" else ["--out", str(tmp_path / "run")]
-    words = [str(tmp_path / "x") if word == "x" else word for word in words]
-    assert main([*words, "--scene", str(path), *out]) == 2
+    assert main([*words, "--scene", str(path), "--out", str(tmp_path / "run")]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1, err
     assert "settotalmass" in err

@@ -117,7 +117,7 @@ def test_the_file_moves_as_our_robot_does_to_the_bit(
     name: str, scene: str, seed: int, gait: str, tmp_path: Path
 ) -> None:
     folder, given = tmp_path / "export", robot_of(name, tmp_path)
-    words = ["robot", "--robot", given, "--export", "mjcf", str(folder), "--gait", gait]
+    words = ["robot", given, "--export", "mjcf", "--out", str(folder), "--gait", gait]
     assert main([*words, "--scene", scene, *(["--seed", str(seed)] if seed else [])]) == 0
     robot = RobotSpec.named(given)
     goals, states = simulated(robot, scene, seed, GaitParams.named(gait))
@@ -256,7 +256,8 @@ def test_a_scene_of_a_file_takes_its_meshes_along(tmp_path: Path) -> None:
         '</body><site name="start"/><site name="exit" pos="2 0 0"/></worldbody></mujoco>'
     )
     folder = tmp_path / "export"
-    assert main(["robot", "--export", "mjcf", str(folder), "--scene", str(scene)]) == 0
+    words = ["robot", "--export", "mjcf", "--out", str(folder)]
+    assert main([*words, "--scene", str(scene)]) == 0
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     assert model.body("scene_b_c").pos == pytest.approx([0.5, 0.4, 0.2])
     assert model.geom(model.body("scene_b_c").geomadr[0]).rgba == pytest.approx([1, 0, 0, 1])
@@ -270,7 +271,7 @@ def test_a_scene_of_a_file_takes_its_meshes_along(tmp_path: Path) -> None:
 def test_a_folder_with_a_run_is_left_alone_unless_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder, words = tmp_path / "export", ["robot", "--export", "urdf"]
+    folder, words = tmp_path / "export", ["robot", "--export", "urdf", "--out"]
     assert main([*words, str(folder)]) == 0
     before = (folder / "robot.urdf").read_bytes()
     capsys.readouterr()
@@ -279,7 +280,7 @@ def test_a_folder_with_a_run_is_left_alone_unless_told(
     assert error.count("\n") == 1
     assert "expected a folder without a run" in error
     assert (folder / "robot.urdf").read_bytes() == before
-    assert main([*words, "--out", str(folder), "--overwrite", "--robot", "hexapod"]) == 0
+    assert main([*words, str(folder), "--overwrite", "--robot", "hexapod"]) == 0
     assert (tmp_path / "export.old" / "robot.urdf").read_bytes() == before
     assert (folder / "robot.urdf").read_bytes() != before
     own = tmp_path / "mine"

@@ -87,7 +87,7 @@ def test_shapes_reach_as_far_as_those_of_the_simulator() -> None:
 def test_limits_are_those_of_data_sheet_and_description(name: str, tmp_path: Path) -> None:
     """XC430-W240-T at 11.1 V: 1.7 N·m (e-Manual); XL330-M288-T at 5 V: 0.52 N·m."""
     folder, robot = tmp_path / "export", RobotSpec.named(name)
-    assert main(["robot", "--robot", name, "--export", "urdf", str(folder)]) == 0
+    assert main(["robot", name, "--export", "urdf", "--out", str(folder)]) == 0
     root = ElementTree.parse(folder / "robot.urdf").getroot()
     joints = {str(joint.get("name")): joint for joint in root.iter("joint")}
     limits = {name: _numbers(joint, "limit") for name, joint in joints.items()}
@@ -145,7 +145,7 @@ def test_what_is_exported_weighs_what_its_page_says(name: str, mass: float, tmp_
     """2.0 and 2.4 kg of docs/robots.md, 1.0 kg of the hexapod's file; README.txt says so, too."""
     for form, file in (("urdf", "robot.urdf"), ("mjcf", "robot.xml")):
         folder = tmp_path / form
-        assert main(["robot", "--robot", name, "--export", form, str(folder)]) == 0
+        assert main(["robot", name, "--export", form, "--out", str(folder)]) == 0
         model = mujoco.MjModel.from_xml_string((folder / file).read_text())
         assert model.body_mass.sum() == pytest.approx(mass, abs=1e-12)
         assert model.body_mass[1:].min() > 0.0

@@ -158,7 +158,7 @@ def test_the_robot_of_a_flag_replaces_the_one_of_the_file(
     """As a whole: nothing is left of the other one, also of one with an inertial sensor."""
     config = tmp_path / "config.toml"
     config.write_text(f'robot = "{other}"\n')
-    words = ["--config", str(config), "--robot", name, "--out", str(tmp_path / "run")]
+    words = [name, "--config", str(config), "--out", str(tmp_path / "run")]
     assert main(["robot", *words]) == 0
     made = read_file(tmp_path / "run" / "config.toml", RobotFile)
     assert made.robot == RobotSpec.named(name)

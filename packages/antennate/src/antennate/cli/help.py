@@ -94,7 +94,8 @@ def _width() -> int:
 
 
 def _usage(command: Command, description: str) -> list[str]:
-    free = "".join(f" {option.usage}" for option in command.others if option.free)
+    options = [*command.others, *command.parameters]
+    free = "".join(f" {option.usage}" for option in options if option.free)
     lines = [f"usage: antennate {command_words(command.name)}{free} [OPTIONS]"]
     for paragraph in description.strip().split("\n\n"):
         lines += ["", *textwrap.wrap(" ".join(paragraph.split()), _width())]

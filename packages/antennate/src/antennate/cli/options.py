@@ -182,13 +182,14 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
             continue
         if hasattr(group, "choice"):
             known = tuple(getattr(group, "known", ()))
-            yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known)
+            place = _place(_extra(field))
+            yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known, **place)
         yield from options_of(group() if value is None else value, (*path, name))
 
 
 def _option(path: tuple[str, ...], model: type, field: FieldInfo, default: Any) -> Iterator[Option]:
     """The option of a field; none of a list of tables, which only a file can hold."""
-    extra: Any = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    extra = _extra(field)
     types, many = _types(field.annotation)
     choices = tuple(c for kind in types if get_origin(kind) is Literal for c in get_args(kind))
     kinds = frozenset(kind for kind in types if isinstance(kind, type)) | {type(c) for c in choices}
@@ -207,10 +208,19 @@ def _option(path: tuple[str, ...], model: type, field: FieldInfo, default: Any) 
             limits=_limits(field),
             default=_words(default),
             kinds=kinds,
-            positional=bool(extra.get("positional")),
-            optional=bool(extra.get("optional")),
             needs=tuple(extra.get("needs", ())),
+            **_place(extra),
         )
+
+
+def _extra(field: FieldInfo) -> dict[str, Any]:
+    """What a field says of its flag."""
+    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+
+
+def _place(extra: Mapping[str, Any]) -> dict[str, bool]:
+    """Whether a value is given without a flag, and whether it may be left out then."""
+    return {name: bool(extra.get(name)) for name in ("positional", "optional")}
 
 
 def _types(annotation: Any) -> tuple[list[Any], bool]:

@@ -222,7 +222,7 @@ class DescribedRobot(Params):
 
     unread: ClassVar[tuple[str, ...]] = ("zeros.measured",)
     shared: ClassVar[bool] = True
-    robot: RobotSpec = RobotSpec()
+    robot: RobotSpec = option(RobotSpec(), "", positional=True, optional=True)
     zeros: ZerosParams = ZerosParams()
 
 
@@ -233,13 +233,6 @@ _MJCF = ("--export mjcf",)
 class Options(ResultOptions, RobotFileOptions):
     """Where the results go, which file describes the robot, and what is exported."""
 
-    out: Path | None = option(
-        None,
-        "folder for the results, else runs/COMMAND-N",
-        "FOLDER",
-        positional=True,
-        optional=True,
-    )
     export: Literal["mjcf", "urdf"] | None = option(
         None, "write the robot for other programs instead"
     )
