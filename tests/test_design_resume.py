@@ -142,6 +142,20 @@ def test_failed_trials_can_be_run_again_and_proposals_stay() -> None:
     assert [each["values"] for each in after] == [each["values"] for each in before]
 
 
+def test_a_shard_of_a_search_is_refused_and_leaves_the_folder_as_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plan()
+    design()
+    Path("run/result.json").unlink()  # as of a run that goes on
+    before = {path: path.read_bytes() for path in Path("run").rglob("*.*")}
+    for out in ("run", "other"):
+        line = refusal(capsys, *words("--shard", "1/2", out=out))
+        assert "--shard: expected trials that are known before the run, found a plan" in line
+    assert {path: path.read_bytes() for path in Path("run").rglob("*.*")} == before
+    assert not Path("other").exists()
+
+
 @pytest.mark.ci
 def test_bad_words_and_late_findings_are_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -151,6 +165,5 @@ def test_bad_words_and_late_findings_are_one_line(
     plan('minimize = ["word"]')
     assert "expected a measure of" in refusal(capsys, *words("--workers", "1", out="later"))
     plan()
-    assert "--shard: expected another plan" in refusal(capsys, *words("--shard", "1/2"))
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert "uv run --extra design antennate" in refusal(capsys, *words())

@@ -203,7 +203,7 @@ def carry_out(
     shards: Content | None = None,
 ) -> int:
     """Run what has been parsed, or put shards together that were run."""
-    _require_possible(options, config)
+    _require_possible(experiment, options, config)
     apart = experiment.continued or bool(code_named(config.model_dump(mode="json")))
     workers = _workers(options, apart) if shards is None else Workers(1, NoMore())
     kind = f"{experiment.name} --log" if options.log else experiment.name
@@ -258,7 +258,7 @@ def _view(options: Options) -> contextlib.AbstractContextManager[SimulationView 
     return view_of(options)
 
 
-def _require_possible(options: Options, config: Params) -> None:
+def _require_possible(experiment: Experiment[Any, Any], options: Options, config: Params) -> None:
     """Refuse options that exclude one another, before the folder is touched.
 
     What is run beside a view is run in this process.
@@ -272,10 +272,17 @@ def _require_possible(options: Options, config: Params) -> None:
                     f"{flag_of((name,))}: expected none beside --view or --foxglove, which show "
                     f"one trial after the other, found {words}"
                 )
+    if options.shard is None:
+        return
     finished = options.out is not None and (options.out / RESULT).exists()
-    if options.shard is not None and finished and not options.overwrite:
+    if finished and not options.overwrite:
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
+        )
+    if experiment.tasks is not None and not experiment.tasks(config):
+        raise ConfigError(
+            "--shard: expected trials that are known before the run, found a plan whose trials "
+            "follow from others"
         )
 
 

@@ -134,7 +134,8 @@ class Experiment(Generic[Config, Out]):
             this machine), whole (anywhere, but not in shards, as trials follow from others) or
             anywhere (on other machines, and a share of them on each, a shard).
         tasks: tasks(config) -> an identity for each task. Tasks that stay the same with more trials
-            have the same, so a finished run can take more. None: that of its `Trials`.
+            have the same, so a finished run can take more. None: that of its `Trials`. Without any
+            each trial follows from others, and a run has no shards.
         of_file: of_file(path) -> the configuration of a FILE that is given without a flag; None
             where only --config takes one.
         counted: What its steps are, beside the bar; else the name of the command stands there.

@@ -30,7 +30,7 @@ from antennate.experiments.study.tasks import (
 from antennate.messages import shortened
 from antennate.studies.experiment import Done
 from antennate.studies.plan import Point
-from antennate.studies.pool import Workers, gather, workers_from
+from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnRow, OnStep, no_row, no_step
 from antennate.studies.work import Failure, Together
 
@@ -191,10 +191,6 @@ def run(
 
 def _searched(config: StudyConfig, workers: int | Workers, on_step: OnStep, on_row: OnRow) -> Done:
     """A search in place of the points of a plan."""
-    if workers_from(workers).shard is not None:
-        raise ConfigError(
-            "--shard: expected another plan than optuna, whose trials follow from others"
-        )
     ended = search.search(config, workers, on_step, on_row)
     found = summarise(
         config,
