@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import math
 import os
@@ -11,7 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 from dynamixel_bus import __version__, demands, servo_list
 from dynamixel_bus.demands import Demand
@@ -84,44 +85,58 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 2 after bad input, 130 if interrupted.
     """
+    _take_closed()
     try:
-        with _output():
-            return _serve(_read(argv))
+        return _serve(_read(argv))
     except BusError as error:
-        sys.stderr.write(f"dynamixel-bus: error: {one_line(str(error))}\n")
+        with suppress(OSError):  # nobody can be told
+            _write(sys.stderr, f"dynamixel-bus: error: {one_line(str(error))}\n")
         return BAD_INPUT
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-@contextmanager
-def _output() -> Iterator[None]:
-    """Standard output, all of it written at the end, also what argparse prints."""
+def _take_closed() -> None:
+    """Let what is written to closed standard streams fail, and no wire get their numbers."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:  # what is opened next gets this number; to write to it is an error
+            os.open(os.devnull, os.O_RDONLY)
+        if number and getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w", encoding="utf-8", closefd=False))
+
+
+def _write(stream: TextIO, text: str) -> None:
+    """Write at once."""
     try:
-        yield
-    finally:
-        if sys.stdout is not None:
-            _print("")
+        stream.write(text)
+        stream.flush()
+    except OSError:
+        with suppress(OSError):  # the buffer keeps the text, and Python flushes it at exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        raise
 
 
 def _print(text: str) -> None:
-    """Write to standard output at once; a reader that has ended is no error."""
-    if sys.stdout is None:
-        raise BadInputError("cannot write to standard output: it is closed")
+    """Write to standard output; a reader that has ended is no error."""
     try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        _write(sys.stdout, text)
+    except BrokenPipeError:
+        pass
     except OSError as error:
-        with suppress(OSError):  # the buffer keeps the text, and Python flushes it at exit
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not isinstance(error, BrokenPipeError):
-            raise BadInputError(f"cannot write to standard output: {reason(error)}") from None
+        why = "it is closed" if error.errno == errno.EBADF else reason(error)
+        raise BadInputError(f"cannot write to standard output: {why}") from None
 
 
 def _read(argv: Sequence[str] | None) -> argparse.Namespace:
     """Words of the command; servos behind `--fault` are servos."""
     parser = _parser()
-    given = parser.parse_args(argv)
+    try:
+        given = parser.parse_args(argv)
+    except SystemExit:  # of --help and --version, whose text still waits
+        _print("")
+        raise
     given.servos += filter(servo_list.is_listed, given.fault)
     given.fault = [word for word in given.fault if not servo_list.is_listed(word)]
     if not given.servos:
