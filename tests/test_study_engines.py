@@ -28,13 +28,15 @@ from study_trials import trial
 import antennate
 from antennate.cli import main
 from antennate.control.registry import CONTROLLERS
-from antennate.errors import WorkerError
+from antennate.errors import AntennateError, WorkerError
 from antennate.experiments.study.config import StudyConfig
 from antennate.messages import command_words
+from antennate.studies.engines import make_engine
 from antennate.studies.identity import environment, identity, packages_used
+from antennate.studies.pool import Workers, gather
 from antennate.studies.slurm import Resumable
 from antennate.studies.submitted import Submitted
-from antennate.studies.trial_file import read_trials
+from antennate.studies.trial_file import TrialFile, read_trials
 from antennate.studies.work import Call, Work
 
 pytestmark = pytest.mark.ci
@@ -204,6 +206,20 @@ def test_trials_of_a_job_of_slurm_crash_or_hang_as_on_one_machine(tmp_path: Path
     found = read_trials(tmp_path / "asked.jsonl").records
     assert all("result" in found[place] for place in "01"), "asked to end, it goes on"
     assert found["2"]["failure"] == ["crashed", "a worker process ended with code -9 in its work"]
+
+
+def test_a_result_that_cannot_be_kept_is_one_line_as_on_one_machine(tmp_path: Path) -> None:
+    """It ends the run at once: no job is begun again for it."""
+    pytest.importorskip("submitit")
+    said = "expected a result that can be kept, found set"
+    for engine, line in ((None, said), (make_engine("slurm-local"), f"slurm: {said}")):
+        store = TrialFile(tmp_path / f"{len(line)}.jsonl")
+        store.begin({"results": "sets"})
+        workers = Workers(1, engine, trials=store)
+        with pytest.raises(AntennateError, match=f"^{line}$"):
+            gather(set, [((1, 2),)], workers, lambda done, total: None)
+        store.close()
+    assert len(list((tmp_path / "slurm").glob("*_submitted.pkl"))) == 1
 
 
 def test_a_trial_that_hangs_beside_a_worker_of_dask_is_found(tmp_path: Path) -> None:

@@ -83,7 +83,11 @@ class Resumable:
             trials.append(str(place), content)
 
         def emit(place: int, result: Any) -> None:
-            keep(place, {"result": encoded(result)})
+            try:
+                content = encoded(result)
+            except TypeError as error:
+                raise WorkerError(str(error)) from None
+            keep(place, {"result": content})
 
         def fail(place: int, failure: Failure) -> None:
             keep(place, {"failure": [failure.status, failure.reason]})
