@@ -37,7 +37,7 @@ from antennate.studies.engines import (
     NoMore,
     make_engine,
 )
-from antennate.studies.experiment import ELSEWHERE, Experiment, Outcome
+from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
@@ -135,8 +135,7 @@ def _without(experiment: Experiment[Any, Any]) -> Sequence[str]:
     """Fields of the options that this experiment has not."""
     has = {
         OF_WORKERS: experiment.workers != "none",
-        ("engine", "slurm"): experiment.workers in ELSEWHERE,
-        ("shard",): experiment.workers != "whole",
+        ("engine", "slurm"): experiment.workers == "anywhere",
         ("video", "video_trial"): experiment.films is not None,
         ("video_view",): experiment.films is not None and "robot" in experiment.config.model_fields,
         ("video_trial",): "trials" in experiment.config.model_fields,

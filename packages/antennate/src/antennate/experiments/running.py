@@ -15,7 +15,7 @@ from antennate.messages import one_line, shown
 from antennate.params.base import Params, from_values
 from antennate.studies.columns import content
 from antennate.studies.engines import LOCAL, Device, make_engine
-from antennate.studies.experiment import ELSEWHERE, Experiment, Outcome
+from antennate.studies.experiment import Experiment, Outcome
 from antennate.studies.identity import environment, identity, texts
 from antennate.studies.pool import Workers
 from antennate.studies.pooling import frame
@@ -162,7 +162,7 @@ def run(
             raise ConfigError(f"{name}: expected out beside it, found none")
     experiment, config = _configured(name_or_config, settings)
     config = experiment.settled(config, out if resume else None)
-    if engine != LOCAL and experiment.workers not in ELSEWHERE:
+    if engine != LOCAL and experiment.workers != "anywhere":
         raise ConfigError(
             f"engine: expected an experiment that runs trials on workers, found {experiment.name}"
         )

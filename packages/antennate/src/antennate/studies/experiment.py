@@ -83,8 +83,6 @@ class Done:
 
 
 Out = TypeVar("Out", bound=Outcome)
-ELSEWHERE = ("whole", "anywhere")
-"""Where trials may run if they may on other machines."""
 Files = Mapping[str, Callable[[Any], str | bytes | None]]
 """Names of files, and what makes the content of each of an outcome; None for no such file."""
 
@@ -131,8 +129,7 @@ class Experiment(Generic[Config, Out]):
             records it; None where nothing can be filmed.
         body: body(result, images) -> HTML that stands in its report in place of tables and figures.
         workers: Where its trials may run: none (it has no trials on workers), here (processes of
-            this machine), whole (anywhere, but not in shards, as trials follow from others) or
-            anywhere (on other machines, and a share of them on each, a shard).
+            this machine) or anywhere (on other machines, too).
         tasks: tasks(config) -> an identity for each task. Tasks that stay the same with more trials
             have the same, so a finished run can take more. None: that of its `Trials`. Without any
             each trial follows from others, and a run has no shards.
@@ -156,7 +153,7 @@ class Experiment(Generic[Config, Out]):
     logs: Callable[[Config], Sequence[str]] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
     body: Callable[[Any, Mapping[str, str]], str] | None = None
-    workers: Literal["none", "here", "whole", "anywhere"] = "anywhere"
+    workers: Literal["none", "here", "anywhere"] = "anywhere"
     tasks: Callable[[Config], Sequence[Any]] | None = None
     of_file: Callable[[Path], Config] | None = None
     counted: str = ""
