@@ -39,6 +39,15 @@ def drawn(scene, seed: int = 0):
     return scene.draw(RobotSpec(), np.random.default_rng(seed))
 
 
+def test_the_help_offers_the_scenes_that_a_refusal_lists(capsys):
+    """A tunnel, corridors, seven hard ones, flat, wall, six of ground, a tunnel with a step."""
+    assert main(["tunnel", "--scene", "tunnle"]) == 2
+    listed = capsys.readouterr().err.split("expected one of ")[1].split(", or FILE.xml")[0]
+    assert len(listed.split(", ")) == 18
+    assert main(["tunnel", "--help-all"]) == 0
+    assert f"--scene NAME {listed}, a MJCF file.xml" in " ".join(capsys.readouterr().out.split())
+
+
 def test_ours_keep_the_protocol(tmp_path):
     for scene in (TunnelScene(), FlatScene(), MjcfScene(mjcf(tmp_path, SITES + WALL))):
         check_scene(scene)

@@ -47,9 +47,7 @@ class TrialConfig(Params):
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of all chance."""
     scene: str = number(TUNNEL, "1", "paper: a cluttered tunnel")
-    """Tunnel, corridors, corner, uturn, room, deadend, heavy, noisy, broken, flat, wall, step_up,
-    step_down, stairs, gap, ramp, rubble, step_tunnel, a MJCF file.xml, MODULE:CLASS or
-    file.py:CLASS."""
+    """{offered}, a MJCF file.xml, MODULE:CLASS or file.py:CLASS."""
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
     ground: GroundParams = GroundParams()
