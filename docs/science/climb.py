@@ -33,7 +33,7 @@ from antennate.studies.pooling import frame
 from antennate.studies.statistics import mean95
 from antennate.studies.tables import Table
 
-Outcome = Found[ClimbConfig, ClimbResult, ClimbPath]
+ClimbOutcome = Found[ClimbConfig, ClimbResult, ClimbPath]
 HERE = Path(__file__).parent
 ROWS, PAGE, FIGURE = (HERE / f"climb.{end}" for end in ("csv", "md", "png"))
 GROUND = HERE / "climb_ground.csv"
@@ -93,7 +93,7 @@ def first_of(result: ClimbResult) -> list[Table]:
     return [table for table in found if table.title.startswith("Climbed")]
 
 
-def without(outcome: Outcome) -> Iterator[Table]:
+def without(outcome: ClimbOutcome) -> Iterator[Table]:
     """Success of `climb` without an inertial sensor, and the pairs with those of a run with it."""
     run = outcome_of(WITHOUT)
     runs = {"climb": outcome.frame[outcome.frame["condition"] == "climb"], "without": run.frame}
@@ -173,7 +173,7 @@ def plane() -> Table:
     )
 
 
-def outcome_of(path: Path) -> Outcome:
+def outcome_of(path: Path) -> ClimbOutcome:
     """The run of which a table of trials is."""
     rows = [
         ClimbRow(

@@ -37,7 +37,7 @@ from antennate.studies.engines import (
     NoMore,
     make_engine,
 )
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.experiment import Experiment, RunOutcome
 from antennate.studies.formats import to_json
 from antennate.studies.identity import code_named, differences, environment, identity
 from antennate.studies.pool import TIMEOUT, ShardEnd, Workers, core_count
@@ -342,7 +342,7 @@ def _outcome(
     workers: Workers,
     run: RunDirectory,
     view: SimulationView | None,
-) -> Outcome:
+) -> RunOutcome:
     """Run it: watched, logged, or neither."""
     how: dict[str, Any] = {} if view is None else {"view": view}
     if options.log and experiment.logs is not None:
@@ -367,7 +367,7 @@ def _end(
     config: Params,
     options: Options,
     run: RunDirectory,
-    outcome: Outcome,
+    outcome: RunOutcome,
     argv: Sequence[str] | None,
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""

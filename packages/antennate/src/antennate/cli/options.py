@@ -182,8 +182,15 @@ def options_of(default: Any, path: tuple[str, ...] = ()) -> Iterator[Option]:
             continue
         if hasattr(group, "choice"):
             known = tuple(getattr(group, "known", ()))
-            place = _place(_extra(field))
-            yield Option((*path, name), "NAME|FILE", frozenset({str}), model, known, **place)
+            yield Option(
+                path=(*path, name),
+                metavar="NAME|FILE",
+                kinds=frozenset({str}),
+                model=model,
+                examples=known,
+                positional=bool(_extra(field).get("positional")),
+                optional=bool(_extra(field).get("optional")),
+            )
         yield from options_of(group() if value is None else value, (*path, name))
 
 
@@ -208,19 +215,15 @@ def _option(path: tuple[str, ...], model: type, field: FieldInfo, default: Any) 
             limits=_limits(field),
             default=_words(default),
             kinds=kinds,
+            positional=bool(extra.get("positional")),
+            optional=bool(extra.get("optional")),
             needs=tuple(extra.get("needs", ())),
-            **_place(extra),
         )
 
 
 def _extra(field: FieldInfo) -> dict[str, Any]:
     """What a field says of its flag."""
     return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-
-
-def _place(extra: Mapping[str, Any]) -> dict[str, bool]:
-    """Whether a value is given without a flag, and whether it may be left out then."""
-    return {name: bool(extra.get(name)) for name in ("positional", "optional")}
 
 
 def _types(annotation: Any) -> tuple[list[Any], bool]:

@@ -15,7 +15,7 @@ from antennate.messages import one_line, shown
 from antennate.params.base import Params, from_values
 from antennate.studies.columns import content
 from antennate.studies.engines import LOCAL, Device, make_engine
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.experiment import Experiment, RunOutcome
 from antennate.studies.identity import environment, identity, texts
 from antennate.studies.pool import Workers
 from antennate.studies.pooling import frame
@@ -43,7 +43,7 @@ class Result:
 
     experiment: Experiment[Any, Any]
     config: Params
-    outcome: Outcome
+    outcome: RunOutcome
     path: Path | None = None
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class Result:
         return _restored, (self.experiment.name, self.config, self.outcome, self.path)
 
 
-def _restored(name: str, config: Params, outcome: Outcome, path: Path | None) -> Result:
+def _restored(name: str, config: Params, outcome: RunOutcome, path: Path | None) -> Result:
     return Result(experiments.load(name), config, outcome, path)
 
 
@@ -217,7 +217,7 @@ def _film(name: str) -> str:
 def keep(
     experiment: Experiment[Any, Any],
     config: Params,
-    outcome: Outcome,
+    outcome: RunOutcome,
     result: Mapping[str, Any],
     directory: RunDirectory,
     figures: bool = True,

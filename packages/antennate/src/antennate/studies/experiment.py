@@ -57,7 +57,7 @@ class Planned(Params):
     """
 
 
-class Outcome(Protocol):
+class RunOutcome(Protocol):
     """What a run returns: the rows of trials.csv, and the result that result.json holds."""
 
     @property
@@ -82,7 +82,7 @@ class Done:
         return self.found
 
 
-Out = TypeVar("Out", bound=Outcome)
+Out = TypeVar("Out", bound=RunOutcome)
 Files = Mapping[str, Callable[[Any], str | bytes | None]]
 """Names of files, and what makes the content of each of an outcome; None for no such file."""
 
@@ -185,7 +185,7 @@ class Experiment(Generic[Config, Out]):
         on_step: OnStep = no_step,
         on_row: OnRow = no_row,
         **how: Any,
-    ) -> Outcome:
+    ) -> RunOutcome:
         """Run a configuration.
 
         Args:

@@ -24,7 +24,7 @@ from antennate.experiments.antenna.result import (
     Taper,
 )
 from antennate.studies.columns import columns, shown
-from antennate.studies.experiment import Experiment, Outcome
+from antennate.studies.experiment import Experiment, RunOutcome
 from antennate.studies.tables import Table
 
 _SETS = 6
@@ -34,7 +34,7 @@ _BENDS = 10
 
 
 @dataclass(frozen=True)
-class AntennaOutcome(Outcome):
+class AntennaOutcome(RunOutcome):
     """An antenna, its readings, and the path of its tip."""
 
     found: AntennaResult

@@ -37,7 +37,7 @@ from antennate.params.base import Params, number, paths_of, require_default
 from antennate.params.bench import BenchVariationParams
 from antennate.params.scene import BenchPhysicsParams
 from antennate.robots.antenna import AntennaSpec, SensorParams
-from antennate.studies.experiment import Outcome
+from antennate.studies.experiment import RunOutcome
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep, no_step
 from antennate.types import Floats
@@ -124,7 +124,7 @@ class CalibrateConfig(Params):
 
 
 @dataclass(frozen=True)
-class CalibrateOutcome(Outcome):
+class CalibrateOutcome(RunOutcome):
     """A calibration and its data.
 
     Attributes:
