@@ -6,12 +6,10 @@ import json
 import re
 import secrets
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import tomlkit
@@ -22,8 +20,9 @@ from antennate.cli.arguments import as_typed
 from antennate.cli.options import PageOptions, fields_of, flag_of, option
 from antennate.cli.pages import page_of
 from antennate.cli.robot import RobotFileOptions, parse_robot, usual_file
-from antennate.cli.terminal import OK, progress, stop_signals, today, write
-from antennate.errors import ConfigError, LogError, reason
+from antennate.cli.terminal import OK, stop_signals, today
+from antennate.cli.twin_recording import Recording, RecordOptions, say
+from antennate.errors import ConfigError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
 from antennate.hardware.ports.finder import read_key
@@ -34,8 +33,6 @@ from antennate.params.base import changes, paths_of
 from antennate.robots.antenna import SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
-from antennate.telemetry import FilmView
-from antennate.telemetry.twin_log import TwinLog
 from antennate.twin.board import UdpEndpoint
 from antennate.twin.config import Passage, TwinConfig, watched
 from antennate.twin.faults import Demand, Faults, read
@@ -47,7 +44,6 @@ from antennate.types import AntennaFrame
 from dynamixel_bus.endpoints import Endpoint, TcpEndpoint
 
 if TYPE_CHECKING:
-    from antennate.telemetry.twin_film import TwinFilm
     from antennate.telemetry.view.process import ViewProcess
 
 _LAST_PORT = 65_534
@@ -89,15 +85,6 @@ esp32=silent, reset, open_left, short_left, stuck_left (or right), left:COUNTS, 
 hum:COUNTS, drift:COUNTS_A_SECOND, plateau:COUNTS, sticky, radio_noise:COUNTS or ber:SHARE;
 bus=silent, echo, loss:SHARE, latency:SECONDS, discharge:VOLTS_A_SECOND or ber:SHARE;
 wire=ber:SHARE (bits wrong) or loss:SHARE (bytes lost), on both wires both ways."""
-
-
-@dataclass(frozen=True)
-class RecordOptions:
-    """What of the twin is recording."""
-
-    log: Path | None = option(None, "keep a log, .mcap", "FILE")
-    video: Path | None = option(None, "film it, .mp4; drawn when it has ended", "FILE")
-    video_view: FilmView = option("above", "from where --video looks", needs=["--video"])
 
 
 @dataclass(frozen=True)
@@ -144,7 +131,7 @@ def command(argv: Sequence[str]) -> int:
     config, places = parse_robot(
         "twin", DESCRIPTION, TwinConfig, argv, Places, file_of, named=TwinConfig, take=take
     )
-    orders = None if places.orders is None else Orders(str(places.orders), _say)
+    orders = None if places.orders is None else Orders(str(places.orders), say)
     if not places.servos:
         return _serve_robot(config, places, orders)
     return _serve_servos(config, places, read_list(places.servos), orders)
@@ -173,7 +160,7 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
-            _say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
+            say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
     return OK
 
 
@@ -203,16 +190,16 @@ def _watch(
     """Tell what happens, and keep it."""
 
     def began(demand: Demand, t: float) -> None:
-        _say(f"{t:.1f} s after the addresses: {demand}")
+        say(f"{t:.1f} s after the addresses: {demand}")
         recording.event(f"fault: {demand}")
 
     def passed() -> None:
-        _say(passage.summary)
+        say(passage.summary)
         if file is not None:
             try:
                 file.touch()
             except OSError as error:
-                _say(f"--passed: expected to make {file}, found: {reason(error)}")
+                say(f"--passed: expected to make {file}, found: {reason(error)}")
         recording.event(passage.summary)
 
     def returned() -> None:
@@ -290,14 +277,6 @@ def _until(
     return go_on
 
 
-def _say(text: str) -> None:
-    write(f"{text}\n")
-
-
-def _say_lost(failure: str) -> None:
-    _say(f"log: {failure}; the twin goes on without it")
-
-
 def _endpoints(places: Places, robot: TwinRobot) -> tuple[Endpoint | None, Endpoint | None]:
     """Endpoints of the board and the bus, None for a pseudo-terminal."""
     board: Endpoint | None = None
@@ -322,93 +301,3 @@ def _place(flag: str, text: str) -> tuple[str, int]:
             f"{flag}: expected [HOST:]PORT with a port of 0 to {_LAST_PORT}, found {text!r}"
         )
     return host or "127.0.0.1", int(port)
-
-
-class Recording:
-    """Log and film of a twin; a context, to be left when nobody is served any more.
-
-    That a log cannot be written any more is said at once, and ends nothing; it is an error when the
-    twin has ended. No file is made before `begin`, when all else is ready.
-
-    Attributes:
-        watchers: What is to be called with the world after each tick.
-    """
-
-    def __init__(self, options: RecordOptions, robot: TwinRobot) -> None:
-        self.watchers: list[Callable[[World], None]] = []
-        self._options, self._robot = options, robot
-        self._log: TwinLog | None = None
-        self._film: TwinFilm | None = None
-        for flag, path, ending in (
-            ("--log", options.log, ".mcap"),
-            ("--video", options.video, ".mp4"),
-        ):
-            if path is not None and path.suffix != ending:
-                raise ConfigError(f"{flag}: expected a name with {ending}, found {path}")
-        if (film := options.video) is not None:
-            if film.exists():
-                raise ConfigError(
-                    f"--video: expected no such file yet, found {film}; choose another name"
-                )
-            if not film.parent.is_dir():
-                raise ConfigError(f"--video: expected a folder for {film}, found none")
-            from antennate.telemetry.film import require_video  # slow to import
-
-            require_video()
-
-    def begin(self, passage: Passage, config: TwinConfig) -> None:
-        """Begin to keep what is served."""
-        if self._options.log is not None:
-            path, start = self._options.log, time.time_ns()
-            self._log = TwinLog(path, self._robot, config, start, _say_lost)
-            self.watchers.append(self._log.take)
-        if self._options.video is not None:
-            from antennate.telemetry.twin_film import TwinFilm  # slow to import
-
-            self._film = TwinFilm(self._robot, passage, config)
-            self.watchers.append(self._film.take)
-
-    def event(self, text: str) -> None:
-        """Keep in the log what happened now."""
-        if self._log is not None:
-            self._log.event(text, self._robot.t)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        failure = ""
-        if self._log is not None:
-            wrong = self._log.close()
-            failure = self._log.failure
-            if not failure:
-                _say(f"log: {self._log.path}{f': {wrong}' if wrong else ''}")
-        if self._film is not None and self._options.video is not None:
-            _draw(self._film, self._options.video, self._options.video_view)
-        if failure and isinstance(error, KeyboardInterrupt | None):
-            raise LogError(failure) from None
-
-
-def _draw(recorded: TwinFilm, path: Path, view: FilmView) -> None:
-    """Draw the film; a second Ctrl-C gives it up."""
-    from antennate.telemetry.film import MOST_PICTURES, RATE, encoded
-
-    film = recorded.film()
-    if film is None:
-        _say("video: no servo had torque, so there is nothing to show")
-        return
-    if recorded.full:
-        _say(f"video: it ends after {MOST_PICTURES / RATE / 60:g} min, as long as a film may be")
-    try:
-        with progress("pictures of the film") as step, stop_signals():
-            data = encoded(film.seen_from(view), step)
-    except KeyboardInterrupt:
-        _say("video: interrupted: no film was written")
-        return
-    write_whole(path, data)
-    _say(f"video: {path}")
