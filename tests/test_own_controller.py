@@ -16,9 +16,10 @@ from stated import stated
 
 import antennate
 from antennate.cli import main
-from antennate.control.controllers import RuleController, closed_loop, open_loop
+from antennate.control.controllers import closed_loop, open_loop
 from antennate.control.kind import ControllerKind
 from antennate.control.registry import CONTROLLERS, KINDS, looks, make_controller
+from antennate.control.rule_controller import RuleController
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
@@ -499,7 +500,7 @@ def test_a_rule_that_lacks_a_part_is_told_so_before_anything_runs(
     del parts[part]
     path = tmp_path / f"lacks_{part}.py"
     path.write_text(
-        "import numpy as np\nfrom antennate.control.controllers import RuleController\n\n"
+        "import numpy as np\nfrom antennate.control.rule_controller import RuleController\n\n"
         "class Lame:\n" + "".join(f"    {text}\n" for text in parts.values()) + "\n"
         "def lame(control, robot, batch):\n"
         "    return RuleController(Lame(), control, robot, batch)\n"

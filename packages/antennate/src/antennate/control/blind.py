@@ -20,10 +20,10 @@ from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
-from antennate.control.controllers import RuleController
 from antennate.control.escape import Escape
 from antennate.control.kind import ControllerKind
 from antennate.control.knowledge import Knowledge
+from antennate.control.rule_controller import RuleController
 from antennate.params.control import (
     ControlParams,
     EscapeParams,

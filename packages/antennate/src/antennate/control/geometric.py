@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from antennate.control.controllers import RuleController
 from antennate.control.escape import SearchRule, Sizes
 from antennate.control.gait import DIRECTION, STEER, targets
 from antennate.control.kind import ControllerKind, all_but
+from antennate.control.rule_controller import RuleController
 from antennate.errors import ConfigError
 from antennate.params.control import ControlParams, SearchParams
 from antennate.params.gaits import GaitParams

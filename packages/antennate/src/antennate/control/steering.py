@@ -24,9 +24,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antennate.control.controllers import RuleController
 from antennate.control.gait import Gait
 from antennate.control.kind import ControllerKind
+from antennate.control.rule_controller import RuleController
 from antennate.params.control import CentreParams, ControlParams, FollowParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import LEFT, RIGHT, Bools, Floats, Ints, JointCommand, Maneuver

@@ -16,9 +16,9 @@ import numpy as np
 
 from antennate.control.climbing.body import Body, require_pitch
 from antennate.control.climbing.rule import ClimbRule
-from antennate.control.controllers import Rule, RuleController
 from antennate.control.kind import ControllerKind, all_but
 from antennate.control.knowledge import Kind, Knowledge
+from antennate.control.rule_controller import Rule, RuleController
 from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec

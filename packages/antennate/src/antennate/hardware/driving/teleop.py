@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from antennate.control.controllers import RuleController
+from antennate.control.rule_controller import RuleController
 from antennate.errors import BadInputError
 from antennate.params.control import ControlParams
 from antennate.params.hardware import TeleopParams
