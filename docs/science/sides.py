@@ -7,7 +7,7 @@ readings tell is judged by docs/science/sides_told.py, by the criterion of docs/
 
 A robot backs off when the rule of `geometric` calls its readings those of a jam (`felt`), or, so
 that a design that feels no jam is asked all the same, when it has not got on for JAM_TIME by the
-truth (`jam`). Draws are the same for all designs.
+truth (`jam`). Each design has draws of its own, so that designs are as many samples of the places.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from typing import Any
 import numpy as np
 
 from antennate.control.conditioning import RepetitionDetector, RunningMean, level_and_fraction
-from antennate.control.knowledge import Knowledge
-from antennate.control.loop import Wrapped
+from antennate.control.knowledge import Kind, Knowledge
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.lockstep import Apparatus
@@ -46,6 +45,8 @@ SEEDS = {"smoke": 590_003, "screening": 590_101, "best": 590_202}
 """Of the draws of each plan; only the first was used while anything was chosen."""
 EACH = 3
 """Episodes of each scene in a round of a design."""
+MOST_DESIGNS = 100
+"""In the file, so that a design more leaves the draws of the others as they are."""
 LIMIT = 50.0
 """Time after which an episode ends [s]."""
 FREQUENCY = 1.0
@@ -69,12 +70,13 @@ AXES = {
     "seconds": Range(low=1.5, high=4.0),
     "motion": ["none", "sinusoid", "outwards", "look", "neck"],
 }
+KNOWN: tuple[Kind, ...] = ("side", "jam", "facing")
 COLUMNS = (
     *("row", "t", "left", "right", "base_left", "base_right"),
     *(f"yaw{i}" for i in range(1, 6)),
     *(f"error{i}" for i in range(1, 6)),
     *("lag_left", "lag_right", "gyro", "maneuver", "stage", "phase"),
-    *("side", "jam", "facing", "felt", "x", "y", "heading"),
+    *(*KNOWN, "felt", "x", "y", "heading"),
 )
 """Of a sample. Counts, angles [rad], the yaw joints' error and the legs' lag [rad] and the rate of
 yaw [rad/s] are means over EVERY ticks, the rest is of the last of them. `stage` is 1 while the
@@ -154,6 +156,11 @@ def propose() -> None:
     DESIGNS.write_text("[\n" + ",\n".join(f" {json.dumps(design)}" for design in found) + "\n]\n")
 
 
+def scene_name(rng: np.random.Generator) -> str:
+    """The scene that a draw begins with."""
+    return SCENES[int(rng.integers(len(SCENES)))]
+
+
 class Approached:
     """One of the scenes, drawn by chance; the robot starts before its entrance."""
 
@@ -161,7 +168,7 @@ class Approached:
 
     def draw(self, robot: RobotSpec, rng: np.random.Generator) -> Any:
         """Draw one, with cylinders where today's robot would have them."""
-        name = SCENES[int(rng.integers(len(SCENES)))]
+        name = scene_name(rng)
         return Begun(make_scene(name).draw(RobotSpec(), rng), name)
 
 
@@ -181,30 +188,29 @@ class Begun:
         return getattr(self._drawn, name)
 
 
+def _chance(seed: int, number: int) -> np.random.Generator:
+    """What a draw of that number begins with."""
+    return np.random.default_rng(np.random.SeedSequence([seed, number]).spawn(3)[0])
+
+
 @cache
 def drawn(seed: int, number: int) -> Begun:
     """The scene of a draw."""
-    chance = np.random.SeedSequence([seed, number]).spawn(3)[0]
-    return Approached().draw(RobotSpec(), np.random.default_rng(chance))
+    return Approached().draw(RobotSpec(), _chance(seed, number))
 
 
-def numbers_of(seed: int, each: int) -> list[int]:
-    """The first draws of each scene, so many, in turn."""
+def numbers_of(seed: int, each: int, block: int) -> list[int]:
+    """Draws of a block: so many of each scene, which no other block has."""
     of: dict[str, list[int]] = {scene: [] for scene in SCENES}
     number = 0
-    while min(map(len, of.values())) < each:
-        if len(some := of[drawn(seed, number).name]) < each:
-            some.append(number)
+    while min(map(len, of.values())) < (block + 1) * each:
+        of[scene_name(_chance(seed, number))].append(number)
         number += 1
-    return [number for some in zip(*of.values(), strict=True) for number in some]
+    some = [numbers[block * each : (block + 1) * each] for numbers in of.values()]
+    return [number for numbers in zip(*some, strict=True) for number in numbers]
 
 
-def scene_of_number(plan: str, number: int) -> Begun:
-    """The scene of an episode of a plan."""
-    return drawn(SEEDS[plan], number)
-
-
-class Moved(Wrapped):
+class Moved:
     """`geometric` with moved antennae or a neck that looks; it is told of a jam, and recorded.
 
     Args:
@@ -215,12 +221,12 @@ class Moved(Wrapped):
         bodies: The simulated robots.
     """
 
-    knows = needs = ("side", "jam", "facing")
+    knows = needs = KNOWN
 
     def __init__(
         self, design: Design, control: ControlParams, robot: RobotSpec, batch: int, bodies: Any
     ) -> None:
-        super().__init__(make_controller("geometric", control, robot, batch))
+        self._made: Any = make_controller("geometric", control, robot, batch)
         self._design, self._bodies, self._limit = design, bodies, robot.yaw_limit
         self._curve, self._mean = (
             control.conditioning,
@@ -237,7 +243,10 @@ class Moved(Wrapped):
         self._looked = np.full(batch, np.inf)
         self._sums: dict[int, list[Floats]] = {row: [] for row in range(batch)}
         self.numbers: dict[int, int] = {}
-        self.samples: list[Floats] = []
+        self.samples: list[Any] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._made, name)
 
     @property
     def maneuver(self) -> Any:
@@ -246,7 +255,7 @@ class Moved(Wrapped):
 
     def reset(self, rows: Any, phase: Any = 0.0) -> None:
         """Start rows anew."""
-        super().reset(rows, phase)
+        self._made.reset(rows, phase)
         self._mean.reset(rows)
         self._detector.reset(rows)
         self._before[rows], self._since[rows], self._looked[rows] = 0, np.nan, np.inf
@@ -333,7 +342,7 @@ class Moved(Wrapped):
             if len(self._sums[row]) < EVERY:
                 continue
             world = self._bodies.world(row)
-            known = [float(getattr(truth, kind)[row]) for kind in self.knows]
+            known = [float(getattr(truth, kind)[row]) for kind in KNOWN]
             sample = (
                 *(self.numbers[row], frame.t[row], *np.mean(self._sums[row], axis=0)),
                 *(self._before[row], stage[row], self._made.phase[row], *known, self._felt[row]),
@@ -348,7 +357,8 @@ def run_round(folder: Path, plan: str, name: str, number: int, each: int = EACH)
     path = folder / f"{name}_{number}.npz"
     if path.exists():
         return f"{path.stem}: done before"
-    design, seed = designs()[name], SEEDS[plan]
+    known, seed = designs(), SEEDS[plan]
+    design, block = known[name], [*known].index(name) + number * MOST_DESIGNS
     config = TunnelConfig(
         seed=seed, robot=design.robot, control=design.control, time_limit=LIMIT, knows=("jam",)
     )
@@ -370,7 +380,7 @@ def run_round(folder: Path, plan: str, name: str, number: int, each: int = EACH)
         return TrialMonitor(episode, name)
 
     rows: list[dict[str, Any]] = []
-    trials = numbers_of(seed, (number + 1) * each)[-len(SCENES) * each :]
+    trials = numbers_of(seed, each, block)
     run_trials(
         *(config, "geometric", trials, lambda found: rows.append(asdict(found[0]))),
         batch=len(trials),
