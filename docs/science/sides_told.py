@@ -126,8 +126,8 @@ def _moved(
 
 
 _MIRRORED = {
-    "touch": ([1, 0, 3, 2, 4, 5, 6, 8, 7], np.array([1, 1, 1, 1, 1, 1, -1, 1, 1.0])),
-    "body": ([*range(11), 12, 11], np.array([-1.0] * 11 + [1.0, 1.0])),
+    "touch": ([1, 0, 3, 2, 4, 5, 6, 8, 7], np.ones(9)),
+    "body": ([*range(12), 13, 12], np.array([-1.0] * 12 + [1.0, 1.0])),
 }
 """Order and signs of the channels of a sequence in a mirror."""
 
@@ -135,11 +135,18 @@ _MIRRORED = {
 def _sequences(trial: Floats, flex: Floats, now: int, seconds: float) -> Any:
     """Sequences up to a moment, by kind, and as in a mirror."""
     maneuver, stage = trial[:, AT["maneuver"]], trial[:, AT["stage"]]
-    kinds = [maneuver == 0, maneuver == 3, 1.0 * (maneuver == 1) - (maneuver == 2)]
-    own = np.stack([*kinds, stage == 1, stage == 2], axis=1).astype(float)
+    turn = 1.0 * (maneuver == 1) - (maneuver == 2)
+    kinds = [maneuver == 0, maneuver == 3, turn != 0.0, stage == 1, stage == 2]
+    own = np.stack(kinds, axis=1).astype(float)
     bases = trial[:, [AT["base_left"], AT["base_right"]]]
     legs = 5.0 * trial[:, [AT["lag_left"], AT["lag_right"]]]
-    body = [trial[:, [AT["gyro"]]], 2.0 * trial[:, YAWS], 5.0 * trial[:, ERRORS], legs]
+    body = [
+        turn[:, None],
+        trial[:, [AT["gyro"]]],
+        2.0 * trial[:, YAWS],
+        5.0 * trial[:, ERRORS],
+        legs,
+    ]
     every = round(seconds * RATE / STEPS)
     wanted = np.maximum(np.arange(now - every * STEPS, now), 0)
     found = {}
@@ -483,7 +490,7 @@ def figure(result: dict[str, Any]) -> Figure:
         panel.set_title(moment, loc="left", fontsize=8)
         panel.set_xlabel("reach to the side over half the width")
     panels[0].set_ylabel("AUC of the side, antennae alone")
-    panels[0].legend(fontsize=6)
+    panels[0].legend(fontsize=7)
     return drawing
 
 
