@@ -20,6 +20,8 @@ import mujoco
 import numpy as np
 import pytest
 from log_ticks import HEADER, tick
+from mcap.reader import make_reader
+from mcap.records import Message
 
 import antennate
 from antennate.cli import main
@@ -34,10 +36,11 @@ from antennate.sim.scenes.registry import make_scene
 from antennate.sim.trial import draw_trial
 from antennate.sim.world import World
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.simulated import HEAD, Beside, Decisions, SimulatedLog, TickLog
+from antennate.telemetry.simulated import Decisions, SimulatedLog, TickLog
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
 from antennate.telemetry.twin_log import LogQueue
+from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 from antennate_lab.gait.experiment import GaitStudyConfig, run
 from dynamixel_bus import packets
@@ -313,14 +316,19 @@ def test_decisions_of_any_form_are_kept_as_they_are(phase: Any) -> None:
     made.level = np.array([[0.5, 0.25], [0.75, 0.125]])
     ticks.append(decisions.take(frame, command))
     spaced[:] = -1.0  # what is used anew by its owner
-    found = np.empty((4, HEAD + len(ROBOT.joint_names)))
-    decisions.rows(ticks, 1, found)
-    expected = [*phase] if np.shape(phase) == (2,) else [math.nan] * 2
-    head = [0.5, 4.0, expected[1], math.nan, 4.0, 1.0, 0.0, 1.0, 1.0]
-    row = [*head, 12, 14, 16, 18, 20, *[1.0] * 12, 9.0, 10.0]
-    np.testing.assert_array_equal(found[:3], [row] * 3)
-    row[5:7] = 0.75, 0.125
-    np.testing.assert_array_equal(found[3], row)
+    expected = {
+        "t": [0.5] * 4,
+        "maneuver": [4] * 4,
+        "phase": [phase[1] if np.shape(phase) == (2,) else math.nan] * 4,
+        "counts": [[math.nan, 4.0]] * 4,
+        "level": [[1.0, 0.0]] * 3 + [[0.75, 0.125]],
+        "contact": [[1, 1]] * 4,
+        "angles": [[12, 14, 16, 18, 20, *[1.0] * 12, 9.0, 10.0]] * 4,
+    }
+    found = decisions.columns(ticks, 1)
+    assert found.keys() == expected.keys()
+    for name, column in expected.items():
+        np.testing.assert_array_equal(found[name], column)
 
 
 def pushes(world: World) -> list[float]:
@@ -388,9 +396,48 @@ def made(count: int) -> list[Tick]:
     return [replace(tick(number), now=0.01 * number) for number in range(1, count + 1)]
 
 
-def as_made(ticks: Sequence[Tick], _: int) -> list[tuple[Tick, Beside]]:
-    """What `TickLog` writes of such ticks."""
-    return [(each, {}) for each in ticks]
+def as_made(log: LogWriter, ticks: Sequence[Tick]) -> None:
+    """Write such ticks as they are."""
+    for each in ticks:
+        log.write(each)
+
+
+def columns(ticks: Sequence[Tick], names: Sequence[str]) -> dict[str, np.ndarray[Any, Any]]:
+    """Some fields of ticks, and those that each tick must have."""
+    needed = ["t", "now", "counts", "reading", "level", "contact", "maneuver", "phase", "angles"]
+    return {name: np.array([getattr(each, name) for each in ticks]) for name in [*needed, *names]}
+
+
+@pytest.mark.parametrize("names", [(), ("positions",), ("positions", "velocities", "efforts")])
+def test_ticks_written_at_once_are_those_written_one_by_one(
+    names: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Bit by bit, of a robot without a supervisor; the time of messages never goes back."""
+    chance, joints = np.random.default_rng(5), (len(names), 40, len(ROBOT.joint_names))
+    measured = [
+        dict(zip(names, map(tuple, row), strict=True))
+        for row in chance.normal(size=joints).swapaxes(0, 1).tolist()
+    ]
+    quiet = {"state": "", "causes": (), "age": math.nan, "missed": 0, "frames": 0, "lost": 0}
+    quiet |= {"misses": 0, "stale": 0, "sent": 0}
+    kept = [replace(each, **quiet, **more) for each, more in zip(made(40), measured, strict=True)]
+    kept[20] = replace(kept[20], now=0.05)
+    with LogWriter(tmp_path / "one by one.mcap", HEADER) as log:
+        as_made(log, kept)
+    with LogWriter(tmp_path / "at once.mcap", HEADER) as log:
+        log.write_many(columns(kept[:30], names), {})
+        log.write_many(columns(kept[30:], names), {})
+    found = [messages(tmp_path / f"{name}.mcap") for name in ("one by one", "at once")]
+    assert found[0] == found[1]
+    with LogReader(tmp_path / "at once.mcap") as reader:
+        assert [each.pack() for each in reader] == [each.pack() for each in kept]
+
+
+def messages(path: Path) -> list[tuple[str, Message]]:
+    """Messages of a file as the package `mcap` reads them, with their topics, in their order."""
+    with path.open("rb") as file:
+        found = make_reader(file).iter_messages(log_time_order=False)
+        return [(channel.topic, message) for _, channel, message in found]
 
 
 def test_a_log_behind_a_queue_is_the_same(tmp_path: Path) -> None:
@@ -413,10 +460,10 @@ def test_a_tick_never_waits_for_a_slow_disk_and_those_without_room_are_counted(
     """The queue holds 30 s of ticks; what comes in order before and after stays in order."""
     begun, go_on = threading.Event(), threading.Event()
 
-    def slowly(ticks: Sequence[Tick], first: int) -> list[tuple[Tick, Beside]]:
+    def slowly(log: LogWriter, ticks: Sequence[Tick]) -> None:
         begun.set()
         go_on.wait(60)
-        return as_made(ticks, first)
+        as_made(log, ticks)
 
     kept = made(3500)
     queue = LogQueue(TickLog(tmp_path / "log.mcap", HEADER, slowly))
@@ -435,7 +482,7 @@ def test_a_tick_never_waits_for_a_slow_disk_and_those_without_room_are_counted(
 
 
 def test_a_log_that_fails_in_any_way_is_told(tmp_path: Path) -> None:
-    def broken(ticks: Sequence[Tick], first: int) -> list[tuple[Tick, Beside]]:
+    def broken(log: LogWriter, ticks: Sequence[Tick]) -> None:
         raise ValueError("ticks of 3")
 
     told = list[str]()
@@ -451,10 +498,10 @@ sys.path[:0] = {sys.path!r}
 from test_simulated_logs import HEADER, Path, TickLog, as_made, made
 
 begun = threading.Event()
-def slowly(ticks, first):
+def slowly(out, ticks):
     begun.set()
     time.sleep(0.5)
-    return as_made(ticks, first)
+    as_made(out, ticks)
 
 log = TickLog(Path(sys.argv[1]), HEADER, slowly)
 for tick in made(300):  # the first 256 are written at once
@@ -505,8 +552,9 @@ def test_a_scene_of_many_bodies_leaves_chunks_that_can_be_read(tmp_path: Path) -
     places = np.random.default_rng(0).normal(size=7500)
     message = COORDINATES.type.encode(0, tuple(places))
 
-    def beside(ticks: Sequence[Tick], _: int) -> list[tuple[Tick, Beside]]:
-        return [(each, {COORDINATES: message}) for each in ticks]
+    def beside(log: LogWriter, ticks: Sequence[Tick]) -> None:
+        places = {place: {COORDINATES: message} for place in range(len(ticks))}
+        log.write_many(columns(ticks, ()), places)
 
     path = tmp_path / "log.mcap"
     with TickLog(path, HEADER, beside) as log:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from antennate.errors import LogError
 
@@ -76,6 +77,32 @@ class MessageType:
         except (struct.error, OverflowError) as error:
             raise LogError(f"expected a {self.name} of numbers that fit, found: {error}") from None
         return _HEADER + body
+
+    def vary(self, data: bytes, columns: Mapping[str, NDArray[Any]]) -> list[bytes]:
+        """Messages that differ from a given one in some of their numbers alone.
+
+        Args:
+            data: The bytes of the given one.
+            columns: Numbers of each message by field, shape (n,), or (n, several) where the field
+                has several. Names that are no fields are passed over.
+        """
+        names, formats, offsets = list[str](), list[Any](), list[int]()
+        body, at = data[len(_HEADER) :], 0
+        for field in self.fields:
+            value, at = _take(body, at, field)
+            if field.name in columns:
+                kind = np.dtype((f"<{field.code}", np.shape(value)))
+                names.append(field.name)
+                formats.append(kind)
+                offsets.append(len(_HEADER) + at - kind.itemsize)
+        layout = np.dtype(
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": len(data)}
+        )
+        count = len(next(iter(columns.values())))
+        rows = np.frombuffer(bytearray(data * count), layout)
+        for name in names:
+            rows[name] = columns[name]
+        return rows.view(f"V{len(data)}").tolist()
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """The values by name; several are a tuple."""

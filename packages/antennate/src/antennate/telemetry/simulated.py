@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from antennate.robots.imu import AXES
 from antennate.robots.spec import RobotSpec
@@ -22,15 +23,11 @@ from antennate.sim.episode import LOOK_EVERY
 from antennate.sim.places import Contacts
 from antennate.sim.world import World
 from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import Tick, numbers_of
+from antennate.telemetry.ticks import Columns, numbers_of
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, JOINTS, MOTION, Topic
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Floats, JointCommand
 
-Beside = Mapping[Topic, bytes]
-"""Messages at the time of a tick that are no part of it, by topic."""
-HEAD = 9
-"""Numbers of a row before those of the joints: t, maneuver, phase, counts, level, contact."""
 _LEAST_FREE = 1e8
 """Room for many trials [byte] (assumed)."""
 _MOST = 256
@@ -45,7 +42,7 @@ class TickLog:
     Args:
         path: A file that does not exist yet.
         header: What stands at its beginning.
-        make: Makes ticks of what was added, many at once, from the number of the first.
+        encode: Writes what was added to the file, many ticks at once.
 
     Attributes:
         path: The file.
@@ -55,9 +52,9 @@ class TickLog:
         self,
         path: Path,
         header: Header,
-        make: Callable[[Sequence[Any], int], Iterable[tuple[Tick, Beside]]],
+        encode: Callable[[LogWriter, Sequence[Any]], object],
     ) -> None:
-        self.path, self._make = path, make
+        self.path, self._encode = path, encode
         self._out = LogWriter(path, header, _LEAST_FREE)
         self._held: list[Any] = []
         self._since = math.inf
@@ -129,9 +126,8 @@ class TickLog:
         self._writing = None
 
     def _write(self, ticks: Sequence[Any]) -> None:
-        """Make ticks, and hand them to the operating system."""
-        for tick, beside in self._make(ticks, self._out.written + 1):
-            self._out.write(tick, beside)
+        """Encode ticks, and hand them to the operating system."""
+        self._encode(self._out, ticks)
         self._out.flush()
 
 
@@ -169,7 +165,7 @@ class Decisions:
         self._kinds = [self._layout[name].base for name in self._layout.names or ()]
 
     def take(self, frame: AntennaFrame, command: JointCommand) -> bytes:
-        """One tick, for `rows`: a copy, in one piece, as this is done in every tick."""
+        """One tick, for `columns`: a copy, in one piece, as this is done in every tick."""
         controller = self._controller
         try:
             phase: Any = controller.phase
@@ -200,20 +196,17 @@ class Decisions:
         except TypeError:  # one is a view with gaps
             return b"".join([part.tobytes() for part in parts])
 
-    def rows(self, ticks: Sequence[bytes], row: int, into: Floats) -> None:
-        """Write how one row of the batch begins in some ticks.
+    def columns(self, ticks: Sequence[bytes], row: int) -> dict[str, NDArray[Any]]:
+        """What was read, decided and commanded in some ticks, for one row of the batch.
 
         Args:
             ticks: Of `take`.
             row: The row of the batch.
-            into: Where to, shape (n, 9 + joints): t, maneuver, phase, counts, level, contact, the
-                angles commanded; behind them six numbers of an inertial sensor.
         """
-        block, at = np.frombuffer(b"".join(ticks), self._layout), 0
-        for name in self._layout.names or ():
-            part = block[name][:, row].reshape(len(ticks), -1)
-            into[:, at : at + part.shape[1]] = part
-            at += part.shape[1]
+        block = np.frombuffer(b"".join(ticks), self._layout)
+        parts = {name: block[name][:, row] for name in block.dtype.names or ()}
+        angles = [parts.pop(name).reshape(len(ticks), -1) for name in self._parts]
+        return parts | {"angles": np.concatenate(angles, axis=1)}
 
 
 class TakenTick(NamedTuple):
@@ -238,9 +231,8 @@ class SimulatedLog(TickLog):
     def __init__(
         self, path: Path, header: Header, world: World, decisions: Decisions, row: int = 0
     ) -> None:
-        super().__init__(path, header, self._made)
+        super().__init__(path, header, self._write_taken)
         self._world, self._decisions, self._row = world, decisions, row
-        self._joints, self._has_imu = len(header.robot.joint_names), header.robot.has_imu
         self._ticks = 0
 
     def take(self, decided: bytes) -> None:
@@ -254,38 +246,27 @@ class SimulatedLog(TickLog):
         world = self._world
         return TakenTick(decided, world.snapshot(), Contacts.of(world.data) if look else None)
 
-    def _made(self, taken: Sequence[TakenTick], first: int) -> Iterator[tuple[Tick, Beside]]:
-        """Ticks that were taken, with what lies beside each, from this number on."""
-        end = HEAD + self._joints
-        rows = np.empty((len(taken), end + 2 * AXES * self._has_imu))
-        self._decisions.rows([tick.decided for tick in taken], self._row, rows)
+    def _write_taken(self, out: LogWriter, taken: Sequence[TakenTick]) -> None:
+        """Write ticks that were taken, with what lies beside each."""
+        decided = self._decisions.columns([tick.decided for tick in taken], self._row)
         measured, places = self._world.measured([tick.measured for tick in taken])
         looks = {i: tick.contacts for i, tick in enumerate(taken) if tick.contacts is not None}
-        beside = self._beside(looks, places) if looks else {}
-        for i, (row, of_joints) in enumerate(zip(rows.tolist(), measured.tolist(), strict=True)):
-            t, maneuver, phase, *_ = row
-            counts, level, contact = ((row[at], row[at + 1]) for at in (3, 5, 7))
-            felt = (tuple(row[at : at + AXES]) for at in range(end, len(row), AXES))
-            tick = Tick(
-                number=first + i,
-                t=t,
-                now=t,
-                counts=counts,
-                reading=counts,
-                level=level,
-                contact=(int(contact[0]), int(contact[1])),
-                maneuver=int(maneuver),
-                phase=phase,
-                angles=tuple(row[HEAD:end]),
-                **dict(zip(JOINTS[1:], map(tuple, of_joints), strict=True)),
-                **dict(zip(MOTION, felt, strict=False)),
-            )
-            yield tick, beside.get(i, {})
+        columns: Columns = {
+            **decided,
+            "now": decided["t"],
+            "reading": decided["counts"],
+            **dict(zip(JOINTS[1:], measured.swapaxes(0, 1), strict=True)),
+        }
+        out.write_many(columns, self._beside(looks, places) if looks else {})
 
-    def _beside(self, looks: Mapping[int, Contacts], places: Floats) -> Mapping[int, Beside]:
+    def _beside(
+        self, looks: Mapping[int, Contacts], places: Floats
+    ) -> Mapping[int, Mapping[Topic, bytes]]:
         """The messages beside the ticks at which one looked."""
-        root, encode = self._world.root, COORDINATES.type.encode
-        messages = {i: {COORDINATES: encode(root, places[i])} for i in looks}
+        seen = places[[*looks]]
+        first = COORDINATES.type.encode(self._world.root, seen[0])
+        coordinates = COORDINATES.type.vary(first, {"position": seen})
+        messages = {i: {COORDINATES: data} for i, data in zip(looks, coordinates, strict=True)}
         contacts = Contacts.joined([*looks.values()])
         which, names, points, forces = self._world.obstacle_contacts(contacts)
         columns = names, *points.T.tolist(), forces.tolist()

@@ -12,6 +12,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from antennate.control.decision import Decision
 from antennate.messages import one_line
@@ -32,7 +33,7 @@ from antennate.telemetry.topics import (
     Topic,
     imu_values,
 )
-from antennate.types import AntennaFrame, Controller, JointCommand
+from antennate.types import AntennaFrame, Controller, Ints, JointCommand
 
 if TYPE_CHECKING:  # a log of a simulation loads no hardware
     from antennate.hardware.safety.session import Session
@@ -42,6 +43,8 @@ _ONE = dict(zip(JOINTS[1:], ("position", "velocity", "effort"), strict=True))
 _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
+Columns = Mapping[str, NDArray[Any]]
+"""Numbers of ticks by the names of `Tick`, shape (n,), or (n, several) where a tick has several."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,6 +227,26 @@ class Tick:
             felt = IMU.decode(messages[IMU])
             values |= {kind: felt[kind] for kind in MOTION}
         return cls(**values)
+
+
+def messages_of(columns: Columns, names: tuple[str, ...], stamps: Ints) -> dict[Topic, list[bytes]]:
+    """Messages of many ticks by topic, those that `Tick.messages` gives of each.
+
+    Args:
+        columns: Numbers of the ticks; what is missing has its default in all of them.
+        names: Names of the joints.
+        stamps: Time of the messages of each tick [ns], shape (n,).
+    """
+    first = Tick(**{name: column[0].tolist() for name, column in columns.items()})
+    more = {
+        JOINT_COMMANDS: {"position": columns["angles"]},
+        JOINT_STATES: {name: columns[kind] for kind, name in _ONE.items() if kind in columns},
+    }
+    varying = {**columns, "sec": stamps // 10**9, "nanosec": stamps % 10**9}
+    return {
+        topic: topic.type.vary(data, varying | more.get(topic, {}))
+        for topic, data in first.messages(names, 0)
+    }
 
 
 def _named(columns: Sequence[str], values: Sequence[Any]) -> dict[str, Any]:

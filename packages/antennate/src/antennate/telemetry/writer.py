@@ -16,14 +16,17 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, cast
+
+import numpy as np
 
 from antennate import __version__
 from antennate.errors import LogError, reason
 from antennate.files import require_room
 from antennate.telemetry.header import LIBRARY, Header
-from antennate.telemetry.ticks import Tick
+from antennate.telemetry.ticks import Columns, Tick, messages_of
 from antennate.telemetry.topics import EVENTS, Topic, topics_of
 
 LEAST_FREE = 1e9
@@ -108,12 +111,8 @@ class LogWriter:
             for topic in topics
         }
 
-    def write(self, tick: Tick, beside: Mapping[Topic, bytes] | None = None) -> None:
+    def write(self, tick: Tick) -> None:
         """Add a tick. After a failure or `close` it does nothing.
-
-        Args:
-            tick: The tick.
-            beside: More messages of its time, by topic.
 
         Raises:
             LogError: A number does not fit; or the disk is full or gone, which is raised once, and
@@ -122,7 +121,7 @@ class LogWriter:
         if self.failure:
             return
         stamp = self._stamp(tick.now)
-        messages = [*tick.messages(self._names, stamp), *(beside or {}).items()]
+        messages = [*tick.messages(self._names, stamp)]
         named = {cause.partition(":")[0] for cause in tick.causes}
         if tick.state != self._state:
             self._told.clear()
@@ -134,6 +133,35 @@ class LogWriter:
         self._state = tick.state
         self.written += 1
         self.settle()
+
+    def write_many(self, columns: Columns, beside: Mapping[int, Mapping[Topic, bytes]]) -> None:
+        """Add ticks of a robot without a supervisor; their numbers follow the last one's.
+
+        Args:
+            columns: Numbers of the ticks, at least one.
+            beside: More messages of a tick's time, by its place in the columns and by topic.
+
+        Raises:
+            LogError: The disk is full or gone.
+        """
+        if self.failure:
+            return
+        stamps = [*accumulate(map(self._stamp, columns["now"].tolist()), max)]
+        numbers = self.written + 1 + np.arange(len(stamps))
+        messages = messages_of({**columns, "number": numbers}, self._names, np.array(stamps))
+        channels, add = [self._channels[topic] for topic in messages], self._mcap.add_message
+        size = sum(len(each[0]) for each in messages.values())
+        for place, (stamp, *row) in enumerate(zip(stamps, *messages.values(), strict=True)):
+            self.written += 1
+            number = self.written & _NUMBERS
+            for channel, data in zip(channels, row, strict=True):
+                add(channel, stamp, data, stamp, number)
+            self._size += size
+            for topic, data in beside.get(place, {}).items():
+                self.add(topic, number, stamp, data)
+            if self._size >= _CHUNK:
+                self.flush()
+        self._time = stamps[-1]
 
     def add(self, topic: Topic, number: int, stamp: int, data: bytes) -> None:
         """Add a message as it is, of a tick and a time [ns], not before the last one's.
