@@ -47,16 +47,16 @@ EACH = 3
 """Episodes of each scene in a round of a design."""
 MOST_DESIGNS = 100
 """In the file, so that a design more leaves the draws of the others as they are."""
-LIMIT = 50.0
+LIMIT = 60.0
 """Time after which an episode ends [s]."""
-FREQUENCY = 1.0
+FREQUENCY = 0.8
 """Of the gait [Hz]: that of the studies of the side before this one."""
 APPROACH = 0.4
 """From the start to the entrance [m]: antennae of 0.32 m touch nothing at the start."""
 SCENES = ("tunnel", "corner", "uturn", "room", "deadend")
 EVERY = 5
 """Ticks that one sample is the mean of: 20 Hz."""
-JAM_TIME = 1.5
+JAM_TIME = 1.9
 """Time for which a robot is jammed before it is told [s]; the rule itself needs 1.5 gait cycles."""
 LINK = 0.02
 """Link of the paper's antenna [m], of which coils and mass are known."""

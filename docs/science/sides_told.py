@@ -28,7 +28,7 @@ from antennate.types import Floats
 HERE = Path(__file__).parent
 ASIDE = math.radians(30.0)
 """Angle to the point ahead from which on there is a side to ask for [rad], as in knowledge.md."""
-RATE, CYCLE = 20, 20
+RATE, CYCLE = 20, 25
 """Samples of a second, and of a gait cycle."""
 SHORTEST = 2 * RATE
 """Samples before a jam without which nothing is asked."""
