@@ -1,0 +1,435 @@
+"""What a side of a given certainty is worth: `python docs/science/sides_worth.py PART FOLDER`.
+
+A teller with errors stands between the truth and the escape of `geometric`: at each decision to
+turn it tells a side, which is the right one with the probability of an AUC. Parts: `trials` runs
+all rivals through the draws, and goes on where it was stopped; `table` writes the table of
+docs/science/sides.md, docs/science/sides_worth.json and the figure, of the draws that all rivals
+have done. The criterion is that page's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.special import ndtri
+
+from antennate.control.knowledge import Knowledge
+from antennate.control.registry import make_controller
+from antennate.experiments.tunnel.batch import run_trials
+from antennate.experiments.tunnel.lockstep import Apparatus, cpu_bodies
+from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
+from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
+from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
+from antennate.sim.knowledge import SIDE_AHEAD
+from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
+
+HERE = Path(__file__).parent
+SEEDS = (591_001, 591_002, 591_003)
+"""Of the rounds, by turns; none was used before."""
+SMOKE = (590_900,)
+"""To see that all this runs."""
+EACH = 10
+"""Draws of a scene in a round: six rounds are 60 draws of three seeds."""
+LIMIT = 100.0
+"""Time after which a trial has failed [s]."""
+FREQUENCY = 1.0
+"""Of the gait [Hz]."""
+PLACE = 0.4
+"""How far apart jams of one place are, at most [m]: a corridor's width."""
+SCENES = ("tunnel", "corner", "uturn", "room", "deadend")
+AUCS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+RESAMPLES = 10_000
+"""Of the bootstrap over draws."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A controller and what it is told.
+
+    Attributes:
+        controller: Its name.
+        side: Whether it knows the side as `--knows side` tells it.
+        auc: Of the teller's score; None without a teller.
+        kept: Whether an error is kept at a place; else each decision has its own.
+        first: Whether it asks at the first try of a jam alone, and then searches both sides.
+        optional: Whether it runs after the others.
+    """
+
+    controller: str = "geometric"
+    side: bool = False
+    auc: float | None = None
+    kept: bool = False
+    first: bool = False
+    optional: bool = False
+
+
+def rivals() -> dict[str, Rival]:
+    """All rivals, by name."""
+    found = {"geometric": Rival(), "geometric-side": Rival(side=True)}
+    found |= {"timed": Rival("timed"), "timed-side": Rival("timed", side=True)}
+    found |= {f"told-{auc:g}": Rival(auc=auc) for auc in AUCS}
+    found |= {f"kept-{auc:g}": Rival(auc=auc, kept=True) for auc in AUCS[:-1]}
+    return found | {f"first-{auc:g}": Rival(auc=auc, first=True, optional=True) for auc in AUCS[1:]}
+
+
+RIVALS = rivals()
+
+
+class Errors:
+    """Chance of a trial's teller, the same for all rivals: a score's error and a coin, each time.
+
+    Args:
+        key: Seed, scene and number of the trial.
+    """
+
+    def __init__(self, key: Iterable[int]) -> None:
+        self._rng = np.random.default_rng([*key])
+        self._places: list[tuple[Floats, tuple[float, float]]] = []
+
+    def next(self) -> tuple[float, float]:
+        """Error of a score, of the standard normal distribution, and a coin, -1 or 1."""
+        error, coin = self._rng.standard_normal(2)
+        return float(error), math.copysign(1.0, coin)
+
+    def of_place(self, head: Floats) -> tuple[float, float]:
+        """Those of the place of a head [m], shape (2,); of a new place the next ones."""
+        for place, found in self._places:
+            if math.dist(place, head) < PLACE:
+                return found
+        self._places.append((head.copy(), self.next()))
+        return self._places[-1][1]
+
+
+class Teller:
+    """A controller that is told a side by a teller with errors.
+
+    A score is normal about +d/2 on the left and -d/2 on the right; its sign is told. An error that
+    is kept is one of right or wrong: at that place the teller is wrong whatever the side is by
+    then. Where the way goes straight on neither side is right: the teller tosses a coin.
+
+    Args:
+        made: The controller.
+        rival: How it is told.
+        bodies: The simulated robots.
+        keys: Seed, scene and number of the trial of each row.
+        batch: Rows.
+    """
+
+    knows = needs = ("side",)
+
+    def __init__(
+        self, made: Any, rival: Rival, bodies: Any, keys: dict[int, tuple[int, ...]], batch: int
+    ) -> None:
+        self._made, self._rival, self._bodies, self._keys = made, rival, bodies, keys
+        self._half = math.sqrt(0.5) * float(ndtri(rival.auc))
+        self._errors: dict[int, Errors] = {}
+        self._drawn = np.tile([0.0, 1.0], (batch, 1))
+        self._before = np.full(batch, int(Maneuver.FORWARD))
+        self._truth = np.zeros(batch, int)
+        self._told = np.zeros(batch, int)
+        self.decisions: dict[int, list[tuple[int, int]]] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._made, name)
+
+    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+        """Start rows anew."""
+        self._made.reset(rows, phase)
+        self._before[rows] = int(Maneuver.FORWARD)
+        for row in np.arange(len(self._before))[rows].tolist():
+            self._errors[row] = Errors(self._keys[row])
+            self.decisions[self._keys[row][-1]] = []
+
+    def know(self, knowledge: Knowledge) -> None:
+        """Take the truth; tell the controller a side."""
+        assert knowledge.side is not None
+        self._truth, (error, coin) = knowledge.side, self._drawn.T
+        right = self._half + error > 0.0
+        told = np.where(self._truth == 0, coin, np.where(right, self._truth, -self._truth))
+        if self._rival.first:
+            told = np.where(self._made.rule._search.tries == 0, told, 0.0)
+        self._told = told.astype(int)
+        self._made.know(Knowledge(side=self._told))
+
+    def step(self, frame: AntennaFrame) -> JointCommand:
+        """One control period; a draw for each row that begins to back off."""
+        command = self._made.step(frame)
+        now, before = self._made.maneuver, self._before
+        now = np.where(now == int(Maneuver.HOLD), before, now)
+        backs, backed = (m == int(Maneuver.REVERSE) for m in (now, before))
+        for row in np.flatnonzero(backs & ~backed).tolist():
+            errors = self._errors[row]
+            head = self._bodies.world(row).head[:2]
+            self._drawn[row] = errors.of_place(head) if self._rival.kept else errors.next()
+        for row in np.flatnonzero(backed & ~backs).tolist():
+            decision = int(self._truth[row]), int(self._told[row])
+            self.decisions[self._keys[row][-1]].append(decision)
+        self._before = now
+        return command
+
+
+def run_round(folder: Path, name: str, scene: str, number: int, smoke: bool) -> str:
+    """Run a round of draws of a rival in a scene, and write their rows."""
+    path = folder / f"{name}_{scene}_{number}.json"
+    if path.exists():
+        return f"{path.stem}: done before"
+    rival, each = RIVALS[name], 3 if smoke else EACH
+    seeds = SMOKE if smoke else SEEDS
+    seed, first = seeds[number % len(seeds)], number // len(seeds) * each
+    config = TunnelConfig(
+        seed=seed,
+        scene=scene,
+        trials=first + each,
+        time_limit=LIMIT,
+        knows=("side",) if rival.side else (),
+        control=ControlParams(gait=GaitParams(frequency=FREQUENCY)),
+    )
+    robots: list[Any] = []
+    tellers: list[Teller] = []
+    keys: dict[int, tuple[int, ...]] = {}
+
+    def bodies(batch: int) -> Any:
+        drawn, robot = cpu_bodies(config)(batch)
+        robots.append(robot)
+        return drawn, robot
+
+    def make(_: str, control: Any, robot: Any, batch: int) -> Any:
+        made = make_controller(rival.controller, control, robot, batch)
+        if rival.auc is None:
+            return made
+        tellers.append(Teller(made, rival, robots[-1], keys, batch))
+        return tellers[-1]
+
+    def monitor(row: int, episode: Any) -> TrialMonitor:
+        keys[row] = seed, SCENES.index(scene), episode.number
+        return TrialMonitor(episode, name)
+
+    rows: list[dict[str, Any]] = []
+    begun = time.process_time()
+    run_trials(
+        *(config, rival.controller, range(first, first + each)),
+        emit=lambda found: rows.append(asdict(found[0])),
+        apparatus=Apparatus(make, bodies, monitor),
+    )
+    decisions = {k: v for teller in tellers for k, v in teller.decisions.items()}
+    kept: list[dict[str, Any]] = [
+        {key: row[key] for key in ("seed", "trial", "outcome", "time_s", "reason")}
+        | {"decisions": decisions.get(row["trial"], [])}
+        for row in sorted(rows, key=lambda row: row["trial"])
+    ]
+    cpu = time.process_time() - begun
+    folder.mkdir(parents=True, exist_ok=True)
+    short = path.with_suffix(".part")
+    short.write_text(json.dumps({"cpu_s": cpu, "rows": kept}) + "\n")
+    short.rename(path)
+    walked = sum(row["time_s"] for row in kept)
+    return f"{path.stem}: {walked:.0f} s of walking in {cpu:.0f} s of a processor"
+
+
+def trials(folder: Path, rounds: int, workers: int, smoke: bool) -> None:
+    """Run all rivals, a round after the other; those that are optional after all others."""
+    tasks = [
+        (folder, name, scene, number, smoke)
+        for optional in (False, True)
+        for number in range(rounds)
+        for name, rival in RIVALS.items()
+        if rival.optional == optional
+        for scene in SCENES
+    ]
+    with ProcessPoolExecutor(workers) as pool:
+        for done in pool.map(run_round, *zip(*tasks, strict=True)):
+            print(done, flush=True)
+
+
+def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]]]:
+    """Times of each rival [s], shape (scenes, draws), NaN if invalid, and how many were right.
+
+    A failure counts as the limit. Draws are those that all rivals of the folder have done.
+    """
+    rows: dict[str, dict[tuple[str, int, int], Any]] = {}
+    for path in sorted(folder.glob("*.json")):
+        name, scene, _ = path.stem.split("_")
+        for row in json.loads(path.read_text())["rows"]:
+            rows.setdefault(name, {})[scene, row["seed"], row["trial"]] = row
+    usual = [rows.get(name, {}) for name in RIVALS if not RIVALS[name].optional]
+    draws = sorted(
+        {key[1:] for key in usual[0] if all((s, *key[1:]) in r for r in usual for s in SCENES)}
+    )
+    times, told = {}, {}
+    for name in RIVALS:
+        if not all((s, *d) in rows.get(name, {}) for s in SCENES for d in draws):
+            continue
+        cells = [[rows[name][s, *draw] for draw in draws] for s in SCENES]
+        times[name] = np.array([[time_of(row) for row in line] for line in cells])
+        told[name] = shares([row["decisions"] for line in cells for row in line])
+    return times, told
+
+
+def time_of(row: dict[str, Any]) -> float:
+    """Time of a trial [s]: a failure as the limit, NaN if it is invalid."""
+    if row["outcome"] == "invalid":
+        return math.nan
+    return min(row["time_s"], LIMIT) if row["outcome"] == "success" else LIMIT
+
+
+def shares(trials: list[Any]) -> dict[str, Any]:
+    """Number of decisions with a side, of those told rightly, and of those without a side."""
+    pairs = np.array([pair for decisions in trials for pair in decisions], int).reshape(-1, 2)
+    truth, told = pairs[(pairs[:, 0] != 0) & (pairs[:, 1] != 0)].T
+    return {
+        "decisions": len(truth),
+        "right": int((truth == told).sum()),
+        "straight": int((pairs[:, 0] == 0).sum()),
+    }
+
+
+def saved(base: Floats, other: Floats, chance: Ints) -> dict[str, Any]:
+    """Time that another rival saves [s], in each scene and in all alike, with 95 % intervals.
+
+    Args:
+        base: Times of the one that it is compared with, shape (scenes, draws).
+        other: Its times.
+        chance: Draws of each resample, shape (resamples, draws).
+    """
+    gain = base - other
+    resampled = np.nanmean(gain[:, chance], axis=2)
+    ends = np.percentile(resampled, [2.5, 97.5], axis=1).T
+    pooled = np.percentile(resampled.mean(axis=0), [2.5, 97.5])
+    return {
+        "scenes": np.nanmean(gain, axis=1).tolist(),
+        "scenes_95": ends.tolist(),
+        "all": float(np.nanmean(gain, axis=1).mean()),
+        "all_95": pooled.tolist(),
+    }
+
+
+def table(folder: Path) -> None:
+    """Write the numbers, the figure and the table of the page."""
+    times, told = times_of(folder)
+    count = next(iter(times.values())).shape[1]
+    if not count:
+        sys.exit("expected a draw that all rivals have done, found none")
+    chance = np.random.default_rng(59).integers(count, size=(RESAMPLES, count))
+    result = {
+        "seeds": SEEDS,
+        "draws": count,
+        "limit_s": LIMIT,
+        "frequency_hz": FREQUENCY,
+        "side_ahead_m": SIDE_AHEAD,
+        "scenes": SCENES,
+        "rivals": {
+            name: {
+                "valid": np.isfinite(found).sum(axis=1).tolist(),
+                "crossed": (found < LIMIT).sum(axis=1).tolist(),
+                "mean_s": np.nanmean(found, axis=1).tolist(),
+                **told[name],
+                "saved": saved(times["geometric"], found, chance),
+                "saved_chance": saved(times["told-0.5"], found, chance),
+            }
+            for name, found in times.items()
+        },
+    }
+    (HERE / "sides_worth.json").write_text(json.dumps(result, indent=1) + "\n")
+    (HERE / "sides_worth.png").write_bytes(render(_figure(result["rivals"]))["png"])
+    write(result)
+
+
+LABELS = {
+    "geometric": "`geometric`, own readings",
+    "geometric-side": "`geometric`, `--knows side`",
+    "timed": "`timed`, blind",
+    "timed-side": "`timed`, `--knows side`",
+}
+"""Rows of the table without a teller."""
+KINDS = {"told": "AUC {}", "kept": "AUC {}, errors kept", "first": "AUC {}, first try alone"}
+
+
+def label(name: str) -> str:
+    """Name of a row of the table."""
+    kind, _, auc = name.partition("-")
+    return LABELS.get(name) or KINDS[kind].format(auc)
+
+
+def span(value: float, ends: list[float]) -> str:
+    """Difference and its interval [s]."""
+    return f"{value:+.1f} ({ends[0]:+.1f} to {ends[1]:+.1f})"
+
+
+def write(result: dict[str, Any]) -> None:
+    """Write the table of the page."""
+    heads = ("side told", "right", *(f"`{scene}`" for scene in SCENES), "crossed")
+    heads = (*heads, "mean [s]", "saved against `geometric` [s]", "saved against AUC 0.5 [s]")
+    lines = [
+        f"{result['draws']} draws of each scene, seeds {', '.join(map(str, result['seeds']))}, at "
+        f"most {LIMIT:g} s. Each scene: mean time [s] and how many crossed.",
+        "",
+        f"| {' | '.join(heads)} |",
+        "|" + " --- |" * len(heads),
+    ]
+    for name, cell in result["rivals"].items():
+        share = f"{100 * cell['right'] / cell['decisions']:.0f} %" if cell["decisions"] else ""
+        scenes = [f"{m:.1f}, {n}" for m, n in zip(cell["mean_s"], cell["crossed"], strict=True)]
+        whole = f"{sum(cell['crossed'])} of {sum(cell['valid'])}", f"{np.mean(cell['mean_s']):.1f}"
+        gains = [span(cell[k]["all"], cell[k]["all_95"]) for k in ("saved", "saved_chance")]
+        gains = ["" if gain.startswith("+0.0 (+0.0") else gain for gain in gains]
+        lines.append(f"| {' | '.join([label(name), share, *scenes, *whole, *gains])} |")
+    lines += ["", "![Time saved by a teller, by its AUC](sides_worth.png)"]
+    page = HERE / "sides.md"
+    begin, rest = page.read_text().split("<!-- worth: ")
+    head, rest = rest.split("\n", 1)
+    _, after = rest.split("<!-- end of worth -->")
+    text = "\n".join(lines)
+    page.write_text(f"{begin}<!-- worth: {head}\n{text}\n<!-- end of worth -->{after}")
+
+
+@styled
+def _figure(cells: dict[str, Any]) -> Figure:
+    """Time saved against `geometric`, by the AUC of the teller."""
+    figure = canvas(WIDTH, 2.8)
+    panel = figure.subplots()
+    names = {"told": "errors anew", "kept": "errors kept at a place", "first": "asked once a jam"}
+    for place, (kind, words) in enumerate(names.items()):
+        found = [(auc, cells[f"{kind}-{auc:g}"]) for auc in AUCS if f"{kind}-{auc:g}" in cells]
+        if not found:
+            continue
+        at = np.array([auc for auc, _ in found]) + 0.006 * (place - 1)
+        mean = [cell["saved"]["all"] for _, cell in found]
+        low, high = np.array([cell["saved"]["all_95"] for _, cell in found]).T
+        panel.plot(at, mean, "o-", color=SERIES[place], markersize=3, label=words)
+        panel.vlines(at, low, high, color=SERIES[place])
+    panel.axhline(0.0, color=INK, linewidth=0.8)
+    panel.set_xlabel("AUC of the teller")
+    panel.set_ylabel("time saved against geometric [s]")
+    panel.legend(fontsize=7)
+    return figure
+
+
+def main(argv: list[str]) -> None:
+    """Do what is asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("part", choices=["trials", "table"])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--rounds", type=int, default=6)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--smoke", action="store_true", help="three draws of a seed of their own")
+    asked = parser.parse_args(argv)
+    if asked.part == "table":
+        table(asked.folder)
+    else:
+        trials(asked.folder, 1 if asked.smoke else asked.rounds, asked.workers, asked.smoke)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
