@@ -45,7 +45,7 @@ EACH = 10
 LIMIT = 100.0
 """Time after which a trial has failed [s]."""
 FREQUENCY = 1.0
-"""Of the gait [Hz]."""
+"""Of the gait [Hz], unless another is asked for."""
 PLACE = 0.4
 """How far apart jams of one place are, at most [m]: a corridor's width."""
 SCENES = ("tunnel", "corner", "uturn", "room", "deadend")
@@ -180,10 +180,14 @@ class Teller:
         return command
 
 
-def run_round(folder: Path, name: str, scene: str, number: int, smoke: bool) -> str:
+def run_round(
+    folder: Path, name: str, scene: str, number: int, smoke: bool, frequency: float
+) -> str:
     """Run a round of draws of a rival in a scene, and write their rows."""
     path = folder / f"{name}_{scene}_{number}.json"
     if path.exists():
+        if json.loads(path.read_text())["frequency_hz"] != frequency:
+            raise ValueError(f"{path}: expected a run at {frequency:g} Hz, found another")
         return f"{path.stem}: done before"
     rival, each = RIVALS[name], 3 if smoke else EACH
     seeds = SMOKE if smoke else SEEDS
@@ -194,7 +198,7 @@ def run_round(folder: Path, name: str, scene: str, number: int, smoke: bool) -> 
         trials=first + each,
         time_limit=LIMIT,
         knows=("side",) if rival.side else (),
-        control=ControlParams(gait=GaitParams(frequency=FREQUENCY)),
+        control=ControlParams(gait=GaitParams(frequency=frequency)),
     )
     robots: list[Any] = []
     tellers: list[Teller] = []
@@ -232,16 +236,17 @@ def run_round(folder: Path, name: str, scene: str, number: int, smoke: bool) -> 
     cpu = time.process_time() - begun
     folder.mkdir(parents=True, exist_ok=True)
     short = path.with_suffix(".part")
-    short.write_text(json.dumps({"cpu_s": cpu, "rows": kept}) + "\n")
+    found = {"frequency_hz": frequency, "cpu_s": cpu, "rows": kept}
+    short.write_text(json.dumps(found) + "\n")
     short.rename(path)
     walked = sum(row["time_s"] for row in kept)
     return f"{path.stem}: {walked:.0f} s of walking in {cpu:.0f} s of a processor"
 
 
-def trials(folder: Path, rounds: int, workers: int, smoke: bool) -> None:
+def trials(folder: Path, rounds: int, workers: int, smoke: bool, frequency: float) -> None:
     """Run all rivals, a round after the other; those that are optional after all others."""
     tasks = [
-        (folder, name, scene, number, smoke)
+        (folder, name, scene, number, smoke, frequency)
         for optional in (False, True)
         for number in range(rounds)
         for name, rival in RIVALS.items()
@@ -324,6 +329,9 @@ def chance_of(name: str, times: Any) -> str:
 def table(folder: Path) -> None:
     """Write the numbers, the figure and the table of the page."""
     times, told = times_of(folder)
+    paces = {json.loads(path.read_text())["frequency_hz"] for path in folder.glob("*.json")}
+    if len(paces) != 1:
+        sys.exit(f"expected a folder of one pace, found {sorted(paces)} Hz")
     count = next(iter(times.values())).shape[1]
     if not count:
         sys.exit("expected a draw that all rivals have done, found none")
@@ -332,7 +340,7 @@ def table(folder: Path) -> None:
         "seeds": SEEDS,
         "draws": count,
         "limit_s": LIMIT,
-        "frequency_hz": FREQUENCY,
+        "frequency_hz": paces.pop(),
         "side_ahead_m": SIDE_AHEAD,
         "scenes": SCENES,
         "rivals": {
@@ -379,7 +387,8 @@ def write(result: dict[str, Any]) -> None:
     heads = (*heads, "mean [s]", "saved against `geometric` [s]", "saved against its AUC 0.5 [s]")
     lines = [
         f"{result['draws']} draws of each scene, seeds {', '.join(map(str, result['seeds']))}, at "
-        f"most {LIMIT:g} s. Each scene: mean time [s] and how many crossed.",
+        f"{result['frequency_hz']:g} Hz, at most {LIMIT:g} s. Each scene: mean time [s] "
+        "and how many crossed.",
         "",
         f"| {' | '.join(heads)} |",
         "|" + " --- |" * len(heads),
@@ -430,11 +439,13 @@ def main(argv: list[str]) -> None:
     parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--smoke", action="store_true", help="three draws of a seed of their own")
+    parser.add_argument("--frequency", type=float, default=FREQUENCY, help="of the gait [Hz]")
     asked = parser.parse_args(argv)
     if asked.part == "table":
         table(asked.folder)
     else:
-        trials(asked.folder, 1 if asked.smoke else asked.rounds, asked.workers, asked.smoke)
+        rounds = 1 if asked.smoke else asked.rounds
+        trials(asked.folder, rounds, asked.workers, asked.smoke, asked.frequency)
 
 
 if __name__ == "__main__":
