@@ -50,7 +50,7 @@ MOST_DESIGNS = 100
 LIMIT = 60.0
 """Time after which an episode ends [s]."""
 FREQUENCY = 0.8
-"""Of the gait [Hz]: that of the studies of the side before this one."""
+"""Of the gait [Hz]; its reason stands in sides.md."""
 APPROACH = 0.4
 """From the start to the entrance [m]: antennae of 0.32 m touch nothing at the start."""
 SCENES = ("tunnel", "corner", "uturn", "room", "deadend")
