@@ -91,6 +91,11 @@ def former(words: Sequence[str]) -> str:
     return ""
 
 
+def installation(package: str) -> str:
+    """How to get a package of ours; it follows words such as `install it with`."""
+    return f"`pip install ./antennate/packages/{package}`, with the clone as ./antennate"
+
+
 def extra(name: str, package: str = "antennate") -> str:
     """How to get an extra of a package of ours; it follows words such as `install it with`."""
     return (

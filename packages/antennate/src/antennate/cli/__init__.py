@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,8 +61,6 @@ _EXPERIMENTS = (
     *("study", "dataset", "reproduce", "tracks", "servo"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
-_OF_LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo")
-"""Commands of the distribution `antennate-lab`."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}
 
 
@@ -133,6 +131,17 @@ def described(name: str) -> Command:
     raise AssertionError(f"{name} took {OptionsRequest.WORD} for an order")
 
 
+def _described() -> Iterator[Command]:
+    """Every command for its completion; one that cannot be loaded is told on stderr."""
+    from antennate.errors import BadInputError
+
+    for name in commands():
+        try:
+            yield described(name)
+        except BadInputError as error:
+            sys.stderr.write(f"antennate: warning: {error}\n")
+
+
 def _divided(words: Sequence[str]) -> tuple[str, list[str]]:
     """The name of the command, behind that of its group, and its words; empty if there is none."""
     name = words[0] if words else ""
@@ -184,8 +193,7 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
         if not name and words[0] == "--completion":
             from antennate.cli.help import script
 
-            pages = (described(name) for name in commands())
-            sys.stdout.write(script(words[1:], commands(), pages))
+            sys.stdout.write(script(words[1:], commands(), _described()))
             return OK
         _refuse_names(name, words)
         return carry_out(name, words)
@@ -217,12 +225,13 @@ def _refuse_names(name: str, words: Sequence[str]) -> None:
 
 def _unknown(group: str, word: str) -> str:
     """What is said of a word that is no command, or the old name of one."""
+    from antennate.experiments import LABORATORY, unknown
     from antennate.messages import nearest, shortened, typed
 
     if command_words(word) != word:
         return f"{word} is `{typed(word)}` now"
-    if word in _OF_LABORATORY:
-        return f"{word}: expected the package antennate-lab, which has this command, found none"
+    if not group and word in LABORATORY:
+        return unknown(word)
     known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"
     return f"expected a command{choices}, found {shortened(word)}"
@@ -244,7 +253,7 @@ def _top() -> dict[str, str]:
     """What stands in the list of commands: those that are in no group, and the groups."""
     known = _GROUPS | commands()
     listed = [*_EXPERIMENTS, *ROBOT_COMMANDS, *LOG_COMMANDS, *known]
-    return {name: known[name] for name in listed if " " not in name}
+    return {name: known[name] for name in listed if name in known and " " not in name}
 
 
 def _usage() -> str:

@@ -16,7 +16,7 @@ from antennate.cli.options import fields_of, flag_of
 from antennate.cli.results import drawn_table, folder_for, show_result
 from antennate.cli.terminal import BAD_INPUT, INTERRUPTED, OK, progress, stop_signals, told
 from antennate.errors import FAILURES, BadInputError, ConfigError, OutputError, raised
-from antennate.experiments import is_ours
+from antennate.experiments import is_explained
 from antennate.experiments.running import keep, names_of, require_films, write_films
 from antennate.messages import shortened, typed
 from antennate.params.base import Params
@@ -29,6 +29,7 @@ from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS, RESULT, SHARD
 from antennate.studies.tables import Interim, Table
 from antennate.studies.trial_file import Content
+from antennate.studies.work import package_of
 
 if TYPE_CHECKING:
     from antennate.telemetry.view.simulation import SimulationView
@@ -212,7 +213,10 @@ def _outcome(
         rows = interim.table()
         return None if rows is None else drawn_table(rows)
 
-    with progress(experiment.counted or experiment.name, table) as step, told():
+    with (
+        progress(experiment.counted or experiment.name, table) as step,
+        told(package_of(experiment.config)),
+    ):
         return experiment.run(config, workers, step, on_row, **how)
 
 
@@ -226,7 +230,7 @@ def _end(
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
     found, title = outcome.result(), experiment.view.title
-    explained = "docs/results.md" if is_ours(experiment.name) else ""
+    explained = "docs/results.md" if is_explained(experiment) else ""
     result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))
     again = ""

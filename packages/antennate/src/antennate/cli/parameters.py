@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+import sys
 from collections.abc import Collection, Sequence
 from types import ModuleType
 from typing import Any
@@ -60,8 +61,10 @@ def _groups(module: ModuleType) -> list[type[Params]]:
 
 def _commands() -> list[type[Params]]:
     """Classes that hold the top level of a command's parameters."""
-    known = map(experiments.load, sorted(experiments.names()))
-    found = [group for each in known for group in _nested(each.config, experiments.home(each))]
+    known = experiments.loaded(lambda why: sys.stderr.write(f"parameters: warning: {why}\n"))
+    found = [
+        group for each in known.values() for group in _nested(each.config, experiments.home(each))
+    ]
     found += _HARDWARE
     found += [group for name in _OTHERS for group in _groups(importlib.import_module(name))]
     return list(dict.fromkeys(found))

@@ -322,17 +322,19 @@ def progress(
 
 
 @contextlib.contextmanager
-def told() -> Iterator[None]:
-    """Show on stderr what the package logs meanwhile: notes, and warnings as always."""
-    logger, handler = logging.getLogger("antennate"), logging.StreamHandler(sys.stderr)
-    level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
+def told(package: str) -> Iterator[None]:
+    """Show on stderr what this package and `antennate` log meanwhile: notes, and warnings."""
+    loggers = [logging.getLogger(name) for name in {"antennate", package}]
+    levels, handler = [logger.level for logger in loggers], logging.StreamHandler(sys.stderr)
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
     try:
         yield
     finally:
-        logger.removeHandler(handler)
-        logger.setLevel(level)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.removeHandler(handler)
+            logger.setLevel(level)
 
 
 class _Pace:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError, in_one_line
-from antennate.messages import nearest, shortened
+from antennate.messages import installation, nearest, shortened
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 GROUP = "antennate.experiments"
 """Group of the entry points."""
+LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo")
+"""Experiments of the distribution `antennate-lab`, which may not be installed."""
 FITTED = "fitted"
 """What stands for a file of `fitted`, as in `--config fitted`."""
 
@@ -36,6 +39,11 @@ def is_ours(name: str) -> bool:
 def home(experiment: Experiment[Any, Any]) -> str:
     """Package whose modules belong to an experiment alone."""
     return experiment.config.__module__.rpartition(".")[0]
+
+
+def is_explained(experiment: Experiment[Any, Any]) -> bool:
+    """Whether docs/results.md says what its rows mean: that of this package or the laboratory."""
+    return home(experiment).partition(".")[0] in ("antennate", "antennate_lab")
 
 
 def names() -> list[str]:
@@ -52,33 +60,47 @@ def fitted() -> dict[str, Path]:
 def summaries() -> dict[str, str]:
     """Name and summary of every experiment; ours are not loaded for it."""
     texts = {name: _first_line(f"{__name__}.{name}") for name in _folders()}
-    for name, entry in _entries().items():
+    for name in names():
         if name not in texts:
             try:
-                place, _, last = entry.module.rpartition(".")
+                place, _, last = _entry(name).module.rpartition(".")
                 texts[name] = (last == "experiment" and _first_line(place)) or _described(name)
             except BadInputError as error:
                 texts[name] = f"({error})"
     return texts
 
 
+def loaded(tell: Callable[[str], object]) -> dict[str, Experiment[Any, Any]]:
+    """Every experiment that can be loaded, by name; of another one `tell` gets the reason."""
+    found = {}
+    for name in sorted(names()):
+        try:
+            found[name] = load(name)
+        except BadInputError as error:
+            tell(str(error))
+    return found
+
+
 def load(name: str) -> Experiment[Any, Any]:
     """The experiment of this name."""
     if is_ours(name):
         return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
-    entries = _entries()
-    if name not in entries:
-        raise BadInputError(unknown(name))
+    entry = _entry(name)
     try:
-        return entries[name].load()
+        return entry.load()
     except (Exception, SystemExit) as error:  # a module may end the program when it is imported
         raise BadInputError(
-            f"{name}: expected an experiment at {entries[name].value}, found: {in_one_line(error)}"
+            f"{name}: expected an experiment at {entry.value}, found: {in_one_line(error)}"
         ) from error
 
 
 def unknown(name: str) -> str:
     """What is said of a name that no experiment has."""
+    if name in LABORATORY:
+        return (
+            f"expected the package antennate-lab, which has {name}, found none; install it with "
+            f"{installation('antennate-lab')}"
+        )
     known = names()
     hint = nearest(name, known)
     return f"expected an experiment{hint}, one of {', '.join(known)}, found {shortened(name)}"
@@ -101,7 +123,24 @@ def _folders() -> tuple[str, ...]:
     return tuple(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)
 
 
-def _entries() -> dict[str, EntryPoint]:
+def _entry(name: str) -> EntryPoint:
+    """The entry point of this name; one that is found twice, as in a clone, is one."""
+    entries = {entry.value: entry for entry in _entries().get(name, ())}
+    if not entries:
+        raise BadInputError(unknown(name))
+    if len(entries) > 1:
+        those = " and ".join(
+            f"{value} of {entry.dist.name if entry.dist else 'nothing known'}"
+            for value, entry in entries.items()
+        )
+        raise BadInputError(f"expected one experiment {name}, found {those}")
+    return next(iter(entries.values()))
+
+
+def _entries() -> dict[str, list[EntryPoint]]:
     from antennate.lookup import installed  # slow to import
 
-    return {entry.name: entry for entry in installed(GROUP)}
+    found: dict[str, list[EntryPoint]] = {}
+    for entry in installed(GROUP):
+        found.setdefault(entry.name, []).append(entry)
+    return found

@@ -54,8 +54,14 @@ def packages_used(command: str, config: Params) -> tuple[str, ...]:
 def environment(command: str = "", config: Params | None = None) -> dict[str, Any]:
     """The part of it that driver and workers must share; without a command, of this package."""
     packages = () if config is None else packages_used(command, config)
-    named = {} if config is None else code_named(_names(config))
+    named = {} if config is None else code_named(_names(config)) | _package_of(config)
     return {"versions": dict(versions(packages)), "code": code() | named}
+
+
+def _package_of(config: Params) -> dict[str, str]:
+    """Checksums of the package that has an experiment; none if it is ours, or a single module."""
+    package, dot, _ = type(config).__module__.partition(".")
+    return _sources(package) if dot and package != antennate.__name__ else {}
 
 
 def _names(config: Params) -> list[str]:
@@ -70,6 +76,8 @@ def environment_here(theirs: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         file = folder / name
         if file.is_file():
             files[name] = _checksum(file)
+        elif "/" in name and _is_module(package := name.partition("/")[0]):
+            files |= _sources(package)
         elif _is_module(name):
             files |= _module(name)
     return {"versions": dict(versions(tuple(theirs["versions"]))), "code": files}
@@ -80,10 +88,17 @@ def code() -> dict[str, str]:
     """Checksum of every file of our packages, but those that only talk to people."""
     checksums = {}
     for room in (antennate, dynamixel_bus, geometric_locomotion):
-        root = Path(room.__file__ or "").parent
-        for path in sorted(root.rglob("*.py")):
-            if (file := path.relative_to(root)).parts[0] not in ("cli", "command.py"):
-                checksums[f"{root.name}/{file.as_posix()}"] = _checksum(path)
+        checksums |= _sources(room.__name__)
+    return checksums
+
+
+def _sources(package: str) -> dict[str, str]:
+    """Checksum of every file of a package, but those that only talk to people."""
+    first, checksums = _file_of(package), {}
+    root = first.parent if first else Path()
+    for path in sorted(root.rglob("*.py")) if first else ():
+        if (file := path.relative_to(root)).parts[0] not in ("cli", "command.py"):
+            checksums[f"{root.name}/{file.as_posix()}"] = _checksum(path)
     return checksums
 
 
@@ -138,13 +153,19 @@ def _code_added(values: Any) -> dict[str, str]:
 
 
 def _module(name: str) -> dict[str, str]:
+    file = _file_of(name)
+    return {} if file is None else {name: _checksum(file)}
+
+
+def _file_of(name: str) -> Path | None:
+    """The file of a module, or the first one of a package; None if it has none."""
     try:
         loaded = getattr(sys.modules.get(name), "__file__", None)
         spec = None if loaded else importlib.util.find_spec(name)
     except (ImportError, ValueError, AttributeError):
-        return {}
+        return None
     file = loaded or (spec.origin if spec else None)
-    return {name: _checksum(Path(file))} if file and Path(file).is_file() else {}
+    return Path(file) if file and Path(file).is_file() else None
 
 
 def _checksum(path: Path) -> str:
