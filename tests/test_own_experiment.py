@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import MISSING, Field, fields
+from importlib.metadata import EntryPoints
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import antennate
 from antennate import experiments
 from antennate.cli import main
 from antennate.errors import BadInputError
@@ -134,6 +136,54 @@ def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
     out = capsys.readouterr().out
     assert "dice" in out
     assert "tunnel" in out
+
+
+@pytest.mark.parametrize("words", [("parameters",), ("--completion", "bash")])
+def test_what_lists_all_leaves_out_one_that_cannot_be_loaded_and_says_so(
+    words: tuple[str, ...], dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(list(words)) == 0
+    out, err = capsys.readouterr()
+    assert "controllers" in out
+    assert err.count("\n") == 1
+    assert "warning: broken: expected an experiment at dice_study:NOTHING" in err
+
+
+def test_two_of_one_name_are_refused_with_both_packages(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    about = next((dice / "site").glob("*.dist-info")) / "entry_points.txt"
+    about.write_text("[antennate.experiments]\ngait = dice_study:EXPERIMENT\n")
+    assert main(["gait", *ONE]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("antennate gait: error: expected one experiment gait, found ")
+    assert "dice_study:EXPERIMENT of dice-study" in err
+    assert "antennate_lab.gait.experiment:EXPERIMENT of antennate-lab" in err
+    assert not (dice / "runs").exists()
+
+
+def test_without_the_laboratory_the_rest_is_there_and_says_what_is_missing(
+    there: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("antennate.lookup.entry_points", EntryPoints)
+    monkeypatch.setattr(sys, "path", [*sys.path, "another"])  # what is installed is read again
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert "tunnel" in out
+    assert "compete" not in out
+    missing = (
+        "expected the package antennate-lab, which has gait, found none; "
+        "install it with `pip install ./antennate/packages/antennate-lab`"
+    )
+    assert main(["gait"]) == 2
+    assert missing in capsys.readouterr().err
+    (there / "plan.toml").write_text('experiment = "gait"\n')
+    assert main(["study", "plan.toml", "--out", "study"]) == 2
+    assert missing in capsys.readouterr().err
+    with pytest.raises(BadInputError, match="which has gait, found none"):
+        antennate.run("gait")
+    assert main(["tunnell"]) == 2
+    assert "did you mean tunnel?" in capsys.readouterr().err
 
 
 FORMS = "dice: expected tables to return a list of Table and sentence a text, found "

@@ -136,11 +136,12 @@ def page(beside_commands: bool = False) -> str:
     robots = [f"antennate.robots.{name}" for name in _ROBOTS]
     modules = map(importlib.import_module, numbers + robots)
     physical = [group for module in modules for group in _groups(module)]
-    known = [*physical, *_commands()]
+    of_commands = _commands()
+    known = [*physical, *of_commands]
     names = experiments.names() if beside_commands else ()
     own = {experiments.load(name).config: name for name in names}
     parts = [_table(group, known) for group in physical]
-    tables = (_table(group, known, own.get(group, "")) for group in _commands())
+    tables = (_table(group, known, own.get(group, "")) for group in of_commands)
     return "\n".join([_HEAD, *parts, _COMMANDS, *tables]).rstrip("\n") + "\n"
 
 
