@@ -390,6 +390,7 @@ def effect_bus_watchdog(bench: Bench) -> None:
     assert bench.get("bus_watchdog") == -1
     assert bench.get("moving") == 0
     assert bench.put("goal_velocity", 150) == RANGE
+    assert bench.put("bus_watchdog", 5) == RANGE
     assert bench.put("bus_watchdog", 0) == NONE
     assert bench.put("goal_velocity", 150) == NONE
     bench.wait(1.0)

@@ -8,6 +8,8 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable
+from typing import Any
 
 from dynamixel_bus.servo_bus import ServoBus
 
@@ -68,3 +70,17 @@ class PtyServer:
             os.write(self._master, data)
         except BlockingIOError:
             return
+
+
+def tried(call: Callable[[], Any], good: Any) -> Any:
+    """What it returns, tried again and again: a busy machine may be slower than its patience."""
+    found = None
+    for _ in range(20):
+        try:
+            found = call()
+        except RuntimeError as error:
+            found = error
+        if found == good:
+            return found
+        time.sleep(0.05)
+    return found

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_manual_packets import FAST
 
 from dynamixel_bus import packets
 from dynamixel_bus.instructions import fast_pieces
-from dynamixel_bus.model import ServoModel, hardware_errors
-from dynamixel_bus.models import MODELS_BY_NUMBER, XC430_W240, XL330_M288
 from dynamixel_bus.packets import (
     HEADER,
     LONGEST,
@@ -27,46 +26,8 @@ from dynamixel_bus.parser import Parser
 GOLDEN = Path(__file__).parents[3] / "shared/data/dxl_golden_packets/golden_packets.json"
 needs_golden = pytest.mark.skipif(not GOLDEN.exists(), reason="golden packets not present")
 
-# https://emanual.robotis.com/docs/en/dxl/protocol2/, the examples of each instruction
-MANUAL = {
-    "ping": (packets.ping(1), "FF FF FD 00 01 03 00 01 19 4E"),
-    "ping all": (packets.ping(), "FF FF FD 00 FE 03 00 01 31 42"),
-    "read": (packets.read(1, 132, 4), "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15"),
-    "write": (
-        packets.write(1, 116, (512).to_bytes(4, "little")),
-        "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89",
-    ),
-    "reboot": (packets.reboot(1), "FF FF FD 00 01 03 00 08 2F 4E"),
-    "clear": (packets.clear(1), "FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC"),
-    "sync read": (
-        packets.sync_read([1, 2], 132, 4),
-        "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA",
-    ),
-    "sync write": (
-        packets.sync_write(116, {1: b"\x96\0\0\0", 2: b"\xaa\0\0\0"}),
-        "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87",
-    ),
-    "fast sync read": (
-        packets.fast_sync_read([3, 7, 4], 132, 4),
-        "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2",
-    ),
-    "status": (
-        packets.status(Status(1, StatusError.NONE, False, b"\xa6\0\0\0")),
-        "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0",
-    ),
-}
-FAST_REPLY = [
-    "FF FF FD 00 FE 19 00 55 00 03 A6 00 00 00 84 08",
-    "00 07 1F 08 00 00 16 CA",
-    "00 04 FF 03 00 00 D1 9E",
-]
+FAST_REPLY = FAST["sync"]
 FAST_IDS, FAST_VALUES = [3, 7, 4], [166, 2079, 1023]
-
-
-@pytest.mark.parametrize("name", MANUAL)
-def test_what_is_made_is_what_the_manual_prints(name: str) -> None:
-    made, printed = MANUAL[name]
-    assert made == bytes.fromhex(printed)
 
 
 @needs_golden
@@ -188,15 +149,6 @@ def test_lengths_that_cannot_be_are_refused_at_once() -> None:
     assert parser.pending == 0
 
 
-@pytest.mark.parametrize("error", [e for e in StatusError if e != StatusError.UNKNOWN])
-@pytest.mark.parametrize("alert", [False, True])
-def test_status_errors_and_the_alert_bit(error: StatusError, alert: bool) -> None:
-    sent = Status(5, error, alert, b"")
-    wire = packets.status(sent)
-    assert wire[8] == error + 128 * alert
-    assert packets.as_status(Parser().feed(wire)[0]) == sent
-
-
 def test_an_error_that_nobody_knows_is_an_error() -> None:
     packet = Parser().feed(packets.encode(5, Instruction.STATUS, b"\x2a"))[0]
     answer = packets.as_status(packet)
@@ -285,29 +237,3 @@ def test_what_cannot_be_sent_is_refused() -> None:
         packets.read(1, 70_000, 1)
     with pytest.raises(PacketError, match="at most 1024"):
         packets.write(1, 0, bytes(1100))
-
-
-@pytest.mark.parametrize("table", MODELS_BY_NUMBER.values(), ids=lambda table: table.name)
-def test_a_table_has_no_overlaps_and_its_defaults_are_in_range(table: ServoModel) -> None:
-    end = 0
-    for register in table.registers.values():
-        assert register.address >= end
-        end = register.address + register.size
-        bounds = (register.low, register.high, register.default)
-        for value in (bound for bound in bounds if bound is not None):
-            assert register.decode(register.encode(value)) == value
-        if register.default is not None and register.name != "secondary_id":
-            assert register.low is None or register.low <= register.default
-            assert register.high is None or register.default <= register.high
-    assert table["model_number"].default == table.number
-
-
-def test_the_tables_differ_where_the_manuals_do() -> None:
-    """A few cells read from the two pages named in their files."""
-    xc, xl = XC430_W240, XL330_M288
-    assert (xc["velocity_limit"].default, xl["velocity_limit"].default) == (306, 445)
-    assert (xc["shutdown"].default, xl["shutdown"].default) == (0x34, 0x35)
-    assert xc["present_load"].address == xl["present_current"].address == 126
-    assert xl["goal_current"].address == 102
-    assert xc["goal_position"].address == xl["goal_position"].address == 116
-    assert hardware_errors(0x34) == ["overheating", "electrical shock", "overload"]

@@ -87,6 +87,18 @@ ASKED: dict[str, tuple[str, int, Instruction, str]] = {
         "03 84 00 04 00 07 7C 00 02 00 04 92 00 01 00",
     ),
 }
+MADE = {
+    "ping": packets.ping(1),
+    "ping all": packets.ping(),
+    "read": packets.read(1, 132, 4),
+    "write": packets.write(1, 116, b"\0\2\0\0"),
+    "reboot": packets.reboot(1),
+    "clear": packets.clear(1),
+    "sync read": packets.sync_read([1, 2], 132, 4),
+    "sync write": packets.sync_write(116, {1: b"\x96\0\0\0", 2: b"\xaa\0\0\0"}),
+    "fast sync read": packets.fast_sync_read([3, 7, 4], 132, 4),
+}
+"""Requests that have a function of their own."""
 SAID: dict[str, tuple[str, int, str]] = {
     "ping 1": ("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D", 1, "06 04 26"),
     "ping 2": ("FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D", 2, "06 04 26"),
@@ -156,6 +168,7 @@ def test_a_request_of_the_manual_is_made_and_understood(name: str) -> None:
     printed, servo, instruction, params = ASKED[name]
     wire = bytes.fromhex(printed)
     assert packets.encode(servo, instruction, bytes.fromhex(params)) == wire
+    assert MADE.get(name, wire) == wire
     assert Parser().feed(wire) == [Packet(servo, instruction, bytes.fromhex(params))]
 
 
@@ -214,7 +227,7 @@ def test_the_twin_answers_a_fast_read_as_the_manual_says(kind: str) -> None:
     assert answer_to(bus, bytes.fromhex(ASKED[f"fast {kind} read"][0])) == expected
 
 
-@pytest.mark.parametrize(("number", "alert"), list(itertools.product(range(1, 8), (0, 0x80))))
+@pytest.mark.parametrize(("number", "alert"), list(itertools.product(range(8), (0, 0x80))))
 def test_every_error_number_and_the_alert_bit(number: int, alert: int) -> None:
     """As made by hand and by the CRC of the manufacturer's program."""
     wire = bytes.fromhex("FF FF FD 00 05 04 00 55") + bytes([number | alert])

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from pty_server import PtyServer
+from pty_server import PtyServer, tried
 from servo_rig import IDS, MODELS, servos
 
 from dynamixel_bus.packets import ALERT
@@ -39,20 +39,6 @@ def peer(server: PtyServer) -> Iterator[Any]:
     controller = module.Xl430PyController(server.path, 1_000_000, TIMEOUT)
     yield controller
     controller.close()
-
-
-def tried(call: Callable[[], Any], good: Any) -> Any:
-    """What it returns, tried again and again: a busy machine may be slower than its patience."""
-    found = None
-    for _ in range(20):
-        try:
-            found = call()
-        except RuntimeError as error:
-            found = error
-        if found == good:
-            return found
-        time.sleep(0.05)
-    return found
 
 
 def ticks(read: list[Any]) -> list[int]:
