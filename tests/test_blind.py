@@ -10,7 +10,6 @@ import pytest
 
 from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams
-from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Maneuver
 
 BLIND = ("timed", "schedule", "zigzag", "random")
@@ -41,17 +40,6 @@ def stretches(found: list[int]) -> list[tuple[int, float]]:
     """Each maneuver in order, and how long it lasted [s]."""
     cuts = [0, *(np.flatnonzero(np.diff(found)) + 1).tolist(), len(found)]
     return [(found[a], (b - a) / 100.0) for a, b in itertools.pairwise(cuts)]
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "timed",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("random", "schedule", "zigzag")),
-    ],
-)
-def test_it_keeps_the_protocol(name: str) -> None:
-    check_controller(name)
 
 
 @pytest.mark.parametrize("name", BLIND)

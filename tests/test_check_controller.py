@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import antennate
 from antennate.errors import AntennateError
+from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
 
@@ -42,16 +44,34 @@ class Plain:
         )
 
 
+EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
+LATER = [
+    "open",
+    "paper",
+    "random",
+    "schedule",
+    "zigzag",
+    "centre",
+    "geometric",
+    "climb",
+    "lifted",
+    "rhythm",
+]
+
+
 @pytest.mark.parametrize(
     "factory",
     [
         "closed",
+        "timed",
+        "follow",
         Plain,
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("open", "paper")),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in (*LATER, EXAMPLE)),
     ],
 )
 def test_sound_controllers_keep_the_protocol(factory: Any) -> None:
-    check_controller(factory)
+    robot = "scuttle3d" if factory in ("climb", "lifted", "rhythm") else "scuttle"
+    check_controller(factory, robot=RobotSpec.named(robot))
 
 
 class Around:

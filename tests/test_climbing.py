@@ -18,18 +18,11 @@ from antennate.errors import ConfigError
 from antennate.params.climb import ClimbParams
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Maneuver, joint_angles
 
 ROBOT = RobotSpec.named("scuttle3d")
 PARAMS = ClimbParams()
 RISE = 0.12
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["climb", "lifted", "rhythm"])
-def test_controllers_that_climb_keep_the_contract(name: str) -> None:
-    check_controller(name, robot=ROBOT)
 
 
 def test_the_line_rises_before_the_edge_and_comes_down_to_the_step() -> None:

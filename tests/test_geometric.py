@@ -11,7 +11,6 @@ from antennate.params.control import ControlParams, GeometricParams
 from antennate.params.gaits import GaitParams
 from antennate.robots.joints import LegParams
 from antennate.robots.spec import RobotSpec
-from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Maneuver
 
 PRESSED, FREE = 1420.0, 1800.0
@@ -80,11 +79,6 @@ def test_it_walks_by_the_gait_that_is_named(forward, crest):
     control = ControlParams(geometric=GeometricParams(forward=forward))
     _, yaw = walked(control, [FREE, FREE], 5.0)
     assert math.degrees(abs(yaw[100:]).max()) == pytest.approx(crest, abs=0.1)
-
-
-@pytest.mark.slow
-def test_it_keeps_the_protocol():
-    check_controller("geometric")
 
 
 def test_lifting_legs_are_refused():

@@ -216,11 +216,6 @@ def test_what_cannot_be_sent_to_workers_is_refused_in_one_line() -> None:
 # the example
 
 
-@pytest.mark.slow
-def test_the_example_keeps_the_protocol() -> None:
-    check_controller(EXAMPLE)
-
-
 @pytest.mark.ci
 def test_a_file_with_a_kind_brings_sentence_and_colour(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

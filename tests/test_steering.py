@@ -13,7 +13,6 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.trial import TrialConfig, draw_scene, scene_of
 from antennate.studies.simulate import simulate
-from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Floats, Maneuver
 
 CONTROL = ControlParams.model_validate(
@@ -116,11 +115,6 @@ def test_left_and_right_are_alike() -> None:
         offsets("follow", f, **c)[0] for f, c in ((flex, {}), (flex[:, ::-1], LEFT_WALL))
     )
     np.testing.assert_allclose(right, -left, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", ["follow", pytest.param("centre", marks=pytest.mark.slow)])
-def test_it_keeps_the_protocol(name: str) -> None:
-    check_controller(name)
 
 
 def test_follow_stays_at_the_wall_that_open_leaves() -> None:
