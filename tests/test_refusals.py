@@ -280,6 +280,7 @@ drive --esp32 x --bus y --limits.longest-pause 0.1 :: the servos at 0.1 s, limit
 drive --esp32 x --bus y --control.rate 12 :: control.rate at 0.0833333 s, the latest answer at 0.07 s
 drive --esp32 x --bus y --stand 2.1 :: --stand: expected a number of at most 2
 drive --esp32 x --bus y --stand 60 :: --stand: expected a number of at most 2
+drive --esp32 x --bus y --hold-to-run :: --hold-to-run: expected a terminal as standard input, whose keys can be held, found none
 """
 TWIN = """
 twin --servos '' :: --servos: expected
@@ -311,6 +312,10 @@ twin --fault esp32=drift:1e9 :: --fault: expected at most 65535 counts a second 
 twin --fault esp32=drift:1e999 :: --fault: expected finite numbers :: found 'esp32=drift:1e999'
 twin --fault esp32=left :: --fault: expected a reading of 0 to 65535 :: found 'esp32=left'
 twin --fault esp32=right:-1 :: --fault: expected a reading of 0 to 65535 :: found 'esp32=right:-1'
+twin --fault servo:7 :: expected TARGET=WHAT
+twin --fault servo:7=asleep :: expected one of silent
+twin --fault esp32=loss :: expected one of silent, reset
+twin --fault servo:99=silent :: expected a servo of 1, 2
 twin --fault esp32=ber :: --fault: expected a share of 0 to 1 :: found 'esp32=ber'
 """
 DATASET = """

@@ -12,9 +12,8 @@ from pty_server import PtyServer
 from twin_rig import Rig, rig
 
 from antennate.control.registry import make_controller
-from antennate.errors import BadInputError, ConfigError
 from antennate.hardware.config import DriveConfig
-from antennate.hardware.driving.connect import await_board, require_quick, require_servos
+from antennate.hardware.driving.connect import require_quick, require_servos
 from antennate.hardware.driving.drive import drive
 from antennate.hardware.driving.report import Report
 from antennate.hardware.dynamixel.bringup import BringUpError
@@ -29,7 +28,7 @@ from antennate.telemetry.replay import replay
 from antennate.telemetry.ticks import Tick
 from antennate.twin.config import TwinConfig
 from antennate.twin.faults import Faults, read
-from antennate.types import AntennaFrame, JointCommand, Maneuver, State
+from antennate.types import AntennaFrame, JointCommand, State
 from dynamixel_bus.packets import Instruction, StatusError
 from dynamixel_bus.parser import Parser
 from dynamixel_bus.port import PortError
@@ -272,12 +271,6 @@ def test_B12_a_hardware_error_is_named_within_200_ms_and_it_holds(what: str) -> 
     assert log.state[-1] >= State.FAULT
 
 
-def test_B6_a_cut_bus_makes_it_hold_within_100_ms() -> None:
-    log = walked(at(EVENT, "bus=silent"))
-    t, state = np.array(log.t), np.array(log.state)
-    assert t[(t > EVENT) & (state >= State.HOLD)][0] - EVENT <= 0.1
-
-
 def test_B7_T5_servos_stop_by_themselves_within_120_ms_of_the_last_packet() -> None:
     made = rig(TwinConfig())
     drive_until(made, EVENT)
@@ -385,33 +378,6 @@ def test_L9_the_gait_stands_still_during_a_hold_so_that_no_leg_has_to_catch_up()
     assert (limited[-1] - limited[0]) / 12 < 3
 
 
-def test_B8_a_controller_that_fails_does_not_feed_the_watchdogs() -> None:
-    class Broken:
-        def __init__(self, sound: object) -> None:
-            self._sound = sound
-            self.maneuver, self.contact = sound.maneuver, sound.contact  # type: ignore[attr-defined]
-            self.ticks = 0
-
-        def step(self, frame: AntennaFrame) -> JointCommand:
-            self.ticks += 1
-            if self.ticks > 100:
-                raise ValueError("a bug")
-            command = self._sound.step(frame)  # type: ignore[attr-defined]
-            self.maneuver, self.contact = self._sound.maneuver, self._sound.contact  # type: ignore[attr-defined]
-            return command
-
-    made = rig(TwinConfig())
-    made.session.control.controller = Broken(made.session.control.controller)
-    log = Log(made)
-    drive(made.session, CONFIG, arm=True, on_tick=log)
-    t = np.array(log.t)
-    failed = log.first(Cause.FAILED)
-    assert any("ValueError: a bug" in text for text in log.texts)
-    state = np.array(log.state)
-    assert (state[(t >= failed) & (t < failed + 0.02)] >= State.HOLD).all()
-    assert log.first(Cause.REPEATED_FAILURES) - failed <= 0.1
-
-
 def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
     """For 0.3 s; it walks on by itself."""
 
@@ -429,26 +395,6 @@ def test_G6_a_robot_whose_record_is_required_holds_while_none_is_kept() -> None:
     assert (states[(t > 1.45) & (t < 1.85)] == State.OK).all()  # once the average is full
     assert report.worst is State.HOLD
     assert "one is required" in report.why
-
-
-@pytest.mark.parametrize("bad", [math.nan, pytest.param(math.inf, marks=pytest.mark.slow)])
-def test_S5_B14_a_pose_that_is_not_finite_never_reaches_the_bus(bad: float) -> None:
-    made = rig(TwinConfig())
-    sound = made.session.control.controller.step
-
-    def step(frame: AntennaFrame) -> JointCommand:
-        command = sound(frame)
-        if made.clock.now() > EVENT:
-            command.leg[0, 2, 1] = bad
-        return command
-
-    made.session.control.controller.step = step  # type: ignore[method-assign]
-    log = Log(made)
-    drive(made.session, CONFIG, arm=True, on_tick=log)
-    assert Cause.BAD_COMMAND in set().union(*log.causes)
-    bad_since = log.first(Cause.BAD_COMMAND)
-    sent = {tuple(g) for g, t in zip(log.goals, log.t, strict=True) if t >= bad_since}
-    assert len(sent) == 1
 
 
 @pytest.mark.parametrize("number", STOPS)
@@ -527,14 +473,6 @@ def test_T6_tracebacks_of_a_controller_are_kept_once_a_second() -> None:
     assert Report().result(session)["tracebacks"] == list(kept)
 
 
-def test_L14_a_port_without_a_board_is_refused_and_the_text_says_what_came() -> None:
-    made = rig(TwinConfig())
-    made.robot.board_silent = True
-    made.robot.take()
-    with pytest.raises(BadInputError, match=r"--esp32: expected an antenna board .* swapped"):
-        await_board(made.session.board, made.clock)
-
-
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
@@ -554,33 +492,6 @@ def test_B15_servos_that_are_not_as_expected_are_refused(
     spoil(made.robot)
     with pytest.raises(BringUpError, match=said):
         require_servos(made.session.actuators.bus, RobotSpec())
-
-
-@pytest.mark.parametrize(
-    "name", ["clsoed", "antennate.control.controllers:Nobody", "no_such_module:X"]
-)
-def test_a_controller_that_does_not_exist_is_refused(name: str) -> None:
-    with pytest.raises(ConfigError, match="controller"):
-        make_controller(name, ControlParams())
-
-
-def test_a_controller_of_ones_own_is_taken() -> None:
-    made = make_controller("antennate.control.controllers:closed_loop", ControlParams())
-    assert int(made.maneuver[0]) == Maneuver.FORWARD
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("servo:7", "expected TARGET=WHAT"),
-        ("servo:7=asleep", "expected one of silent"),
-        ("esp32=loss", "expected one of silent, reset"),
-        ("servo:99=silent", "expected a servo of 1, 2"),
-    ],
-)
-def test_faults_that_do_not_exist_are_refused(text: str, said: str) -> None:
-    with pytest.raises(BadInputError, match=said):
-        Faults([read(text)], RobotSpec().ids)
 
 
 def test_B11_a_servo_that_reboots_alone_is_a_fault_within_a_second() -> None:
