@@ -36,7 +36,6 @@ from antennate_lab.compete.config import (
     settled,
 )
 from antennate_lab.compete.episodes import Draw, EpisodeRow, run_episodes
-from antennate_lab.compete.experiment import run
 from antennate_lab.compete.page import sentence
 from antennate_lab.compete.scenes import label, tunnel_config
 from antennate_lab.compete.standings import standing
@@ -450,24 +449,6 @@ def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
     assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 
-@pytest.mark.ci
-def test_a_run_without_a_valid_episode_ends_with_the_reason_and_exit_code_2(
-    entries: Callable[[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["compete", "--trials", "1", "--scenes", SHORT, "--no-figures", "--out", "run"]
-    assert main([*words, "--controllers", entries("Raises")]) == BAD_INPUT
-    out = capsys.readouterr().out
-    assert "No episode of Raises is valid: controller: step raised ZeroDivisionError: no" in out
-
-
-@pytest.mark.slow
-def test_rows_are_the_same_for_any_number_of_workers() -> None:
-    config = CompeteConfig(controllers=("follow", "centre"), scenes=(SHORT, "uturn+time_limit=0.5"))
-    one, three = (run(config, workers).rows for workers in (1, 3))
-    assert one == three
-    assert len({(r.controller, r.scene, r.trial) for r in one}) == 40
-
-
 @pytest.mark.smoke
 def test_a_row_is_that_of_tunnel() -> None:
     """The same scene, seed and trial, run by the command `tunnel` with those parameters."""
@@ -832,101 +813,52 @@ def test_a_table_is_run_again_and_rows_that_differ_are_named(
         (tmp_path / "again").rename(tmp_path / f"old{code}{len(said)}")
 
 
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("", "expected a header with controller, found an empty file"),
-        (
-            "controller,scene,seed,trial,outcome,time_s\n",
-            "expected a table of trials, found no row",
-        ),
-        ("controller,scene\nopen,flat\n", "with the columns controller, .*, found none named seed"),
-        (
-            "controller;scene\nopen;flat\n",
-            "expected columns separated by commas.* found semicolons",
-        ),
-        (
-            "controller,scene,seed,trial,trial,outcome\nopen,flat,1,0,1,timeout\n",
-            "expected each column once, found 'trial' twice",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s,engin\nopen,flat,1,0,timeout,1.0,3\n",
-            r"expected a known column, found 'engin' \(did you mean engine\?\)",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,sucess,1.0\n",
-            "line 2: outcome: expected one of success, .*, found 'sucess'",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\n" + 2 * "open,flat,1,0,timeout,1.0\n",
-            "line 3: expected each draw once a controller, found that of line 2 again",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopne,flat,1,0,timeout,1.0\n",
-            r"line 2: expected one of open, .* \(did you mean open\?\)",
-        ),
-        ("\0\n", "expected UTF-8 text, found a zero byte"),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat,700000,0,timeout,100.0\n",
-            "line 2: expected no seed of 700000",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,-1,success,9.0\n",
-            "line 2: trial: expected 0 to 4611686018427387904, found -1",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,success,nan\n",
-            "line 2: time_s: expected a finite number of 0 to limit_s, 100, found nan",
-        ),
-        *(
-            (
-                f"controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,{ended}\n",
-                f"a.csv: line 2: {why}",
-            )
-            for ended, why in (
-                ("success,-5,100", "time_s: expected .* 0 to limit_s, 100, found -5.0"),
-                ("success,-1e9,100", "time_s: expected .* found -1000000000.0"),
-                ("success,1e9,100", "time_s: expected .* found 1000000000.0"),
-                ("success,100.01,100", "time_s: expected .* found 100.01"),
-                ("timeout,99.9,100", "time_s: expected limit_s, 100, as it is no success"),
-                ("left,0,100", "time_s: expected limit_s, 100, as it is no success"),
-                ("invalid,-100,100", "time_s: expected a finite number of 0 to limit_s"),
-                ("success,1,inf", "limit_s: expected a finite number above 0, found inf"),
-            )
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s,progress_m\nopen,flat,1,0,success,1,inf\n",
-            "line 2: progress_m: expected a finite number, found inf",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat,1,0,overturned,100\n",
-            "line 2: overturned: expected True, as it ended so, found False",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s,reason\nopen,flat,1,0,left,100,slow\n",
-            "line 2: reason: expected none, as it is not invalid, found 'slow'",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flatt,1,0,success,9\n",
-            "line 2: .*did you mean flat",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s\nopen,flat+tim=1,1,0,success,9\n",
-            "line 2: scenes: expected a parameter of",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,1.0,0.0\n",
-            "line 2: limit_s: expected a finite number above 0, found 0",
-        ),
-        (
-            "controller,scene,seed,trial,outcome,time_s,limit_s\nopen,flat,1,0,success,43.0,8.0\n",
-            "line 2: time_s: expected a finite number of 0 to limit_s, 8, found 43.0",
-        ),
-    ],
-)
+COLUMNS = "controller,scene,seed,trial,outcome,time_s"
+NO_TABLE = [
+    ("", "expected a header with controller, found an empty file"),
+    ("controller,scene\nopen,flat\n", "with the columns controller, .*, found none named seed"),
+    ("controller;scene\nopen;flat\n", "expected columns separated by commas.* found semicolons"),
+    ("\0\n", "expected UTF-8 text, found a zero byte"),
+    (f"{COLUMNS}\n", "expected a table of trials, found no row"),
+    (f"{COLUMNS},trial\n", "expected each column once, found 'trial' twice"),
+    (f"{COLUMNS},engin\n", r"expected a known column, found 'engin' \(did you mean engine\?\)"),
+]
+NO_ROW = [
+    ("open,flat,1,0,sucess,1.0", "outcome: expected one of success, .*, found 'sucess'"),
+    ("opne,flat,1,0,timeout,1.0", r"expected one of open, .* \(did you mean open\?\)"),
+    ("open,flat,700000,0,timeout,100.0", "expected no seed of 700000"),
+    ("open,flat,1,-1,success,9.0", "trial: expected 0 to 4611686018427387904, found -1"),
+    ("open,flat,1,0,success,nan", "time_s: expected .* 0 to limit_s, 100, found nan"),
+    ("open,flat,1,0,overturned,100", "overturned: expected True, as it ended so, found False"),
+    ("open,flatt,1,0,success,9", ".*did you mean flat"),
+    ("open,flat+tim=1,1,0,success,9", "scenes: expected a parameter of"),
+]
+NO_END = [
+    ("progress_m", "success,1,inf", "progress_m: expected a finite number, found inf"),
+    ("reason", "left,100,slow", "reason: expected none, as it is not invalid, found 'slow'"),
+    ("limit_s", "success,-5,100", "time_s: expected .* 0 to limit_s, 100, found -5.0"),
+    ("limit_s", "success,1e9,100", "time_s: expected .* found 1000000000.0"),
+    ("limit_s", "success,100.01,100", "time_s: expected .* found 100.01"),
+    ("limit_s", "success,43.0,8.0", "time_s: expected .* 0 to limit_s, 8, found 43.0"),
+    ("limit_s", "timeout,99.9,100", "time_s: expected limit_s, 100, as it is no success"),
+    ("limit_s", "left,0,100", "time_s: expected limit_s, 100, as it is no success"),
+    ("limit_s", "invalid,-100,100", "time_s: expected a finite number of 0 to limit_s"),
+    ("limit_s", "success,1,inf", "limit_s: expected a finite number above 0, found inf"),
+    ("limit_s", "success,1.0,0.0", "limit_s: expected a finite number above 0, found 0"),
+]
+TWICE = "open,flat,1,0,timeout,1.0"
+FILES = [
+    *NO_TABLE,
+    *((f"{COLUMNS}\n{row}\n", f"line 2: {why}") for row, why in NO_ROW),
+    *((f"{COLUMNS},{name}\nopen,flat,1,0,{end}\n", f"line 2: {why}") for name, end, why in NO_END),
+    (f"{COLUMNS}\n{TWICE}\n{TWICE}\n", "line 3: expected each draw once .*, found that of line 2"),
+]
+
+
+@pytest.mark.parametrize(("text", "why"), FILES)
 def test_a_file_that_is_no_such_table_is_one_line(text: str, why: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(ConfigError, match=why) as error:
+    with pytest.raises(ConfigError, match=rf"a\.csv: .*{why}") as error:
         read_rows(tmp_path / "a.csv")
     assert "\n" not in str(error.value)
 
@@ -1029,7 +961,7 @@ def test_on_another_processor_rows_may_end_otherwise_but_not_to_one_side(
     assert compared(*both).successes_p == pytest.approx(2.0 * 0.5 ** min(won, 9))
 
 
-ELSEWHERE = "controller,scene,seed,trial,outcome,time_s,limit_s,processor"
+ELSEWHERE = f"{COLUMNS},limit_s,processor"
 
 
 @pytest.mark.parametrize(
