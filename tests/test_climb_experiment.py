@@ -182,15 +182,6 @@ def test_what_is_felt_is_counted_by_hand():
     assert stats.poisson.cdf(2, 0.5 * high) == pytest.approx(0.025)
 
 
-@pytest.mark.ci
-def test_rows_are_the_same_on_two_workers():
-    config = ClimbConfig(**TINY)
-    one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)
-    assert one.rows == two.rows
-    assert [r.outcome for r in one.rows] == ["timeout"] * 6
-    assert one.result() == two.result()
-
-
 def test_a_run_leaves_its_tables_and_figures(tmp_path):
     out = tmp_path / "run"
     words = ["climb", "--trials", "1", "--heights", "0.05", "--conditions", "climb", "level"]
@@ -303,15 +294,6 @@ def test_a_configuration_names_its_robot_as_anywhere(file, mass, sensor, tmp_pat
     kept = ["--no-figures", "--workers", "1", "--out", str(again)]
     assert main(["climb", "--config", str(out / "config.toml"), *kept]) == 0
     assert (again / "trials.csv").read_bytes() == (out / "trials.csv").read_bytes()
-
-
-def test_shards_are_merged(tmp_path):
-    folders = [str(tmp_path / name) for name in ("one", "two")]
-    for i, folder in enumerate(folders, 1):
-        assert main([*SHORT, "--shard", f"{i}/2", "--out", folder]) == 0
-    assert main(["study", "merge", *folders, "--out", str(tmp_path / "all")]) == 0
-    with (tmp_path / "all" / "trials.csv").open(newline="") as file:
-        assert len(list(csv.DictReader(file))) == 2
 
 
 def test_a_run_that_was_stopped_tells_of_the_divisors_that_it_came_to():

@@ -90,21 +90,3 @@ def test_a_finished_run_says_so_and_lists_what_is_there(
     assert main([*words, "--resume"]) == 0
     assert capsys.readouterr().err.endswith("complete already; nothing was run: run\n")
     assert {p: p.read_bytes() for p in Path("run").rglob("*") if p.is_file()} == there
-
-
-def test_an_interrupted_run_lists_its_trials(monkeypatch: pytest.MonkeyPatch) -> None:
-    from antennate.studies.run_directory import RunDirectory
-
-    append = RunDirectory.append
-
-    def interrupted(self: RunDirectory, row: object) -> None:
-        append(self, row)
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(RunDirectory, "append", interrupted)
-        assert main(["tunnel", *SHORT[:1], "3", *SHORT[2:], "--out", "run"]) == 130
-    names = Path("run/files.txt").read_text().splitlines()[1:]
-    assert "trials.jsonl" in names
-    assert all(Path("run", name).exists() for name in names)
-    assert main(["tunnel", *SHORT[:1], "3", *SHORT[2:], "--out", "run", "--resume"]) == 0

@@ -46,6 +46,8 @@ ROOT = HERE.parent
 VARY = {"x": [0.5, 1.5]}
 QUICK = ["--gait.frequency", "1"]
 """The shortest cycle."""
+CLIMB = ["--heights", "0.05", "--grounds", "flat", "--conditions", "level", "edges"]
+CLIMB += ["--divisors", "256", "--time-limit", "0.1", "--sensing", "0", "--trials", "1"]
 NEAR = ["--wall.travel", "0.03", "--wall.start", "0.002", "--wall.speed", "0.05"]
 
 
@@ -602,14 +604,15 @@ def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
             marks=pytest.mark.slow,
         ),
         ("calibrate", ["--rig.pushes", "2", "--rig.speeds", "0.3"]),
+        ("climb", CLIMB),
     ],
 )
 def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]) -> None:
-    """Half of the trials were there before; all that is written is the same."""
-    words = [*command_words(name).split(), *words, "--workers", "1"]
-    assert main([*words, "--out", "whole"]) == 0
-    assert main([*words, "--out", "run", "--shard", "1/2"]) == 0
-    assert main([*words, "--out", "run", "--resume"]) == 0
+    """Half of the trials were there before, and two workers run the others; all is the same."""
+    words = [*command_words(name).split(), *words]
+    assert main([*words, "--workers", "1", "--out", "whole"]) == 0
+    assert main([*words, "--workers", "1", "--out", "run", "--shard", "1/2"]) == 0
+    assert main([*words, "--workers", "2", "--out", "run", "--resume"]) == 0
     for path in sorted(Path("whole").rglob("*.*")):
         again = Path("run") / path.relative_to("whole")
         if path.name == "files.txt":

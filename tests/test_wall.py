@@ -149,20 +149,6 @@ def test_trials_share_their_chance_across_arms_and_differ_among_each_other() -> 
     assert abs(one.tip - other.tip).max() > 1e-5
 
 
-@pytest.mark.ci
-def test_same_table_on_one_and_two_workers() -> None:
-    config = WallConfig.model_validate({**SHORT, "profiles": ["stiff", "descending"]})
-    one, two = EXPERIMENT.run(config, 1), EXPERIMENT.run(config, 2)
-    assert one.rows == two.rows
-    assert one.result() == two.result()
-    assert [(r.profile, r.trial) for r in one.rows] == [
-        ("stiff", 0),
-        ("stiff", 1),
-        ("descending", 0),
-        ("descending", 1),
-    ]
-
-
 def test_trouble_in_the_physics_is_an_invalid_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = wall.passage
 

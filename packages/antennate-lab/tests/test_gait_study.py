@@ -153,19 +153,6 @@ def test_walks_by_name_become_the_result_that_the_tables_show():
     assert "the measured 0.70 is inside" in study.sentence(result)
 
 
-@pytest.mark.ci
-def test_result_does_not_depend_on_workers():
-    config = study.GaitStudyConfig(
-        cycles=2,
-        settling_cycles=0,
-        sweep_points=2,
-        rate=50.0,
-        gait=GaitParams(frequency=1.0),
-        physics=PhysicsParams(timestep=0.004, contact_time=0.008),
-    )
-    assert study.run(config, workers=1).result() == study.run(config, workers=2).result()
-
-
 @pytest.mark.slow
 def test_chosen_lead_is_near_the_best():
     config = study.GaitStudyConfig(cycles=2, sweep_points=12)
