@@ -198,30 +198,6 @@ def test_a_run_leaves_its_tables_and_figures(tmp_path):
     assert names == {"success", "side", "felt"}  # no link came to the edge: no error of the plan
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--robot", "scuttle"], "expected a robot with pitch joints and antennae that rise"),
-        (["--heights", "0.6"], "--heights: expected a number of at most 0.5, found 0.6"),
-        (["--robot.links", "3", "--heights", "0.4"], "expected at most the length of the robot"),
-        (["--heights", "0.05", "0.05"], "heights must differ"),
-        (["--robot", "hexapod"], "expected a robot with pitch joints and antennae that rise"),
-        (["--start", "0.1", "1"], "start must rise from at least 0.25 to at most 10 m, found 0.1"),
-        (["--start", "0.35"], "--start: expected 2 values, found 1"),
-        (["--conditions", "fly"], "expected one of locked, level, lifted, rhythm, climb or edges"),
-        (["--divisors", "0"], "--divisors: expected a number above 0, found 0.0"),
-        (["--robot.servos.xc430-w240.gain-divisor", "9"], "divisors says it"),
-    ],
-)
-def test_bad_input_is_answered_in_one_line(words, said, capsys, tmp_path):
-    out = tmp_path / "run"
-    assert main(["climb", *words, "--out", str(out)]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert not out.exists()
-
-
 def test_a_robot_of_its_own_begins_with_the_one_that_climbs():
     assert ClimbConfig.model_validate({"robot": {"mass": 2.5}}).robot.pitch_count == 5
     with pytest.raises(BadInputError, match="expected a robot with pitch joints"):

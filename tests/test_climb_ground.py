@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antennate.cli import main
-from antennate.cli.terminal import BAD_INPUT
 from antennate.control.climbing.rule import Ground, Stage
 from antennate.experiments.climb.config import (
     Cell,
@@ -182,33 +180,3 @@ def test_a_robot_that_feels_nothing_crosses_what_is_small_and_falls_into_what_is
         carry_out(config, cell.name, [0], lambda item: ended.append(item[0]))
     assert [r.outcome for r in ended] == ["success", "fell", "success", "walked"]
     assert ended[-1].speed_m_s == pytest.approx(0.22, abs=0.03)  # a robot in the plane: 0.23 m/s
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--grounds", "gap:0.6"], "--grounds: gap: width: expected a number of at most 0.5"),
-        (["--grounds", "ramp:80"], "--grounds: ramp: slope: expected a number of at most 45"),
-        (
-            ["--grounds", "stairs:0"],
-            "--grounds: stairs: height: expected a number of at least 0.001",
-        ),
-        (["--grounds", "gap:nan"], "--grounds: gap: width: expected"),
-        (["--grounds", "gap"], "expected flat or one of gap:WIDTH, step_down:HEIGHT"),
-        (["--grounds", "pond:1"], "found 'pond:1'"),
-        (["--grounds", "ramp:x"], "expected a number after ramp:, found 'x'"),
-        (["--grounds", "gap:0.1", "gap:0.10"], "grounds must differ, found gap:0.1, gap:0.1"),
-        (
-            ["--robot.links", "3", "--grounds", "gap:0.4"],
-            "grounds: gap: expected at most the length of the robot, 0.36 m, found 0.4",
-        ),
-        *((["--grounds", w, "--robot", "scuttle"], "expected a robot with pitch") for w in WORDS),
-    ],
-)
-def test_bad_grounds_are_answered_in_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["climb", *words]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1

@@ -8,8 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from antennate.cli import main
-from antennate.cli.terminal import BAD_INPUT
 from antennate.control.climbing.body import line, pitch_angles
 from antennate.control.climbing.rule import Ground, Stage
 from antennate.control.knowledge import Knowledge
@@ -104,25 +102,6 @@ def test_a_plan_that_is_told_goes_on_at_its_pace_and_back_with_the_robot() -> No
     assert first[109] - first[11] == pytest.approx(0.98 * control.climb.pace)
     assert first[-1] == -0.15
     assert np.isnan(np.array(plans)[:, 1:]).all()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["low", "0.2"], "control.climb: low: expected at most rise, 0.17 m, found 0.2"),
-        (
-            ["feel.touch", "0.1"],
-            "control.climb.feel: missing: expected less than touch, 0.1, found 0.14",
-        ),
-    ],
-)
-def test_parameters_that_contradict_each_other_are_refused_in_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["climb", f"--control.climb.{words[0]}", words[1]]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
 
 
 def test_legs_go_slower_while_the_plan_goes_on() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven_rig import driven, simulated_alike
+from driven_rig import driven
 
 from antennate.cli import main
 from antennate.cli.terminal import BAD_INPUT, OK
@@ -111,17 +111,6 @@ def test_a_robot_with_actuated_pitch_walks_level_and_as_fast_as_a_locked_one(
     assert np.abs(angles).max() < 0.1  # they give way a little under the legs' load
     assert np.ptp(angles, axis=0).min() > 1e-6  # each one is free to
     assert speed(moved) == pytest.approx(speed(locked), rel=0.1)
-
-
-def test_actuated_pitch_is_driven_through_bytes_as_in_simulation() -> None:
-    config = TunnelConfig(robot=NODDING)
-    one = driven(config, "closed", 0, 60)
-    other = simulated_alike(config, "closed", 0, one.start, 60)
-    assert len(one.walk.commands) == 60
-    assert one.walk.commands == other.commands
-    assert one.walk.readings == other.readings
-    middle = one.walk.goals[-1][-NODDING.pitch_count :]
-    assert middle == (2048,) * 5  # level, half a turn of the servo
 
 
 @pytest.mark.parametrize("name", PLANAR)

@@ -142,21 +142,6 @@ def test_rows_are_read_as_they_were_kept(published):
     assert 0.2 < rows.outcomes["stiff jams"].mean() < 0.6
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (["weigh", "wall", "none"], "none: expected the rows of a study, found no such file"),
-        (["best", "wall", FOLDER / "published_tunnel.csv"], "expected a column wall.base_angle"),
-    ],
-)
-def test_what_cannot_be_weighed_is_one_line(words, line):
-    run = part(*words)
-    assert run.returncode == 2
-    assert line in run.stderr
-    assert run.stderr.count("\n") == 1
-
-
 def test_ranges_that_leave_nothing_are_one_line(published, capsys):
     with pytest.raises(SystemExit) as end:
         published.weights_of({"a": np.array([0.0, 1.0]), "b": np.array([1.0, 0.0])})
@@ -264,6 +249,8 @@ def test_a_controller_is_searched_in_the_setting_of_a_file(controller, tmp_path,
 @pytest.mark.parametrize(
     ("words", "line"),
     [
+        (["weigh", "wall", "none"], "none: expected the rows of a study, found no such file"),
+        (["best", "wall", FOLDER / "published_tunnel.csv"], "expected a column wall.base_angle"),
         (["tune", "tunnel"], "the following arguments are required: files"),
         (["tune", "wall", "x"], "argument group: invalid choice: 'wall'"),
         (["tune", "tunnel", "none.toml"], "none.toml: expected a readable file"),

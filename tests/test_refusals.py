@@ -173,6 +173,34 @@ gait --unknown robot.mass=0.1:2 --robot hexapod :: unknown: robot.mass: expected
 gait --unknown robot.mass=1:2 robot.mass=1:3 --robot hexapod :: unknown must differ
 gait --robot.legs.reach 0.1 --robot hexapod :: legs.reach: expected at most 0.053 m
 """
+CLIMB = """
+climb --robot scuttle :: expected a robot with pitch joints and antennae that rise
+climb --robot hexapod :: expected a robot with pitch joints and antennae that rise
+climb --robot.servos.xc430-w240.gain-divisor 9 :: divisors says it
+climb --heights 0.6 :: --heights: expected a number of at most 0.5, found 0.6
+climb --robot.links 3 --heights 0.4 :: expected at most the length of the robot
+climb --heights 0.05 0.05 :: heights must differ
+climb --start 0.1 1 :: start must rise from at least 0.25 to at most 10 m, found 0.1
+climb --start 0.35 :: --start: expected 2 values, found 1
+climb --conditions fly :: expected one of locked, level, lifted, rhythm, climb or edges
+climb --divisors 0 :: --divisors: expected a number above 0, found 0.0
+climb --grounds gap:0.6 :: --grounds: gap: width: expected a number of at most 0.5
+climb --grounds ramp:80 :: --grounds: ramp: slope: expected a number of at most 45
+climb --grounds stairs:0 :: --grounds: stairs: height: expected a number of at least 0.001
+climb --grounds gap:nan :: --grounds: gap: width: expected
+climb --grounds gap :: expected flat or one of gap:WIDTH, step_down:HEIGHT
+climb --grounds pond:1 :: found 'pond:1'
+climb --grounds ramp:x :: expected a number after ramp:, found 'x'
+climb --grounds gap:0.1 gap:0.10 :: grounds must differ, found gap:0.1, gap:0.1
+climb --robot.links 3 --grounds gap:0.4 :: grounds: gap: expected at most the length of the robot, 0.36 m, found 0.4
+climb --control.climb.low 0.2 :: control.climb: low: expected at most rise, 0.17 m, found 0.2
+climb --control.climb.feel.touch 0.1 :: control.climb.feel: missing: expected less than touch, 0.1, found 0.14
+geometry --gait.amplitude 0.6 :: gait.amplitude: expected at most 0.5087 rad
+geometry --robot.links 1 :: links: expected a number of at least 2, found 1
+geometry --largest-amplitude 0.55 :: expected at most 0.5087 rad
+gait --optimise speed --gait.amplitude 0.6 :: the limit of the yaw joints
+gait --optimise fast :: speed
+"""
 BENCH = """
 bench wall --profiles stiff stiff :: profiles must differ
 bench wall --wall.overlap 0.09 :: overlap must stay below
@@ -339,6 +367,7 @@ TOPICS = [
     KNOWLEDGE,
     NOT_READ,
     HEXAPOD,
+    CLIMB,
     BENCH,
     DATASET,
     ANTENNA,

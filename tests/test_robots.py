@@ -34,6 +34,11 @@ def robot_of(links: int, hinges: int) -> RobotSpec:
 
 SIZES = [(4, 4), (8, 10)]
 """Fewer links and hinges than ours, and more."""
+DRIVEN = [
+    *(robot_of(*size) for size in SIZES),
+    RobotSpec.model_validate({"pitch": {"kind": "actuated"}}),
+    RobotSpec.named("scuttle3d"),
+]
 
 
 @pytest.mark.parametrize(("links", "hinges"), SIZES)
@@ -54,9 +59,9 @@ def test_a_robot_of_any_size_is_decided_alike_in_simulation_and_through_bytes(
     assert on_twin(config, "closed", 0) == simulated(config, "closed", 0)
 
 
-@pytest.mark.parametrize(("links", "hinges"), SIZES)
-def test_a_robot_of_any_size_is_driven_as_in_simulation(links: int, hinges: int) -> None:
-    config = TunnelConfig(robot=robot_of(links, hinges))
+@pytest.mark.parametrize("robot", DRIVEN, ids=["4", "8", "pitch", "scuttle3d"])
+def test_a_robot_of_any_size_is_driven_as_in_simulation(robot: RobotSpec) -> None:
+    config = TunnelConfig(robot=robot)
     one = driven(config, "closed", 0, 60)
     other = simulated_alike(config, "closed", 0, one.start, 60)
     assert len(one.walk.maneuvers) == 60

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven_rig import driven, simulated_alike
+from driven_rig import driven
 from setup_rig import Box, Script
 from twin_rig import rig
 
@@ -72,16 +72,6 @@ class Nodding:
 @pytest.fixture(autouse=True)
 def nodding(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(CONTROLLERS.added, "nodding", Nodding)
-
-
-def test_it_is_driven_through_bytes_as_in_simulation() -> None:
-    config = TunnelConfig(robot=ROBOT)
-    one = driven(config, "closed", 0, 60)
-    other = simulated_alike(config, "closed", 0, one.start, 60)
-    assert len(one.walk.commands) == 60
-    assert one.walk.maneuvers == other.maneuvers
-    assert one.walk.commands == other.commands
-    assert one.walk.readings == other.readings
 
 
 def test_goals_of_pitch_and_elevation_go_through_bytes() -> None:

@@ -30,26 +30,16 @@ class Ports:
         return Path(found).name if found else ""
 
 
-def test_the_port_that_goes_and_comes_back_is_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["ttyUSB1", "ttyUSB7"])
+def test_the_port_that_goes_and_comes_back_is_it_by_any_name(name: str, tmp_path: Path) -> None:
     ports = Ports(tmp_path)
     script = Script(
         [
             ("unplug the adapter", lambda: ports.unplug("ttyUSB1"), ""),
-            ("plug it in again", lambda: ports.plug("ttyUSB1"), ""),
+            ("plug it in again", lambda: ports.plug(name), ""),
         ]
     )
-    assert ports.find(script) == "ttyUSB1"
-
-
-def test_a_port_may_come_back_by_another_name(tmp_path: Path) -> None:
-    ports = Ports(tmp_path)
-    script = Script(
-        [
-            ("unplug", lambda: ports.unplug("ttyUSB1"), ""),
-            ("plug it in", lambda: ports.plug("ttyUSB7"), ""),
-        ]
-    )
-    assert ports.find(script) == "ttyUSB7"
+    assert ports.find(script) == name
 
 
 def test_none_or_two_are_told_and_asked_for_once_more(tmp_path: Path) -> None:

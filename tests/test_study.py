@@ -144,17 +144,6 @@ def test_odd_letters_and_long_text_are_kept_and_read_again() -> None:
     assert [len(row["said"]) for row in antennate.RunDirectory.open("run").rows()] == [150_000] * 6
 
 
-@pytest.mark.slow
-def test_W4_a_trial_that_never_ends_is_given_up() -> None:
-    plan(mode="hang")
-    text = (
-        Path("plan.toml").read_text().replace("[0.5, 1.5]", "[0.5]").replace("[[1, 2], [3]]", "[1]")
-    )
-    Path("plan.toml").write_text(text)
-    assert study("--trial-timeout", "4") == 0
-    assert [row["status"] for row in table()] == ["ok", "hung", "ok"]
-
-
 def test_W3_changes_are_refused_and_named(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = Path("run/trials.csv").read_bytes()
     plan(mode="nan")

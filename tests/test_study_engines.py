@@ -7,7 +7,6 @@ import functools
 import os
 import re
 import shlex
-import shutil
 import signal
 import socket
 import subprocess
@@ -298,16 +297,6 @@ def test_a_scheduler_that_is_not_there_is_one_line(capsys: pytest.CaptureFixture
     assert "expected --engine slurm beside it" in capsys.readouterr().err
 
 
-def test_a_name_that_submitit_does_not_know_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("submitit")
-    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
-    words = ["--engine", "slurm-local", "--slurm", "timeout=5", "--out", "run"]
-    assert main(["study", "plan.toml", *words]) == 2
-    said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert "--slurm: expected names of submitit, such as timeout_min" in said
-    assert said.endswith("Parameter 'timeout' need to be prefixed by an executor name.")
-
-
 POOL = """
 import sys
 import antennate
@@ -576,19 +565,6 @@ def test_the_commands_of_the_snakefile_leave_the_same_table() -> None:
         assert Path(outputs["shard"].replace("{i}", number)).is_file()
     words = merge.replace("{params.folders}", "shards/1 shards/2")
     assert main(shlex.split(words)[1:]) == 0
-    assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
-    assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
-
-
-def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
-    if shutil.which("snakemake") is None:
-        pytest.skip("snakemake is not installed; `uv run --with snakemake pytest` brings it")
-    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    words = ["snakemake", "--cores", "2", "--config", "study=plan.toml", "--snakefile"]
-    words.append(str(ROOT / "examples" / "snakemake" / "Snakefile"))
-    done = subprocess.run(words, env={**os.environ, "PATH": path}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
     assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
     assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
 

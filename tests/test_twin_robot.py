@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from recorded import robot_for
-from twin_rig import Decisions, on_twin, simulated
+from twin_rig import on_twin, simulated
 
 from antennate.control.gait import targets
 from antennate.control.registry import BUILT_IN, make_controller
@@ -23,7 +23,6 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene
 from antennate.sim.world import World
 from antennate.twin.config import Passage
-from antennate.twin.robot import TwinRobot
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 ROBOT = RobotSpec()
@@ -179,24 +178,6 @@ def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
     assert pure.status == end
     assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
     assert twin == pure
-
-
-def test_a_board_that_falls_silent_makes_the_robot_hold_within_100_ms() -> None:
-    """Row L8: UNKNOWN after 50 ms, decided at the next tick; the command then stays."""
-    config = TunnelConfig(seed=0, time_limit=2.0)
-    ticks = 0
-
-    def cut(robot: TwinRobot) -> None:
-        nonlocal ticks
-        ticks += 1
-        if ticks > 100:
-            robot.board_silent = True
-
-    found: Decisions = on_twin(config, "open", 0, cut)
-    first = found.maneuvers.index(Maneuver.HOLD)
-    assert 100 < first <= 100 + 10
-    assert set(found.maneuvers[first:]) == {Maneuver.HOLD}
-    assert math.isnan(found.counts[-1][0])
 
 
 def test_the_twin_tells_when_its_head_passes_the_exit() -> None:

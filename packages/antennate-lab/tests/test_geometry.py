@@ -191,23 +191,6 @@ def test_a_row_keeps_what_was_planned():
     assert math.isfinite(walked.speed_m_s)
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["geometry", "--gait.amplitude", "0.6"], "gait.amplitude: expected at most 0.5087 rad"),
-        (["gait", "--optimise", "speed", "--gait.amplitude", "0.6"], "the limit of the yaw joints"),
-        (["gait", "--optimise", "fast"], "speed"),
-        (["geometry", "--robot.links", "1"], "links: expected a number of at least 2, found 1"),
-        (["geometry", "--largest-amplitude", "0.55"], "expected at most 0.5087 rad"),
-    ],
-)
-def test_bad_input_is_one_line(words, text, capsys):
-    assert main(words) == 2
-    err = capsys.readouterr().err
-    assert text in err
-    assert err.count("\n") == 1
-
-
 def test_gaits_by_name_stay_within_the_joints():
     limit = RobotSpec().yaw_limit
     for name in ("serpenoid", "swift", "thrifty"):

@@ -227,55 +227,6 @@ def lerobot(monkeypatch: pytest.MonkeyPatch) -> Any:
     )
 
 
-def test_lerobot_calibrates_and_moves_two_servos(
-    lerobot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    common, dynamixel = lerobot
-    mode = common.MotorNormMode.RANGE_M100_100
-    names = {"pan": ("xl330-m288", 1), "lift": ("xl430-w250", 2)}
-    motors = {name: common.Motor(n, model, mode) for name, (model, n) in names.items()}
-    with served(XL330_M288, XL430_W250, million=True) as server:
-        bus = dynamixel.DynamixelMotorsBus(server.path, motors)
-        eventually(lambda: bus.connect() or bus.is_connected, bool)
-        bus.disable_torque(num_retry=5)
-        for name in names:
-            extended = dynamixel.OperatingMode.EXTENDED_POSITION.value
-            bus.write("Operating_Mode", name, extended, num_retry=5)
-        offsets = bus.set_half_turn_homings()
-        assert offsets == {"pan": 2047 - 1300, "lift": 2047 - 1600}
-        assert positions(bus) == {"pan": 2047, "lift": 2047}
-        mins, maxes = recorded(bus, server, common, monkeypatch)
-        assert mins == {"pan": 1547, "lift": 1747}
-        assert maxes == {"pan": 2547, "lift": 2347}
-        bus.enable_torque(num_retry=5)
-        bus.sync_write("Goal_Position", {"pan": 1600, "lift": 2300}, normalize=False)
-        eventually(lambda: positions(bus), lambda p: p == {"pan": 1600, "lift": 2300})
-        bus.disconnect()
-        with server.lock:
-            assert [servo.torque for servo in server.bus.servos] == [False, False]
-
-
-def positions(bus: Any) -> dict[str, int]:
-    return bus.sync_read("Present_Position", normalize=False, num_retry=5)
-
-
-def recorded(
-    bus: Any, server: Moving, common: Any, monkeypatch: pytest.MonkeyPatch
-) -> tuple[dict[str, int], dict[str, int]]:
-    """Somebody turns both servos to their ends and back, then presses Enter."""
-    turns = iter([(1547, 1747), (2547, 2347), (2047, 2047)])
-
-    def enter_pressed() -> bool:
-        turn = next(turns, None)
-        with server.lock:
-            for servo, position in zip(server.bus.servos, turn or (), strict=turn is not None):
-                servo.place(float(position))
-        return turn is None
-
-    monkeypatch.setattr(common, "enter_pressed", enter_pressed)
-    return bus.record_ranges_of_motion(display_values=False)
-
-
 def test_lerobot_finds_a_new_servo_and_gives_it_id_and_speed(lerobot: Any) -> None:
     common, dynamixel = lerobot
     motor = common.Motor(6, "xl330-m288", common.MotorNormMode.DEGREES)
