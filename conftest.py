@@ -121,9 +121,9 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     """Run a command that is refused: nothing on stdout, one line on stderr, which is returned."""
 
-    def run(*words: str) -> str:
+    def run(*words: object) -> str:
         capsys.readouterr()
-        assert main(list(words)) == 2
+        assert main([*map(str, words)]) == 2
         out, err = capsys.readouterr()
         assert out == ""
         assert err.endswith("\n")

@@ -49,17 +49,6 @@ def child(code: str, *argv: str, **options) -> subprocess.Popen:
     return subprocess.Popen(words, env=environment, text=True, **options)
 
 
-def refusal(capsys, *argv: str) -> str:
-    """The one line with which a command refuses."""
-    assert main(argv) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.endswith("\n")
-    assert err.count("\n") == 1, err
-    assert "Traceback" not in err
-    return err.strip()
-
-
 def test_version_and_help(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"antennate {antennate.__version__}\n"
@@ -217,14 +206,14 @@ def test_a_refusal_imports_nothing_that_it_does_not_need() -> None:
 
 
 @pytest.mark.parametrize("words", ["scuttle --robot hexapod", "--robot hexapod scuttle"])
-def test_a_robot_given_in_two_ways_is_refused(words: str, capsys) -> None:
-    line = refusal(capsys, "robot", *words.split())
+def test_a_robot_given_in_two_ways_is_refused(words: str, refused) -> None:
+    line = refused("robot", *words.split())
     assert "--robot: expected it once, found also NAME|FILE without" in line
 
 
 @pytest.mark.parametrize("flag", ["--log", "--readings", "--video", "--view"])
-def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys) -> None:
-    line = refusal(capsys, "geometry", flag)
+def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys, refused) -> None:
+    line = refused("geometry", flag)
     assert f"expected a flag of this command, found {flag}; " in line
     told = line.partition(f"{flag}; ")[2].partition(" take it;")[0]
     having = set()
@@ -272,10 +261,10 @@ def test_a_flag_of_other_commands_is_refused_with_their_names(flag: str, capsys)
         (b"\xff\xfe", ["expected UTF-8 text, found byte 0xff at 0"]),
     ],
 )
-def test_bad_files(capsys, tmp_path, text, parts):
+def test_bad_files(refused, tmp_path, text, parts):
     (tmp_path / "c.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
     start = time.monotonic()
-    line = refusal(capsys, "tunnel", "--config", "c.toml")
+    line = refused("tunnel", "--config", "c.toml").rstrip()
     assert time.monotonic() - start < 2.0
     for part in parts:
         assert part in line
@@ -299,19 +288,19 @@ def test_negative_numbers_and_none_are_values():
     assert config.duration is None
 
 
-def test_bad_folders(capsys, tmp_path):
+def test_bad_folders(refused, tmp_path):
     (tmp_path / "file").write_text("mine")
     for words in ((), ("--overwrite",)):
-        line = refusal(capsys, *QUICK, "--out", "file", *words)
+        line = refused(*QUICK, "--out", "file", *words)
         assert "expected to write file, found: File exists" in line
     (tmp_path / "link").symlink_to("nowhere")
-    line = refusal(capsys, *QUICK, "--out", "link", "--overwrite")
+    line = refused(*QUICK, "--out", "link", "--overwrite")
     assert "expected to write link, found: File exists" in line
-    assert "Not a directory" in refusal(capsys, *QUICK, "--out", "file/sub")
+    assert "Not a directory" in refused(*QUICK, "--out", "file/sub")
     assert (tmp_path / "file").read_text() == "mine"
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "config.toml").write_text("trials = 1\n")
-    line = refusal(capsys, *QUICK, "--out", "mine")
+    line = refused(*QUICK, "--out", "mine")
     assert "mine: expected no file config.toml but of this run" in line
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["config.toml"]
 
@@ -325,27 +314,27 @@ def test_bad_folders(capsys, tmp_path):
         ("doctor",),
     ],
 )
-def test_a_path_that_is_too_long_is_one_line(capsys, tmp_path, words):
+def test_a_path_that_is_too_long_is_one_line(refused, tmp_path, words):
     """A name has at most 255 bytes (POSIX NAME_MAX of Linux)."""
     (tmp_path / "a.toml").write_text('experiment = "antenna"\n')
-    assert refusal(capsys, *words, "--out", "a" * 300)
+    assert refused(*words, "--out", "a" * 300)
 
 
 @pytest.mark.parametrize("words", [("--out", "bad\udcff"), ("--out=bad\udcff",)])
-def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(capsys, tmp_path, words):
+def test_a_folder_whose_name_is_no_text_is_one_line_and_is_not_made(refused, tmp_path, words):
     """The shell's `$'bad\\xff'` comes as a lone surrogate (PEP 383), which UTF-8 cannot write."""
-    line = refusal(capsys, "antenna", *words)
+    line = refused("antenna", *words)
     assert "--out: expected text in UTF-8, found " in line
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission(capsys, tmp_path):
+def test_a_folder_without_permission(refused, tmp_path):
     (tmp_path / "closed").mkdir(mode=0o500)
-    assert "Permission denied" in refusal(capsys, *QUICK, "--out", "closed")
+    assert "Permission denied" in refused(*QUICK, "--out", "closed")
 
 
-def test_a_full_disk_is_one_line_and_keeps_what_was_there(capsys, tmp_path, monkeypatch):
+def test_a_full_disk_is_one_line_and_keeps_what_was_there(capsys, refused, tmp_path, monkeypatch):
     assert main([*QUICK, "--out", "run"]) == 0
     capsys.readouterr()
     before = (tmp_path / "run" / "result.json").read_bytes()
@@ -354,7 +343,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_there(capsys, tmp_path, monk
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    assert "No space left on device" in refusal(capsys, *QUICK, "--out", "other")
+    assert "No space left on device" in refused(*QUICK, "--out", "other")
     assert not (tmp_path / "other").exists()
     assert (tmp_path / "run" / "result.json").read_bytes() == before
 
@@ -464,10 +453,10 @@ def test_flags_override_the_file_and_the_run_says_so(capsys, tmp_path):
         assert ours.read_bytes() == theirs.read_bytes()
 
 
-def test_an_unfinished_run_is_not_overwritten(capsys, tmp_path):
+def test_an_unfinished_run_is_not_overwritten(refused, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "trials.jsonl").write_text("{}\n")
-    assert "trials.jsonl" in refusal(capsys, *QUICK, "--out", "run")
+    assert "trials.jsonl" in refused(*QUICK, "--out", "run")
 
 
 def test_an_invalid_trial_is_a_row_and_no_success(capsys, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shutil
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -83,16 +84,6 @@ def run(finished: Path, there: Path) -> Path:
     return Path(shutil.copytree(finished, "run"))
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    """The one line with which `report` refuses."""
-    capsys.readouterr()
-    assert main(["report", *words]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1, err
-    return err
-
-
 @pytest.mark.usefixtures("run")
 def test_a_run_leaves_a_page_with_everything() -> None:
     data = json.loads(Path("run/result.json").read_text())
@@ -147,38 +138,38 @@ def test_every_figure_has_a_sentence() -> None:
 
 
 @pytest.mark.usefixtures("run")
-def test_it_is_written_again_and_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_is_written_again_and_elsewhere(refused: Callable[..., str]) -> None:
     first = Path("run/report.html").read_bytes()
     Path("run/report.html").unlink()
     assert main(["report", "run"]) == 0
     assert Path("run/report.html").read_bytes() == first
     assert main(["report", "run", "--out", "page.html"]) == 0
     assert Path("page.html").read_bytes() == first
-    assert "expected no such file" in refusal(capsys, "run", "--out", "page.html")
+    assert "expected no such file" in refused("report", "run", "--out", "page.html")
     assert main(["report", "run", "--out", "page.html", "--overwrite"]) == 0
 
 
 @pytest.mark.usefixtures("run")
-def test_a_page_takes_the_place_of_no_file_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_takes_the_place_of_no_file_of_its_run(refused: Callable[..., str]) -> None:
     before = Path("run/result.json").read_bytes()
     for words in (["run"], ["--compare", "run", "run"]):
-        said = refusal(capsys, *words, "--out", "run/result.json", "--overwrite")
+        said = refused("report", *words, "--out", "run/result.json", "--overwrite")
         assert "--out: expected no file that the page is made of, found run/result.json" in said
     assert Path("run/result.json").read_bytes() == before
 
 
 @pytest.mark.usefixtures("run")
-def test_a_pipe_or_a_device_is_never_replaced(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_or_a_device_is_never_replaced(refused: Callable[..., str]) -> None:
     os.mkfifo("pipe")
     Path("null").symlink_to("/dev/null")
     for name in ("pipe", "null"):
-        said = refusal(capsys, "run", "--out", name, "--overwrite")
+        said = refused("report", "run", "--out", name, "--overwrite")
         assert f"{name}: expected a file or a new name, found a folder, a pipe or a device" in said
     assert Path("pipe").is_fifo()
     assert Path("null").is_char_device()
     Path("run/report.html").unlink()
     os.mkfifo("run/report.html")
-    assert "expected a file or a new name" in refusal(capsys, "run")
+    assert "expected a file or a new name" in refused("report", "run")
 
 
 @pytest.mark.usefixtures("run")
@@ -229,7 +220,7 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
     assert "Over half of the trials jam" in page.text
 
 
-def test_two_runs_stand_side_by_side(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_runs_stand_side_by_side(run: Path, refused: Callable[..., str]) -> None:
     run.rename("coil-4")
     assert main(["antenna", "--coil-mm", "3.6", "--out", "coil-3.6"]) == 0
     assert main(["report", "--compare", "coil-3.6", "coil-4"]) == 0
@@ -243,9 +234,9 @@ def test_two_runs_stand_side_by_side(run: Path, capsys: pytest.CaptureFixture[st
     ]
     for row in stiffness:
         assert f"{row['stiffness_n_mm_per_deg']:.4f}"[:5] in page.text
-    assert "expected no such file" in refusal(capsys, "--compare", "coil-3.6", "coil-4")
+    assert "expected no such file" in refused("report", "--compare", "coil-3.6", "coil-4")
     main(["calibrate", "--no-figures", "--out", "other"])
-    told = refusal(capsys, "--compare", "coil-4", "other")
+    told = refused("report", "--compare", "coil-4", "other")
     assert (
         "expected two runs of one command, found antenna in coil-4 and calibrate in other" in told
     )
@@ -325,37 +316,37 @@ def test_invalid_trials_and_their_reasons_are_shown() -> None:
     ],
 )
 def test_what_cannot_be_shown_is_one_line(
-    capsys: pytest.CaptureFixture[str], name: str, text: str, why: str
+    refused: Callable[..., str], name: str, text: str, why: str
 ) -> None:
     Path("run").mkdir()
     Path("run", name).write_text(text)
-    assert why in refusal(capsys, "run")
+    assert why in refused("report", "run")
     assert not Path("run/report.html").exists()
 
 
 @pytest.mark.parametrize("cut", [0, 10, -1, -2, -30])
-def test_a_table_that_was_cut_is_one_line(capsys: pytest.CaptureFixture[str], cut: int) -> None:
+def test_a_table_that_was_cut_is_one_line(refused: Callable[..., str], cut: int) -> None:
     """Its last cell is empty: without its end the last row may still have all cells."""
     Path("run").mkdir()
     Path("run/command.txt").write_text("antennate bench wall --trials 2\n")
     Path("run/trials.jsonl").touch()
     table = "seed,trial,reason\n0,0,\n0,1,it is a long reason that is quoted\n0,2,\n"
     Path("run/trials.csv").write_text(table[:cut])
-    assert "run/trials.csv: expected a whole file of this kind" in refusal(capsys, "run")
+    assert "run/trials.csv: expected a whole file of this kind" in refused("report", "run")
     Path("run/trials.csv").write_text(table)
     assert main(["report", "run"]) == 0
     assert "3 trials were kept" in Page(Path("run/report.html")).text
 
 
 def test_a_run_that_has_ended_without_its_result_is_one_line(
-    capsys: pytest.CaptureFixture[str],
+    refused: Callable[..., str],
 ) -> None:
     """What says that it goes on is gone, so it has written a result."""
     Path("run").mkdir()
     Path("run/command.txt").write_text("antennate bench wall --trials 2\n")
     Path("run/config.toml").touch()
     Path("run/trials.csv").write_text("seed,trial\n0,0\n")
-    assert "run/result.json: expected a readable file" in refusal(capsys, "run")
+    assert "run/result.json: expected a readable file" in refused("report", "run")
 
 
 @pytest.mark.parametrize("ends", [(None, None), (1.0, math.nan), (-math.inf, 1.0)])

@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tracked import NAMES, POINTS, animal, classified, dwelling, write
-
-from antennate.cli import main
 
 GIVEN = (
     Path(__file__).parents[4] / "shared" / "data" / "inputs_turn4" / "three_animals_no_track.csv"
@@ -49,23 +48,15 @@ def sleap_csv(path: Path, animals: list[dict[str, np.ndarray]], tracks: list[str
     return path
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """The one line of a command that ends with exit code 2."""
-    assert main(["tracks", *map(str, words)]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1, err
-    return err
-
-
 def test_animals_without_a_name_never_become_one(
-    three: list[dict[str, np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    three: list[dict[str, np.ndarray]], tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     """SLEAP writes no track where nothing was tracked; one row a frame alone is one animal."""
     path = sleap_csv(tmp_path / "a.csv", three, ["", "", ""])
     said = f"found more in {FRAMES} frames, the first of them 0; if these are several animals"
-    assert said in refusal(capsys, "--files", path, *FLAGS)
+    assert said in refused("tracks", "--files", path, *FLAGS)
     path = sleap_csv(tmp_path / "b.csv", three, ["one", "two", "two"])
-    assert f"{FRAMES} frames of two, the first" in refusal(capsys, "--files", path, *FLAGS)
+    assert f"{FRAMES} frames of two, the first" in refused("tracks", "--files", path, *FLAGS)
     path = sleap_csv(tmp_path / "c.csv", three, ["one", "two", "three"])
     result, _ = classified(path, rate=100.0)
     assert [row.animal for row in result.rows[::2]] == ["one", "two", "three"]
@@ -75,12 +66,12 @@ def test_animals_without_a_name_never_become_one(
 
 
 @pytest.mark.skipif(not GIVEN.exists(), reason="the file is not here")
-def test_the_given_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_given_file_is_refused(refused: Callable[..., str]) -> None:
     """40 rows of each of three animals, in 40 frames."""
     points = ["--points.left", "lb", "lt", "--points.right", "rb", "rt", "--rate", 100]
     plain = ["--columns.x", "{}.x", "--columns.y", "{}.y", "--columns.frame", "frame_idx"]
     for words in (points, [*points, *plain]):
-        err = refusal(capsys, "--files", GIVEN, *words)
+        err = refused("tracks", "--files", GIVEN, *words)
         assert "expected one place for each point in a frame, found more in 40 frames" in err
 
 
@@ -125,7 +116,7 @@ def test_an_individual_without_the_points_is_named_with_a_count(
     name: str,
     three: list[dict[str, np.ndarray]],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Callable[..., str],
 ) -> None:
     """DeepLabCut calls `single` what belongs to no animal, such as corners of the arena."""
     corner = {"corner": np.ones((FRAMES, 2))}
@@ -139,7 +130,7 @@ def test_an_individual_without_the_points_is_named_with_a_count(
     assert "Of 4 animals 2 left out: bare, single." in result.sentence
     half = {"one": three[0], "two": {n: three[1][n] for n in NAMES[:3]}}
     path = deeplabcut(tmp_path / f"half_{name}", half)
-    assert "two: expected x and y of " in refusal(capsys, "--files", path, *FLAGS)
+    assert "two: expected x and y of " in refused("tracks", "--files", path, *FLAGS)
 
 
 @pytest.mark.parametrize("kind", ["plain", "sleap", "deeplabcut"])
@@ -149,7 +140,7 @@ def test_semicolons_are_told_from_names_of_columns(
     comma: str,
     three: list[dict[str, np.ndarray]],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Callable[..., str],
 ) -> None:
     """As a spreadsheet writes where commas are decimal marks; what is said mends the file."""
     path = tmp_path / "a.csv"
@@ -162,7 +153,7 @@ def test_semicolons_are_told_from_names_of_columns(
     good, heads = path.read_text(), 4 if kind == "deeplabcut" else 1
     lines = good.replace(",", ";").splitlines(keepends=True)
     path.write_text("".join(lines[:heads]) + "".join(lines[heads:]).replace(".", comma))
-    err = refusal(capsys, "--files", path, *FLAGS)
+    err = refused("tracks", "--files", path, *FLAGS)
     assert "row 1: expected columns separated by commas, and points as decimal marks, found " in err
     how = " and decimal commas; replace commas by points, then semicolons by commas\n"
     assert ("found semicolons" + (how if comma == "," else "\n")) in err
@@ -210,24 +201,24 @@ def corrected(path: Path, points: dict[str, np.ndarray], origin: int) -> Path:
 
 
 def test_a_prediction_that_was_corrected_by_hand_is_no_second_animal(
-    three: list[dict[str, np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    three: list[dict[str, np.ndarray]], tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     """SLEAP keeps it in the file: it is counted, and only another instance is another animal."""
     result, _ = classified(corrected(tmp_path / "a.slp", three[0], origin=3), rate=100.0)
     assert result.summary["handled"]["duplicated"] == 1
     assert result.summary["frames"]["contact"] == 2 * FRAMES
     path = corrected(tmp_path / "b.slp", three[0], origin=-1)
-    err = refusal(capsys, "--files", path, *FLAGS)
+    err = refused("tracks", "--files", path, *FLAGS)
     assert "found several without a track in frame 3; track them in SLEAP" in err
 
 
 def test_scores_of_another_shape_are_not_passed_over(
-    three: list[dict[str, np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    three: list[dict[str, np.ndarray]], tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     h5py = pytest.importorskip("h5py")
     tracks = np.stack(list(three[0].values()))[None].transpose(0, 3, 1, 2)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["tracks"], file["node_names"] = tracks, [name.encode() for name in three[0]]
         file["point_scores"] = np.ones((1, len(NAMES), FRAMES - 1))
-    err = refusal(capsys, "--files", tmp_path / "a.h5", *FLAGS)
+    err = refused("tracks", "--files", tmp_path / "a.h5", *FLAGS)
     assert "expected point_scores of shape (1, 10, 40), found (1, 10, 39)" in err

@@ -6,6 +6,7 @@ import csv
 import json
 import pickle
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,6 @@ import pytest
 from tracked import NAMES, POINTS, animal, classified, dwelling, write
 
 import antennate
-from antennate.cli import main
 
 h5py = pytest.importorskip("h5py")
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -113,14 +113,6 @@ def pandas_table(path: Path, points: dict[str, np.ndarray], names: bytes | None 
     return path
 
 
-def message(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """The one line of a command that ends with exit code 2."""
-    assert main(["tracks", *map(str, words)]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1, err
-    return err
-
-
 @pytest.mark.parametrize("kind", ["csv", "turned", "sleap", "labels", "pandas"])
 def test_every_container_holds_the_same_animal(kind: str, tmp_path: Path) -> None:
     points = animal(dwelling(5, 200))
@@ -188,7 +180,7 @@ def test_locusts_have_the_angles_that_others_computed() -> None:
     ],
 )
 def test_a_wrong_frame_rate_is_one_line(
-    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], expected: str, refused: Callable[..., str]
 ) -> None:
     file = LOCUSTS / "raw" / "locusts-noqr_20250117_5_id1.npz"
     names = [
@@ -203,7 +195,7 @@ def test_a_wrong_frame_rate_is_one_line(
         "--points.head",
         "1",
     ]
-    assert expected in message(capsys, "--files", file, *names, *words)
+    assert expected in refused("tracks", "--files", file, *names, *words)
 
 
 @here
@@ -223,7 +215,7 @@ def test_bees_are_the_same_in_every_container() -> None:
 @pytest.mark.parametrize(
     "file", ["CollectedData_felix.csv", "CollectedData_felix.h5", "*1030000.h5"]
 )
-def test_labels_are_no_recording(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_labels_are_no_recording(file: str, refused: Callable[..., str]) -> None:
     (path,) = MOSQUITO.glob(file)
     names = [
         "--points.left",
@@ -234,16 +226,16 @@ def test_labels_are_no_recording(file: str, capsys: pytest.CaptureFixture[str]) 
         "--points.tail",
         "abdomen",
     ]
-    err = message(capsys, "--files", path, *names, "--rate", 30)
+    err = refused("tracks", "--files", path, *names, "--rate", 30)
     assert "expected numbers of frames, found an image" in err
     assert "these are labels" in err
 
 
 @here
-def test_files_without_antennae_are_refused_politely(capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_without_antennae_are_refused_politely(refused: Callable[..., str]) -> None:
     files = sorted(NO_ANTENNA.glob("*.h5")) + sorted(NO_ANTENNA.glob("*.slp"))
     for path in files:
-        err = message(capsys, "--files", path, "--rate", 30)
+        err = refused("tracks", "--files", path, "--rate", 30)
         assert "expected a point left_base, found " in err
         assert "--points." in err
 
@@ -272,7 +264,7 @@ def test_real_axes_of_sleap_agree_with_its_own_file() -> None:
 
 
 def test_what_is_truncated_or_no_such_file_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     points = animal(dwelling(7, 60))
     whole = {
@@ -286,9 +278,9 @@ def test_what_is_truncated_or_no_such_file_is_one_line(
         data = path.read_bytes()
         for share in (0.0, 0.3, 0.97):
             path.write_bytes(data[: int(share * len(data))])
-            assert name in message(capsys, "--files", path, "--rate", 100, *FLAGS)
-    assert "expected a readable file" in message(capsys, "--files", tmp_path / "no.csv")
-    assert "expected a file in .csv, .h5" in message(capsys, "--files", tmp_path / "a.mp4")
+            assert name in refused("tracks", "--files", path, "--rate", 100, *FLAGS)
+    assert "expected a readable file" in refused("tracks", "--files", tmp_path / "no.csv")
+    assert "expected a file in .csv, .h5" in refused("tracks", "--files", tmp_path / "a.mp4")
 
 
 @pytest.mark.parametrize(
@@ -307,13 +299,13 @@ def test_what_is_truncated_or_no_such_file_is_one_line(
     ],
 )
 def test_bad_csv_is_one_line(
-    text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, expected: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     header = "frame," + ",".join(f"{n}_{a}" for n in NAMES for a in "xy")
     cells = ["1.5"] * 20
     text = text.format(header=header, row=",".join(cells), word=",".join(["here", *cells[1:]]))
     (tmp_path / "a.csv").write_text(text)
-    assert expected in message(capsys, "--files", tmp_path / "a.csv", *FLAGS)
+    assert expected in refused("tracks", "--files", tmp_path / "a.csv", *FLAGS)
 
 
 @pytest.mark.parametrize(
@@ -324,39 +316,37 @@ def test_bad_csv_is_one_line(
     ],
 )
 def test_a_wrong_number_of_a_frame_does_not_fill_the_memory(
-    last: int, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    last: int, expected: str, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     header = "frame," + ",".join(f"{n}_{a}" for n in NAMES for a in "xy")
     rows = [f"{frame}," + ",".join(["1.5"] * 20) for frame in (0, 1, last)]
     (tmp_path / "a.csv").write_text("\n".join([header, *rows, ""]))
     words = ("--files", tmp_path / "a.csv", "--rate", 100, *FLAGS)
-    assert expected in message(capsys, *words)
+    assert expected in refused("tracks", *words)
 
 
-def test_mirrored_coordinates_are_noticed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mirrored_coordinates_are_noticed(tmp_path: Path, refused: Callable[..., str]) -> None:
     path = write(tmp_path / "a.csv", animal(dwelling(8, 100)))
-    err = message(capsys, "--files", path, *FLAGS[:-1])
+    err = refused("tracks", "--files", path, *FLAGS[:-1])
     assert "expected left antennae on the left of the body axis, found 100 % on the right" in err
     assert "--no-y-down" in err
 
 
 def test_names_of_columns_that_would_run_code_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Callable[..., str]
 ) -> None:
     mark = tmp_path / "mark"
     harmful = f"cbuiltins\nopen\n(V{mark}\nVw\ntR.".encode()
     path = pandas_table(tmp_path / "a.h5", animal(dwelling(9, 20)), harmful)
-    err = message(capsys, "--files", path, "--rate", 100, *FLAGS)
+    err = refused("tracks", "--files", path, "--rate", 100, *FLAGS)
     assert "save it as CSV" in err
     assert not mark.exists()
 
 
 def test_without_h5py_the_extra_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = sleap(tmp_path / "a.h5", animal(dwelling(10, 20)))
     monkeypatch.setitem(sys.modules, "h5py", None)
-    err = message(capsys, "--files", path, "--rate", 100, *FLAGS)
+    err = refused("tracks", "--files", path, "--rate", 100, *FLAGS)
     assert "./antennate/packages/* './antennate/packages/antennate-lab[tracks]'" in err
