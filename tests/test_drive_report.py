@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -334,19 +336,23 @@ def test_a_drive_without_a_log_says_so(
     assert result["unlogged"] == result["pace"]["ticks"] > 0
 
 
+def late(every: int, pause: float = 0.012, loss: float = 0.0, duration: float = 1.0) -> Any:
+    """The result of a drive: time [s] is lost in some ticks, and a share of answers on the bus."""
+    made, ticks = rig(TwinConfig()), itertools.count(1)
+    made.robot.bus.loss = loss
+
+    def busy(made: Rig, t: float) -> None:
+        if next(ticks) % every == 0:
+            made.clock.sleep(pause)
+
+    made, report = driven(busy, made, CONFIG.model_copy(update={"duration": duration}))
+    return report.result(made.session)
+
+
 @pytest.mark.parametrize(("pause", "named"), [(0.0, False), (0.012, True)])
 def test_a_computer_that_is_late_is_named(pause: float, named: bool) -> None:
     """A loop that loses 12 ms in every tenth tick misses one tick or two of eleven or twelve."""
-    made, ticks = rig(TwinConfig()), 0
-
-    def busy(made: Rig, t: float) -> None:
-        nonlocal ticks
-        ticks += 1
-        if ticks % 10 == 0:
-            made.clock.sleep(pause)
-
-    made, report = driven(busy, made)
-    result = report.result(made.session)
+    result = late(10, pause)
     said = late_sentence(result)
     assert bool(said) == named
     if named:
@@ -363,17 +369,7 @@ def test_a_computer_that_is_late_is_named(pause: float, named: bool) -> None:
 def test_where_one_tick_in_a_hundred_is_missed_missed_answers_tell_a_late_computer(
     loss: float, named: bool
 ) -> None:
-    made, ticks = rig(TwinConfig()), 0
-    made.robot.bus.loss = loss
-
-    def busy(made: Rig, t: float) -> None:
-        nonlocal ticks
-        ticks += 1
-        if ticks % 100 == 0:
-            made.clock.sleep(0.012)
-
-    made, report = driven(busy, made, CONFIG.model_copy(update={"duration": 4.0}))
-    result = report.result(made.session)
+    result = late(100, loss=loss, duration=4.0)
     assert 0.005 < result["walking"]["missed_share"] < 0.02
     said = late_sentence(result)
     assert bool(said) == named

@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal, get_args, get_type_hints
@@ -454,23 +455,32 @@ def test_the_word_fitted_is_a_file_only_where_there_is_no_choice(
     assert "the word fitted" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("quick", [True, False])
-def test_parts_count_by_their_work(quick: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tunnels take 86 of 141 s of one core with `quick`: half of them done is no half of nine."""
-    steps: list[tuple[int, int]] = []
-    ends: dict[str, int] = {}
+def stub_others(patch: pytest.MonkeyPatch, half_done: Callable[[str], None]) -> None:
+    """Every other experiment takes one step of two, which is told, and finds nothing."""
     load = experiments.load
 
     def stub(name: str) -> Any:
         def run(config: Any, workers: Any, step: Any, row: Any) -> Any:
             step(1, 2)
-            ends[name] = steps[-1][0]
+            half_done(name)
             return SimpleNamespace(result=dict)
 
-        return SimpleNamespace(config=load(name).config, run=run)
+        return (
+            EXPERIMENT
+            if name == "reproduce"
+            else SimpleNamespace(config=load(name).config, run=run)
+        )
 
-    monkeypatch.setattr(experiments, "load", stub)
-    monkeypatch.setattr(reproduce, "CLAIMS", ())
+    patch.setattr(experiments, "load", stub)
+    patch.setattr(reproduce, "CLAIMS", ())
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_parts_count_by_their_work(quick: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tunnels take 86 of 141 s of one core with `quick`: half of them done is no half of nine."""
+    steps: list[tuple[int, int]] = []
+    ends: dict[str, int] = {}
+    stub_others(monkeypatch, lambda name: ends.update({name: steps[-1][0]}))
     EXPERIMENT.run(ReproduceConfig(quick=quick), 1, lambda *s: steps.append(s), lambda row: None)
     done = [at for at, _ in steps]
     assert done == sorted(done)
@@ -482,20 +492,7 @@ def test_parts_count_by_their_work(quick: bool, monkeypatch: pytest.MonkeyPatch)
 def test_the_bar_says_that_it_counts_per_cent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    load = experiments.load
-
-    def stub(name: str) -> Any:
-        def run(*_: Any) -> Any:
-            return SimpleNamespace(result=dict)
-
-        return (
-            EXPERIMENT
-            if name == "reproduce"
-            else SimpleNamespace(config=load(name).config, run=run)
-        )
-
-    monkeypatch.setattr(experiments, "load", stub)
-    monkeypatch.setattr(reproduce, "CLAIMS", ())
+    stub_others(monkeypatch, lambda name: None)
     assert main(["reproduce", "--quick", "--no-figures", "--out", str(tmp_path / "out")]) == 0
     assert "% of reproduce: 100 of 100 after" in capsys.readouterr().err
 

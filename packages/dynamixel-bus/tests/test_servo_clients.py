@@ -82,11 +82,6 @@ def eventually(call: Callable[[], Any], good: Callable[[Any], bool]) -> Any:
     raise AssertionError(found)
 
 
-def done(order: Callable[[], Any]) -> None:
-    """Give an order until its answer comes in time; none of those here matters twice."""
-    eventually(order, lambda _: True)
-
-
 # the manufacturer's SDK
 
 
@@ -156,53 +151,6 @@ def test_the_sdk_resets_a_servo_to_what_it_was_delivered_with(
     servo, code = left
     assert port.setBaudRate({1: FACTORY_BAUD, 3: 1_000_000}[code])
     eventually(lambda: handler.read1ByteTxRx(port, servo, 9), lambda r: r == (250, 0, 0))
-
-
-def at(servo: Servo) -> tuple[float, int]:
-    """Where its shaft is [ticks], and its own time [ms], modulo 32768."""
-    return servo.position, servo.get("realtime_tick")
-
-
-def test_the_easy_layer_turns_a_servo_at_a_speed() -> None:
-    easy = pytest.importorskip("dynamixel_easy_sdk")
-    with served(XL330_M288) as server:
-        connector = easy.Connector(server.path, FACTORY_BAUD)
-        motor = eventually(lambda: connector.createMotor(1), lambda made: made.id == 1)
-        done(lambda: motor.setOperatingMode(easy.OperatingMode.VELOCITY))
-        done(motor.enableTorque)
-        done(lambda: motor.setGoalVelocity(100))
-        eventually(motor.getPresentVelocity, lambda speed: abs(speed - 100) <= 1)
-        with server.lock:
-            before, begin = at(server.bus.servos[0])
-        time.sleep(1.0)
-        with server.lock:
-            after, end = at(server.bus.servos[0])
-        seconds = 1e-3 * ((end - begin) % 32_768)
-        assert (after - before) / seconds / 4096 * 60 == pytest.approx(100 * RPM, rel=0.01)
-        done(motor.disableTorque)
-        connector.closePort()
-
-
-# rustypot
-
-
-def test_rustypot_resets_a_servo(recwarn: pytest.WarningsRecorder) -> None:
-    module = pytest.importorskip("rustypot")
-    with served(XL430_W250) as server:
-        with server.lock:
-            server.bus.servos[0].set("id", 4)
-            server.bus.servos[0].set("position_p_gain", 1)
-            server.bus.servos[0].set("return_delay_time", 9)
-        client = module.Xl430PyController(server.path, FACTORY_BAUD, 0.1)
-        eventually(lambda: client.ping(4), bool)
-        client.factory_reset(4, True, False)
-        time.sleep(0.3)
-        eventually(lambda: client.ping(4), bool)
-        with server.lock:
-            servo = server.bus.servos[0]
-            found = [servo.get(n) for n in ("id", "return_delay_time", "position_p_gain")]
-        assert found == [4, 250, 640]
-        client.close()
 
 
 # LeRobot
