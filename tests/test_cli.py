@@ -504,6 +504,20 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
     assert json.loads((tmp_path / "run" / "result.json").read_text())["interrupted"] is True
 
 
+def test_gait_runs_and_writes_its_result(capsys, tmp_path):
+    words = ["gait", "--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2"]
+    words += ["--gait.frequency", "1"]  # the shortest cycle
+    assert main([*words, "--workers", "1", "--out", "run"]) == 0
+    assert "lead of 200 deg" in capsys.readouterr().out
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert (result["schema"], result["command"]) == (1, "gait")
+    assert list(result["maneuvers"]) == ["forward", "turn_l", "turn_r", "reverse"]
+    assert sorted(p.name for p in (tmp_path / "run" / "figures").iterdir()) == [
+        "gait.png",
+        "gait.svg",
+    ]
+
+
 def test_table_cells_cannot_become_formulas_and_numbers_stay_numbers():
     rows = [{"name": text, "x": -1.5} for text in ("=1+1", "+1", "-1", "@a", "a\x1b[2Jb\r\n", "ok")]
     lines = to_csv(rows).splitlines()

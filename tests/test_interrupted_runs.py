@@ -253,6 +253,19 @@ def test_help_lists_no_option_that_is_always_refused(
 
 
 @pytest.mark.ci
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_walls_of_which_none_is_valid_end_with_2(
+    workers: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One worker gives a trial up too, in a process of its own."""
+    words = ["bench", "wall", "--trials", "2", "--profiles", "stiff", "--trial-timeout", "0.01"]
+    more = ["--workers", workers, "--no-figures", "--out", str(tmp_path / "run")]
+    assert main([*words, *more]) == 2
+    assert "no result within 0.01 s" in (tmp_path / "run" / "trials.csv").read_text()
+    assert "No trial is valid" in capsys.readouterr().out
+
+
+@pytest.mark.ci
 def test_a_shard_of_a_finished_study_leaves_it_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -45,7 +45,16 @@ ROOT = HERE.parent
 VARY = {"x": [0.5, 1.5]}
 QUICK = ["--gait.frequency", "1"]
 """The shortest cycle."""
-CLIMB = ["--heights", "0.05", "--grounds", "flat", "--conditions", "level", "edges"]
+CLIMB = [
+    "--heights",
+    "0.05",
+    "--grounds",
+    "flat",
+    "step_tunnel:0.08",
+    "--conditions",
+    "level",
+    "edges",
+]
 CLIMB += ["--divisors", "256", "--time-limit", "0.1", "--sensing", "0", "--trials", "1"]
 NEAR = ["--wall.travel", "0.03", "--wall.start", "0.002", "--wall.speed", "0.05"]
 
