@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import pty
-import subprocess
-import sys
 import threading
 import time
 import tty
@@ -128,27 +126,6 @@ def test_E3_a_board_that_starts_anew_when_opened_is_waited_for() -> None:
     assert now[0] <= 3.0
     assert board.clock.resets == 0
     assert not port.wrote
-
-
-@pytest.mark.ci
-def test_L15_the_second_program_on_a_port_is_refused_and_told_the_pid_of_the_first(
-    plug: Callable[[], Terminal], tmp_path: Path
-) -> None:
-    plug()
-    path = str(tmp_path / "port")
-    program = (
-        "import sys\nfrom antennate.hardware.ports.serial_line import SerialPort\n"
-        f"line = SerialPort({path!r}, 115200)\nprint('open', flush=True)\nsys.stdin.read()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as first:
-        assert first.stdout is not None
-        assert first.stdout.readline() == "open\n"
-        with pytest.raises(PortError, match=rf"pid {first.pid} \("):
-            SerialPort(path, 115_200)
-        first.communicate("")
-    SerialPort(path, 115_200).close()
 
 
 # identity
