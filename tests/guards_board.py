@@ -12,7 +12,6 @@ import numpy as np
 import test_bad_readings
 import test_board
 import test_conditioning
-import test_contact
 import test_diagnosis
 import test_esp32_clock as test_clock
 import test_esp32_decoder as test_decoder
@@ -20,7 +19,7 @@ import test_esp32_frame as test_frame
 import test_imu_diagnosis as test_imu
 import test_maneuver
 import test_noise
-import test_touch_check
+import test_signal_quality
 from guard_tools import Guard, around, before, constant, put, together
 from hardware_rig import BAND
 
@@ -264,7 +263,7 @@ FILMS = [
     Guard(
         "swapped antennae",
         around(touch_check.TouchCheck, "step", exchanged),
-        test_touch_check.test_S8_swapped_channels_are_refused,
+        test_signal_quality.test_S8_swapped_channels_are_refused,
     ),
     Guard(
         "a missing sample taints its mean",
@@ -284,7 +283,7 @@ FILMS = [
     Guard(
         "NaN is UNKNOWN",
         around(conditioning, "contact_of", lambda old, p, b, was: old(p, np.nan_to_num(b), was)),
-        test_contact.test_nan_is_unknown_and_is_not_remembered_as_contact,
+        test_conditioning.test_nan_is_unknown_and_is_not_remembered_as_contact,
     ),
     Guard(
         "UNKNOWN ends a held maneuver",

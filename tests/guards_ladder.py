@@ -9,9 +9,9 @@ from functools import partial
 from typing import Any
 
 import hardware_rig
+import test_signal_quality
 import test_supervisor
 import test_supervisor_outages as test_outages
-import test_touch_check
 from guard_tools import Guard, Off, after, around, blind, given, put
 from hardware_rig import PERIOD
 
@@ -127,7 +127,7 @@ SUPERVISOR = [
     Guard(
         "touch check and other objections",
         blind(objections=()),
-        test_touch_check.test_S8_an_objection_keeps_the_robot_from_being_armed,
+        test_signal_quality.test_S8_an_objection_keeps_the_robot_from_being_armed,
     ),
     Guard(
         "arm gate",

@@ -1,4 +1,4 @@
-"""Counts to bending level: closed forms of the sigmoid and of the running mean."""
+"""Counts to bending level, and level to contact: sigmoid, running mean, thresholds."""
 
 from __future__ import annotations
 
@@ -7,8 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from antennate.control.conditioning import RunningMean, bending_level, level_and_fraction
-from antennate.params.control import ConditioningParams
+from antennate.control.conditioning import (
+    ContactState,
+    RunningMean,
+    bending_level,
+    contact_of,
+    level_and_fraction,
+)
+from antennate.params.control import ConditioningParams, RuleParams
+from antennate.types import Contact
 
 PLAIN = ConditioningParams(counts_low=0.0, counts_high=1.0, polarity=1)
 PERIOD = 0.01
@@ -91,3 +98,34 @@ def test_a_row_that_is_reset_forgets_and_the_others_do_not() -> None:
     mean.step(np.array([[math.nan] * 2, [20.0] * 2]))
     mean.reset(np.array([0]))
     assert mean.step(np.full((2, 2), 30.0)).tolist() == [[30.0, 30.0], [20.0, 20.0]]
+
+
+PARAMS = RuleParams(threshold=0.5, hysteresis=0.1)
+
+
+def states(*levels: float) -> list[Contact]:
+    """Contact of the left side for levels that follow one another."""
+    state = ContactState(PARAMS, 1)
+    return [Contact(int(state.step(np.array([[b, 0.0]]))[0, 0])) for b in levels]
+
+
+def test_contact_begins_at_the_threshold_and_ends_below_the_hysteresis() -> None:
+    free, touch = Contact.FREE, Contact.CONTACT
+    assert states(0.45, 0.5, 0.45, 0.401, 0.399, 0.45) == [free, touch, touch, touch, free, free]
+
+
+def test_nan_is_unknown_and_is_not_remembered_as_contact() -> None:
+    assert states(0.9, math.nan, 0.45) == [Contact.CONTACT, Contact.UNKNOWN, Contact.FREE]
+
+
+def test_a_side_does_not_know_of_the_other() -> None:
+    said = contact_of(PARAMS, np.array([[0.9, math.nan]]), np.zeros((1, 2), dtype=np.int64))
+    assert said.tolist() == [[Contact.CONTACT, Contact.UNKNOWN]]
+
+
+def test_reset_forgets_contact_of_its_rows_only() -> None:
+    state = ContactState(PARAMS, 2)
+    state.step(np.ones((2, 2)))
+    state.reset(np.array([True, False]))
+    after = state.step(np.full((2, 2), 0.45))
+    assert after.tolist() == [[Contact.FREE] * 2, [Contact.CONTACT] * 2]

@@ -1,13 +1,18 @@
-"""Tests know the package by its public names alone, so that a rename inside it breaks none."""
+"""Tests know public names alone, so that a rename breaks none; and no imports have a circle."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+import antennate
+import dynamixel_bus
+import geometric_locomotion
 
 TESTS = Path(__file__).parent
 PACKAGES = [*TESTS.parent.glob("packages/*/src/*")]
@@ -104,3 +109,34 @@ def test_tests_use_no_private_name_of_the_package() -> None:
         for path in [*TESTS.glob("*.py"), *TESTS.parent.glob("packages/*/tests/*.py")]
         for node in used(ast.parse(path.read_text(encoding="utf-8")), package)
     ] == []
+
+
+ROOTS = [
+    Path(str(room.__file__)).parent for room in (antennate, dynamixel_bus, geometric_locomotion)
+]
+SOURCES = {
+    ".".join((root.name, *path.relative_to(root).with_suffix("").parts)).removesuffix(
+        ".__init__"
+    ): path
+    for root in ROOTS
+    for path in root.rglob("*.py")
+}
+
+
+def imported(path: Path) -> set[str]:
+    """Modules of our packages that a file imports anywhere."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports are not followed here"
+            names = (f"{node.module}.{alias.name}" for alias in node.names)
+            found |= {name if name in SOURCES else str(node.module) for name in names}
+    return found & SOURCES.keys()
+
+
+def test_imports_have_no_circle() -> None:
+    graph = {name: imported(path) - {name} for name, path in SOURCES.items()}
+    assert any(graph.values())
+    tuple(TopologicalSorter(graph).static_order())  # a circle is an error that names it

@@ -1,12 +1,17 @@
-"""Which port is which, by unplugging and plugging in."""
+"""What a person answers, and which port is which by unplugging and plugging in."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from setup_rig import Script
 
+from antennate.cli import keys
+from antennate.cli.keys import TerminalPerson
+from antennate.errors import BadInputError
 from antennate.hardware.setup.person import Quit, find_port, ports_like
 
 
@@ -70,3 +75,31 @@ def test_it_may_be_left_out_or_ended(tmp_path: Path) -> None:
     assert ports.find(Script([("unplug", None, "s")])) == ""
     with pytest.raises(Quit):
         ports.find(Script([("unplug", None, "q")]))
+
+
+@pytest.fixture
+def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The end of a pipe to write to; standard input is the other one."""
+    reader, writer = os.pipe()
+    with os.fdopen(reader) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        yield writer
+    os.close(writer)
+
+
+def test_lines_are_answers_one_by_one(pipe: int) -> None:
+    os.write(pipe, b"\n S \nq\nrest")
+    asked = TerminalPerson()
+    assert [asked.ask("?"), asked.ask("?"), asked.answer(), asked.answer()] == ["", "s", "q", None]
+
+
+def test_a_pipe_that_stays_silent_is_told(pipe: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keys, "PATIENCE", 0.05)
+    with pytest.raises(BadInputError, match=r"an answer to 'go on\?', found none in 0.05 s"):
+        TerminalPerson().ask("go on?")
+
+
+def test_no_standard_input_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", None)
+    with pytest.raises(BadInputError, match="found no standard input"):
+        TerminalPerson().ask("go on?")

@@ -1,9 +1,12 @@
-"""Hands on the twin's antennae, and one twin for many drives."""
+"""Hands on the twin's antennae, one twin for many drives, and one that is asked to end."""
 
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -139,3 +142,38 @@ def test_the_shipped_twin_takes_typed_touches_and_answers_others(tmp_path_factor
     assert said[2].startswith("not done: --fault: expected a servo of 1, 2")
     left, right = (np.median([float(row[i]) for row in rows]) for i in (1, 2))
     assert left < right - 50
+
+
+PROGRAM = "import sys; from antennate.cli import main; sys.exit(main())"
+INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("pair", [(INT, TERM), (TERM, TERM), (HUP, HUP)])
+def test_a_twin_ends_in_order_however_often_it_is_asked_to(pair: tuple[int, int]) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "twin"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as twin:
+        assert twin.stdout is not None
+        assert set(json.loads(twin.stdout.readline())) == {"esp32", "bus"}
+        os.kill(twin.pid, signal.SIGSTOP)  # so that both wait for it
+        for number in pair:
+            os.kill(twin.pid, number)
+        os.kill(twin.pid, signal.SIGCONT)
+        while twin.poll() is None:
+            for number in pair:
+                twin.send_signal(number)
+            try:
+                twin.wait(0.001)
+            except subprocess.TimeoutExpired:
+                continue
+        said = twin.communicate()[1]
+    assert twin.returncode == 130
+    *_, last, interrupted = said.splitlines()
+    assert last.startswith("The twin has ended: ")
+    assert "late" in last
+    assert interrupted == "antennate twin: interrupted"
+    assert "Traceback" not in said

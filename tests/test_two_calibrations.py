@@ -1,4 +1,4 @@
-"""One calibration for each antenna: each is read by its own curve, everywhere."""
+"""A calibration is taken as it is, by all that feel; and one for each antenna."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from test_bad_calibrations import GOOD
 
+from antennate.cli import main
 from antennate.control.registry import make_controller
 from antennate.errors import ConfigError
+from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.hardware.config import DoctorConfig, DriveConfig, RobotFile
 from antennate.hardware.safety.channel import Finding
 from antennate.hardware.safety.signal_quality import SignalQuality
@@ -157,3 +159,27 @@ def test_what_contradicts_is_refused(file: Path, change: tuple[str, str], said: 
     file.write_text(file.read_text().replace(*change, 1))
     with pytest.raises(ConfigError if "sensor" not in change[1] else Exception, match=said):
         read_file(file, RobotFile).part(DriveConfig).calibrated()
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of a small calibration."""
+    folder = tmp_path_factory.mktemp("calibrate") / "run"
+    words = ["--rig.pushes", "2", "--rig.speeds", "0.1", "0.2", "--no-figures"]
+    assert main(["calibrate", *words, "--workers", "1", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_the_tunnel_and_a_robot_take_the_same_curve(run: Path) -> None:
+    file = run / "conditioning.toml"
+    tunnel, robot = read_file(file, TunnelConfig), read_file(file, RobotFile)
+    assert tunnel.control.conditioning == robot.control.conditioning
+    assert tunnel.control.conditioning != TunnelConfig().control.conditioning
+
+
+def test_the_command_walks_with_it(run: Path, tmp_path: Path) -> None:
+    words = ["--trials", "1", "--controllers", "closed", "--time-limit", "0.2", "--no-figures"]
+    config = ["--config", str(run / "conditioning.toml")]
+    assert main(["tunnel", *config, *words, "--out", str(tmp_path / "run")]) == 0
+    kept = read_file(tmp_path / "run" / "config.toml", TunnelConfig)
+    assert kept.control == read_file(run / "conditioning.toml", TunnelConfig).control
