@@ -15,10 +15,10 @@ import test_bad_controllers
 import test_deadlines
 import test_dynamixel_bus as test_bus
 import test_jog
-import test_loop
 import test_release
 import test_session
 import test_signals
+import test_timing
 import test_twin_robot
 import test_unmeasured
 from guard_tools import Guard, around, before, constant, put
@@ -232,6 +232,6 @@ SESSION = [
     Guard(
         "no burst after an overrun",
         put(loop, "math", SimpleNamespace(ceil=constant(0))),
-        test_loop.test_T1_an_overrun_leaves_out_the_ticks_it_covers_and_delays_none_after,
+        test_timing.test_T1_an_overrun_leaves_out_the_ticks_it_covers_and_delays_none_after,
     ),
 ]

@@ -1,4 +1,4 @@
-"""Options that say nothing without another one are refused alone, whatever their value."""
+"""Options that need another one, and options that take several values."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import antennate
-from antennate.cli import commands, described
+from antennate.cli import commands, described, main
+from antennate.cli.arguments import read_words
 from antennate.cli.options import Option
 from antennate.errors import ConfigError
 
@@ -42,12 +43,12 @@ def dependents() -> Iterator[tuple[str, Option]]:
         yield from ((name, each) for each in [*found.others, *found.parameters] if each.needs)
 
 
-EVERY = list(dependents())
+DEPENDENT = list(dependents())
 
 
 def test_the_options_that_need_another_one_are_these() -> None:
-    assert {each.flag for _, each in EVERY} == NEEDS.keys()
-    for name, each in EVERY:
+    assert {each.flag for _, each in DEPENDENT} == NEEDS.keys()
+    for name, each in DEPENDENT:
         assert list(each.needs) == ELSEWHERE.get((name, each.flag), NEEDS[each.flag])
 
 
@@ -62,7 +63,7 @@ def test_what_is_needed_is_there_and_a_longer_name_needs_the_shorter(name: str) 
 
 
 @pytest.mark.parametrize(
-    ("name", "option"), EVERY, ids=[f"{name} {each.flag}" for name, each in EVERY]
+    ("name", "option"), DEPENDENT, ids=[f"{name} {each.flag}" for name, each in DEPENDENT]
 )
 def test_each_is_refused_alone(
     name: str,
@@ -88,3 +89,51 @@ def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:
         antennate.run("antenna", overwrite=True)
     with pytest.raises(ConfigError, match="resume: expected out beside it, found none"):
         antennate.run("antenna", resume=True)
+
+
+COMMAS = {"--files", "--recording", "--beside", "--slurm", "--compare", "--shards"}
+"""Lists of files, and what SLURM is asked for: a comma may be part of a value."""
+
+
+def lists() -> Iterator[tuple[str, Option]]:
+    for name in sorted(commands()):
+        found = described(name)
+        yield from ((name, each) for each in [*found.others, *found.parameters] if each.many)
+
+
+LISTS = list(lists())
+
+
+def test_every_list_takes_words_and_adds_those_of_a_flag_given_again() -> None:
+    assert len(LISTS) > 100
+    for name, each in LISTS:
+        two = (each.choices * 2)[:2] or ("1", "2")
+        first, last = map(str, two)
+        values = read_words([each.flag, first, last], [each])
+        assert values[each.path] == (each.value(first), each.value(last)), (name, each.flag)
+        assert read_words([each.flag, first, each.flag, last], [each]) == values
+        assert read_words([f"{each.flag}={first}", last], [each]) == values
+
+
+def test_no_list_is_one_word_with_commas() -> None:
+    for name, each in LISTS:
+        words = [each.flag, "a,b"]
+        if each.flag in COMMAS:
+            assert list(map(str, read_words(words, [each])[each.path])) == ["a,b"], name
+        else:
+            with pytest.raises(ConfigError, match=f"^{each.flag}: expected .* separated by spaces"):
+                read_words(words, [each])
+
+
+def test_a_name_of_code_may_have_a_comma_in_its_path(
+    tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    assert "a,b.py" in refused("tunnel", "--controllers", f"{tmp_path}/a,b.py:C", "--trials=1")
+
+
+@pytest.mark.parametrize("how", ["--help", "--help-all"])
+def test_the_help_says_how_a_list_is_given(how: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["twin", how]) == 0
+    said = capsys.readouterr().out
+    assert "A list (...) is words separated by spaces." in said
+    assert "--fault TEXT..." in said
