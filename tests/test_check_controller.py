@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,45 @@ class Around:
         return self.inner.step(frame)
 
 
+def saying(name: str, part: str, change: Callable[[Any], Any]) -> Any:
+    """`Plain`, which tells its level, maneuver or contact otherwise."""
+
+    def step(self: Around, frame: AntennaFrame) -> JointCommand:
+        command = Around.step(self, frame)
+        setattr(self, part, change(getattr(self.inner, part)))
+        return command
+
+    return type(name, (Around,), {"step": step})
+
+
+def adding(name: str, joints: str, what: Callable[[Around, AntennaFrame], Any]) -> Any:
+    """`Plain`, to whose angles something is added."""
+
+    def step(self: Around, frame: AntennaFrame) -> JointCommand:
+        command = Around.step(self, frame)
+        getattr(command, joints)[:] += what(self, frame)
+        return command
+
+    return type(name, (Around,), {"step": step})
+
+
+def writing(name: str, write: Callable[[Around, AntennaFrame], Any]) -> Any:
+    """`Plain`, which changes the frame that it was given."""
+
+    def step(self: Around, frame: AntennaFrame) -> JointCommand:
+        command = Around.step(self, frame)
+        write(self, frame)
+        return command
+
+    return type(name, (Around,), {"step": step})
+
+
+InfiniteLevel = saying(
+    "InfiniteLevel", "level", lambda level: np.where(np.arange(2) == 0, -np.inf, level)
+)
+UnknownLevel = saying("UnknownLevel", "level", lambda level: np.full_like(level, math.nan))
+
+
 class ForOneOnly(Around):
     def __init__(self, control: Any, robot: Any, batch: int) -> None:
         super().__init__(control, robot, 1)
@@ -101,13 +141,6 @@ class FewJoints(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         command = super().step(frame)
         return JointCommand(command.yaw[:, :2], command.leg, command.antenna)
-
-
-class NoArray(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.level = self.inner.level.tolist()
-        return command
 
 
 class NoLevel(Plain):
@@ -121,86 +154,9 @@ class NoLevel(Plain):
         return command
 
 
-class ObjectLevel(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.level = self.inner.level.astype(object)
-        return command
-
-
-class NoManeuver(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.maneuver = self.inner.maneuver + 7
-        return command
-
-
-class FloatManeuver(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.maneuver = self.inner.maneuver.astype(float)
-        return command
-
-
-class NoContact(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.contact = self.inner.contact + 5
-        return command
-
-
-class LevelInPercent(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.level = 100.0 * self.inner.level
-        return command
-
-
-class InfiniteLevel(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.level = np.where(np.arange(2) == 0, -np.inf, self.inner.level)
-        return command
-
-
-class NotFinite(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.leg[0, 0, 0] = math.nan
-        return command
-
-
 class Raises(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         raise ZeroDivisionError("of my own")
-
-
-class ByChance(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.antenna[:] += self.noise.normal(0.0, 0.01)
-        return command
-
-
-class RowsTogether(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.yaw[:] += np.nanmean(frame.counts) * 1e-6
-        return command
-
-
-class FirstRowDiffers(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.yaw[0] += 0.01
-        return command
-
-
-class BatchCounts(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.yaw[:] += 0.01 * self.batch
-        return command
 
 
 class ResetsAll(Around):
@@ -218,48 +174,6 @@ class WalksBlind(Around):
     def step(self, frame: AntennaFrame) -> JointCommand:
         counts = np.where(np.isfinite(frame.counts), frame.counts, 1872.0)
         return super().step(AntennaFrame(t=frame.t, counts=counts))
-
-
-class CreepsBlind(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        command.leg[:] += 1e-4 * frame.t[:, None, None]
-        return command
-
-
-class KnowsBlind(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.contact = np.where(self.inner.contact == 2, 1, self.inner.contact)
-        return command
-
-
-class Scribbles(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        frame.counts[:] = 0.0
-        return command
-
-
-class ScribblesLate(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        frame.t[frame.t > 90.0] = 0.0
-        return command
-
-
-class ScribblesAtLast(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        frame.positions[:] *= float(self.ticks < 2000)
-        return command
-
-
-class Rebinds(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        object.__setattr__(frame, "t", frame.t + 1.0)
-        return command
 
 
 class CountsFromItsStart(Around):
@@ -293,29 +207,59 @@ class TrustsItsCommand(Around):
 BROKEN = {
     ForOneOnly: "IndexError.*with 5 rows",
     FewJoints: r"expected yaw of shape \(5, 5\), found \(5, 2\)",
-    NoArray: "expected an array as level, found list",
+    saying(
+        "NoArray", "level", lambda level: level.tolist()
+    ): "expected an array as level, found list",
     NoLevel: "expected an array as level, found none",
-    ObjectLevel: "expected real numbers as level, found an array of object",
-    NoManeuver: "expected a maneuver of 0 to 4, found 7",
-    FloatManeuver: "expected whole numbers as maneuver, found an array of float64",
-    NoContact: "expected contacts of 0 to 2",
-    LevelInPercent: "expected levels of 0 to 1",
+    saying(
+        "ObjectLevel", "level", lambda level: level.astype(object)
+    ): "expected real numbers as level, found an array of object",
+    saying(
+        "NoManeuver", "maneuver", lambda maneuver: maneuver + 7
+    ): "expected a maneuver of 0 to 4, found 7",
+    saying(
+        "FloatManeuver", "maneuver", lambda maneuver: maneuver.astype(float)
+    ): "expected whole numbers as maneuver, found an array of float64",
+    saying("NoContact", "contact", lambda contact: contact + 5): "expected contacts of 0 to 2",
+    saying("LevelInPercent", "level", lambda level: 100.0 * level): "expected levels of 0 to 1",
     InfiniteLevel: "expected levels of 0 to 1, or NaN",
-    NotFinite: "expected finite angles in leg",
+    adding(
+        "NotFinite", "leg", lambda self, frame: [math.nan, 0.0]
+    ): "expected finite angles in leg",
     Raises: "step raised ZeroDivisionError: of my own",
-    ByChance: "expected the same answers to the same readings, found another antenna",
-    RowsTogether: "alone to answer as in a batch, found another yaw",
-    FirstRowDiffers: "from rows in another order, found another yaw",
-    BatchCounts: "alone to answer as in a batch, found another yaw",
+    adding(
+        "ByChance", "antenna", lambda self, frame: self.noise.normal(0.0, 0.01)
+    ): "expected the same answers to the same readings, found another antenna",
+    adding(
+        "RowsTogether", "yaw", lambda self, frame: np.nanmean(frame.counts) * 1e-6
+    ): "alone to answer as in a batch, found another yaw",
+    adding(
+        "FirstRow", "yaw", lambda self, frame: 0.01 * (np.arange(len(frame.t)) < 1)[:, None]
+    ): "from rows in another order, found another yaw",
+    adding(
+        "BatchCounts", "yaw", lambda self, frame: 0.01 * self.batch
+    ): "alone to answer as in a batch, found another yaw",
     ResetsAll: "the other rows to go on when one is reset",
     ResetsNothing: "a row that is reset to answer as a new one",
     WalksBlind: "expected HOLD while an antenna reads nan",
-    CreepsBlind: "expected joint targets that stand still in HOLD, found leg moves",
-    KnowsBlind: "expected UNKNOWN for a reading of nan",
-    Scribbles: "expected a frame that is left as it is, found another counts .*; change a copy",
-    ScribblesLate: "a frame that is left as it is, found another t after a step at 120.00 s",
-    ScribblesAtLast: "that is left as it is, found another positions after a step at 360[0-9]",
-    Rebinds: "expected a frame that is left as it is, found another t after",
+    adding(
+        "CreepsBlind", "leg", lambda self, frame: 1e-4 * frame.t[:, None, None]
+    ): "expected joint targets that stand still in HOLD, found leg moves",
+    saying(
+        "KnowsBlind", "contact", lambda contact: np.where(contact == 2, 1, contact)
+    ): "expected UNKNOWN for a reading of nan",
+    writing(
+        "Scribbles", lambda self, frame: frame.counts.fill(0.0)
+    ): "expected a frame that is left as it is, found another counts .*; change a copy",
+    writing(
+        "ScribblesLate", lambda self, frame: np.copyto(frame.t, 0.0, where=frame.t > 90.0)
+    ): "a frame that is left as it is, found another t after a step at 120.00 s",
+    writing(
+        "AtLast", lambda self, frame: frame.positions.__imul__(float(self.ticks < 2000))
+    ): "that is left as it is, found another positions after a step at 360[0-9]",
+    writing(
+        "Rebinds", lambda self, frame: object.__setattr__(frame, "t", frame.t + 1.0)
+    ): "expected a frame that is left as it is, found another t after",
     CountsFromItsStart: "expected a frame that is left as it is, found another t after",
     KeepsBuffer: "expected a command that stays as it was returned",
     TrustsItsCommand: "when a command that was returned is changed",
@@ -332,13 +276,6 @@ def test_a_broken_controller_is_told_what_is_broken(kind: Any) -> None:
 def test_a_controller_that_is_not_there_fails_the_check(name: str) -> None:
     with pytest.raises(AssertionError, match=name):
         check_controller(name)
-
-
-class UnknownLevel(Around):
-    def step(self, frame: AntennaFrame) -> JointCommand:
-        command = super().step(frame)
-        self.level = np.full_like(self.inner.level, math.nan)
-        return command
 
 
 def test_an_infinite_level_makes_a_trial_invalid_and_an_unknown_one_does_not() -> None:
