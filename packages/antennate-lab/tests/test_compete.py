@@ -658,44 +658,6 @@ def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     assert not Path("none").exists()
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("change", "why"),
-    [
-        ({"mass": 2.5}, "made for another robot: expected robot.mass 2.5"),
-        ({"rate": 50.0}, "expected rate 50.0, found 100.0"),
-    ],
-)
-def test_a_policy_of_another_robot_or_rate_is_refused(
-    change: dict[str, Any], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("onnx")
-    pytest.importorskip("onnxruntime")
-    from policy_files import FORWARD, constant
-
-    from antennate.control.policy.contract import contract_of
-    from antennate.control.policy.interface import PolicyInterface
-    from antennate.params.control import ControlParams
-    from antennate.robots.spec import RobotSpec
-
-    control = ControlParams(rate=change.get("rate", 100.0))
-    robot = RobotSpec.model_validate({k: v for k, v in change.items() if k == "mass"})
-    made = contract_of(PolicyInterface(), control, robot)
-    file = constant(tmp_path / "policy.onnx", FORWARD, made)
-    assert main(["compete", "--controllers", str(file), "--scenes", SHORT]) == 2
-    assert why in capsys.readouterr().err
-
-
-@pytest.mark.ci
-def test_a_policy_competes(tmp_path: Path) -> None:
-    pytest.importorskip("onnx")
-    pytest.importorskip("onnxruntime")
-    from policy_files import FORWARD, constant
-
-    file = constant(tmp_path / "policy.onnx", FORWARD)
-    assert [row.outcome for row in episodes(str(file), 2)] == ["timeout"] * 2
-
-
 # seeds
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-import pickle
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tracked import NAMES, POINTS, animal, classified, dwelling, write
+from tracked import NAMES, POINTS, animal, classified, dwelling, write, write_table
 
 GIVEN = (
     Path(__file__).parents[4] / "shared" / "data" / "inputs_turn4" / "three_animals_no_track.csv"
@@ -98,17 +97,7 @@ def deeplabcut(path: Path, animals: dict[str, dict[str, np.ndarray]]) -> Path:
         lines += [[str(i), *map(str, row)] for i, row in enumerate(values.tolist())]
         path.write_text("".join(",".join(line) + "\n" for line in lines))
         return path
-    h5py = pytest.importorskip("h5py")
-    kind = [("index", "<i8"), ("values_block_0", "<f8", (len(keys),))]
-    table = np.zeros(len(values), kind)
-    table["index"], table["values_block_0"] = np.arange(len(values)), values
-    with h5py.File(path, "w") as file:
-        group = file.create_group("df_with_missing")
-        group.attrs["pandas_type"] = b"frame_table"
-        made = group.create_dataset("table", data=table)
-        names = pickle.dumps([("net", *key) for key in keys], protocol=0)
-        made.attrs["values_block_0_kind"] = np.bytes_(names)
-    return path
+    return write_table(path, [("net", *key) for key in keys], values)
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.h5"])

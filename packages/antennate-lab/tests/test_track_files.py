@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import pickle
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tracked import NAMES, POINTS, animal, classified, dwelling, write
+from tracked import NAMES, POINTS, animal, classified, dwelling, write, write_table
 
 import antennate
 
@@ -101,16 +100,7 @@ def labels(path: Path, points: dict[str, np.ndarray]) -> Path:
 def pandas_table(path: Path, points: dict[str, np.ndarray], names: bytes | None = None) -> Path:
     """HDF5 as pandas writes it in format `table`, which DeepLabCut uses."""
     columns = [("net", n, c) for n in points for c in ("x", "y")]
-    values = np.hstack(list(points.values()))
-    kind = [("index", "<i8"), ("values_block_0", "<f8", (values.shape[1],))]
-    table = np.zeros(len(values), kind)
-    table["index"], table["values_block_0"] = np.arange(len(values)), values
-    with h5py.File(path, "w") as file:
-        group = file.create_group("df_with_missing")
-        group.attrs["pandas_type"] = b"frame_table"
-        made = group.create_dataset("table", data=table)
-        made.attrs["values_block_0_kind"] = np.bytes_(names or pickle.dumps(columns, protocol=0))
-    return path
+    return write_table(path, columns, np.hstack(list(points.values())), names)
 
 
 @pytest.mark.parametrize("kind", ["csv", "turned", "sleap", "labels", "pandas"])

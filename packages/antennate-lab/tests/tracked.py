@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import pickle
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import antennate
 
@@ -89,3 +91,19 @@ def classified(path: Path, **settings) -> tuple[antennate.Result, dict[str, list
     return result, {
         side: [row["shape"] for row in rows if row["side"] == side] for side in ("left", "right")
     }
+
+
+def write_table(
+    path: Path, columns: list[tuple[str, ...]], values: np.ndarray, names: bytes | None = None
+) -> Path:
+    """HDF5 as pandas writes it in format `table`, which DeepLabCut uses."""
+    h5py = pytest.importorskip("h5py")
+    kind = [("index", "<i8"), ("values_block_0", "<f8", (values.shape[1],))]
+    table = np.zeros(len(values), kind)
+    table["index"], table["values_block_0"] = np.arange(len(values)), values
+    with h5py.File(path, "w") as file:
+        group = file.create_group("df_with_missing")
+        group.attrs["pandas_type"] = b"frame_table"
+        made = group.create_dataset("table", data=table)
+        made.attrs["values_block_0_kind"] = np.bytes_(names or pickle.dumps(columns, protocol=0))
+    return path
