@@ -15,8 +15,7 @@ from typing import Any
 
 import pytest
 from lockstep import BoardPort, LockstepClock
-from stated import STATED
-from test_drive_processes import ANTENNATE, NO_SERVO, Drive, twin
+from test_drive_processes import ANTENNATE, Drive, twin
 from test_simulated_logs import HEADER, as_made, made, walked
 
 from antennate.cli import main
@@ -102,36 +101,6 @@ def test_a_twin_tells_its_failed_log_with_the_cause_and_ends_with_2(tmp_path: Pa
     assert said.count("the twin goes on without it") == said.count("log: ") <= 1
     with LogReader(tmp_path / "t.mcap") as log:
         assert sum(1 for _ in log) >= int(found[1])
-
-
-@pytest.mark.slow
-def test_a_run_whose_folder_is_removed_says_what_is_lost(tmp_path: Path) -> None:
-    """The walk goes on to its end; result and configuration are written again, the log is gone."""
-    drive = Drive(tmp_path / "run")
-    words = ["drive", "--arm", "--no-touch-check", "--dry-run", "2", "--duration", "4"]
-    words += STATED
-    with (
-        twin() as (places, _),
-        subprocess.Popen(
-            [*ANTENNATE, *words, *NO_SERVO, *places, "--out", "run"],
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process,
-    ):
-        drive.read(process, lambda: drive.sent > 0)
-        shutil.rmtree(drive.folder)
-        drive.read(process, lambda: False)
-        assert process.stdout is not None
-        out = " ".join(process.stdout.read().split())
-    result = drive.result
-    assert process.returncode == 2
-    assert result["ended"] == "the end of its time"
-    assert result["torque_off"] is True
-    removed_is_said(result, out)
-    assert (drive.folder / "config.toml").exists()
-    assert sum("removed or renamed" in line for line in drive.lines) == 1
 
 
 REMOVED = (
