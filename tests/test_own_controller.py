@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lockstep import BoardPort, LockstepClock
-from stated import stated
+from twin_rig import Driven
 
 import antennate
 from antennate.cli import main
@@ -23,16 +22,11 @@ from antennate.control.rule_controller import RuleController
 from antennate.errors import ConfigError, WorkerError
 from antennate.experiments.tunnel.experiment import EXPERIMENT
 from antennate.experiments.tunnel.physics import TunnelConfig
-from antennate.hardware.config import DriveConfig
-from antennate.hardware.driving.connect import prepare
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.session import Session
 from antennate.robots.antenna import AntennaSpec
 from antennate.sim.scenes.registry import SCENES, make_scene
 from antennate.sim.scenes.scene import FlatScene
 from antennate.sim.trial import draw_trial
 from antennate.testing import check_controller
-from antennate.twin.config import TwinConfig, watched
 from antennate.types import AntennaFrame, JointCommand, Maneuver, State
 
 EXAMPLE = f"{Path(__file__).parents[1] / 'examples/own_controller.py'}:OwnController"
@@ -285,20 +279,8 @@ def test_the_example_runs_in_the_tunnel_in_worker_processes(
 
 def test_the_example_drives_the_twin() -> None:
     """By the code of `drive`, all of it through bytes, in lock-step."""
-    robot = watched(TwinConfig())[0]
-    clock = LockstepClock(robot)
-    config = DriveConfig(
-        robot=stated(), controller=EXAMPLE, dry_run=0.5, duration=3.0, touch_check=False
-    )
-    session = prepare(config, BoardPort(robot, clock), clock, clock)
-    maneuvers: list[int] = []
-    goals: set[tuple[int, ...]] = set()
-
-    def on_tick(session: Session, now: float) -> None:
-        maneuvers.append(session.control.decision.maneuver)
-        goals.add(tuple(servo.get("goal_position") for servo in robot.servos))
-
-    report = drive(session, config, True, on_tick)
+    driven = Driven(EXAMPLE)
+    report, maneuvers, goals = driven.report, driven.maneuvers, set(driven.goals)
     assert report.worst < State.HOLD, report.why
     assert set(maneuvers[-200:]) <= {Maneuver.FORWARD, Maneuver.TURN_R}
     assert len(goals) > 200

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
-from lockstep import BoardPort, LockstepClock
 from pages import blocks
 from policy_files import FORWARD, constant, contract, counting, drawn, failing
 from recorded import recorded
-from stated import stated
+from twin_rig import Driven
 
 from antennate.cli import main, viewer
 from antennate.control.policy.contract import Contract, contract_of, require_match
@@ -31,14 +30,9 @@ from antennate.control.registry import make_controller
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
-from antennate.hardware.config import DriveConfig
-from antennate.hardware.driving.connect import prepare
-from antennate.hardware.driving.drive import drive
-from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
-from antennate.twin.config import TwinConfig, watched
 from antennate.types import AntennaFrame, Maneuver, State
 from antennate_lab.compete.episodes import Draw, run_episodes
 from antennate_lab.compete.page import sentence
@@ -202,19 +196,10 @@ def test_compete_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: P
 
 
 def test_drive_says_in_how_many_decisions_the_answer_was_no_number(tmp_path: Path) -> None:
-    robot = watched(TwinConfig())[0]
-    clock = LockstepClock(robot)
     path = str(failing(tmp_path / "p.onnx"))
-    config = DriveConfig(
-        robot=stated(), controller=path, dry_run=0.5, duration=4.0, touch_check=False
-    )
-    session = prepare(config, BoardPort(robot, clock), clock, clock)
-    held: list[bool] = []
-
-    def on_tick(session: Session, now: float) -> None:
-        held.append(session.control.decision.maneuver == Maneuver.HOLD)
-
-    result = drive(session, config, True, on_tick).result(session)
+    driven = Driven(path, 4.0)
+    result = driven.report.result(driven.session)
+    held = [maneuver == Maneuver.HOLD for maneuver in driven.maneuvers]
     last = held[::-1].index(False)  # ticks since it walked, ten to a decision
     assert result["void_decisions"] == math.ceil(last / 10) > 5
     head = {"controller": path, "armed": True}
@@ -264,18 +249,8 @@ def test_nothing_begins_before_the_first_reading_that_can_be_used(tmp_path: Path
 
 def test_it_drives_the_twin_behind_the_supervisor(tmp_path: Path) -> None:
     path = constant(tmp_path / "p.onnx", (0.0, 0.0, 5.0, 0.0), contract(servos=True))
-    robot = watched(TwinConfig())[0]
-    clock = LockstepClock(robot)
-    config = DriveConfig(
-        robot=stated(), controller=str(path), dry_run=0.5, duration=3.0, touch_check=False
-    )
-    session = prepare(config, BoardPort(robot, clock), clock, clock)
-    maneuvers: list[int] = []
-
-    def on_tick(session: Session, now: float) -> None:
-        maneuvers.append(session.control.decision.maneuver)
-
-    report = drive(session, config, True, on_tick)
+    driven = Driven(str(path))
+    report, maneuvers = driven.report, driven.maneuvers
     assert report.worst < State.HOLD, report.why
     assert set(maneuvers[-200:]) == {Maneuver.TURN_R}
 

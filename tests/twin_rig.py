@@ -12,10 +12,15 @@ from typing import Any
 
 import numpy as np
 from lockstep import BoardPort, LockstepClock
+from stated import stated
 
 from antennate.control.loop import run_loop
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
+from antennate.hardware.config import DriveConfig
+from antennate.hardware.driving.connect import prepare
+from antennate.hardware.driving.drive import drive
+from antennate.hardware.driving.report import Report
 from antennate.hardware.dynamixel import bringup
 from antennate.hardware.dynamixel.actuators import DynamixelActuators
 from antennate.hardware.esp32.board import Board, BoardReader
@@ -251,3 +256,27 @@ def on_twin(
 
     run_loop(stage.body, stage.control, stage.period, go_on)
     return stage.decisions()
+
+
+class Driven:
+    """`drive` of a controller before a twin in lock-step; what it decided and sent, tick by tick.
+
+    Args:
+        controller: Its name.
+        duration: For how long it walks [s].
+    """
+
+    def __init__(self, controller: str, duration: float = 3.0) -> None:
+        robot = watched(TwinConfig())[0]
+        clock = LockstepClock(robot)
+        config = DriveConfig(robot=stated(), controller=controller, duration=duration)
+        config = config.model_copy(update={"dry_run": 0.5, "touch_check": False})
+        self.session = prepare(config, BoardPort(robot, clock), clock, clock)
+        self.maneuvers: list[int] = []
+        self.goals: list[tuple[int, ...]] = []
+
+        def on_tick(session: Session, now: float) -> None:
+            self.maneuvers.append(session.control.decision.maneuver)
+            self.goals.append(tuple(servo.get("goal_position") for servo in robot.servos))
+
+        self.report: Report = drive(self.session, config, True, on_tick)
