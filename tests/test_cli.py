@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -583,3 +584,31 @@ def test_a_robot_file_in_this_folder_is_read_where_no_port_is_named(
     (said,) = capsys.readouterr().err.splitlines()
     assert "found none" in said
     assert hint in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_a_signal_ends_the_run_and_keeps_its_trials(tmp_path, number, workers):
+    code = (
+        "import signal, sys; from antennate.cli import main; "
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main(sys.argv[1:]))"
+    )
+    words = ["tunnel", "--trials", "5000", "--out", "run", "--no-figures", "--workers", workers]
+    trials = tmp_path / "run" / "trials.jsonl"
+    with child(code, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
+        try:
+            deadline = time.monotonic() + 60
+            while not (trials.exists() and trials.read_text().count('"key":') >= 2):
+                assert time.monotonic() < deadline
+                time.sleep(0.2)
+            run.send_signal(number)
+            _, err = run.communicate(timeout=30)
+        finally:
+            run.kill()
+    assert run.returncode == 130
+    assert "Traceback" not in err
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["interrupted"] is True
+    rows = table(tmp_path / "run")
+    assert len(rows) == sum(open_["trials"] for open_ in result["controllers"].values()) >= 2

@@ -6,6 +6,8 @@ import json
 import os
 import pty
 import select
+import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,6 +21,7 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.drive import Operator, drive
 from antennate.hardware.driving.stopping import DeadMan
 from antennate.hardware.safety.session import Session
+from antennate.messages import typed
 from antennate.params.hardware import DeadManParams
 from antennate.twin.config import TwinConfig
 
@@ -112,6 +115,20 @@ def test_a_key_let_go_again_and_again_is_no_fault() -> None:
     assert report.ended == "the end of its time"
 
 
+@pytest.mark.ci
+def test_it_needs_a_terminal_and_says_so(tmp_path: Path) -> None:
+    words = ["drive", "--esp32", "a", "--bus", "b", "--hold-to-run", "--out", str(tmp_path / "r")]
+    run = subprocess.run(
+        [*ANTENNATE, *words], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 2
+    assert run.stderr == (
+        "antennate drive: error: --hold-to-run: expected a terminal as standard input, whose keys "
+        "can be held, found none\n"
+    )
+    assert not (tmp_path / "r").exists()
+
+
 @pytest.mark.slow
 def test_B19_a_key_held_in_a_terminal_is_the_dead_man_of_the_shipped_command(
     tmp_path: Path,
@@ -142,3 +159,34 @@ def test_B19_a_key_held_in_a_terminal_is_the_dead_man_of_the_shipped_command(
     assert result["torque_off"] is True
     assert "HOLD RELEASED" in result["why"]
     assert result["commands_sent"] > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SIGINT", "SIGQUIT", "SIGTERM", "SIGHUP"])
+def test_B19_a_signal_sent_again_and_again_loses_no_report(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    words = ["drive", "--arm", "--no-touch-check", "--dry-run", "1", "--out", str(folder)]
+    words += STATED
+    with (
+        twin() as (places, _),
+        subprocess.Popen(
+            [*ANTENNATE, *words, *places],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        ) as process,
+    ):
+        assert process.stderr is not None
+        for line in process.stderr:
+            if " sent=" in line and " sent=0 " not in line:
+                break
+        while process.poll() is None:
+            os.killpg(process.pid, getattr(signal, name))
+            time.sleep(0.02)
+        out, err = process.communicate()
+    assert process.returncode == 0
+    assert json.loads((folder / "result.json").read_text())["torque_off"] is True
+    assert err.splitlines()[-1] == f"written to {folder}"
+    assert f"What was read and decided: {typed('replay')} " in out
+    assert "ended by a signal; torque is off, verified." in out

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +17,8 @@ import pytest
 from doctor_rig import Patient, wrong
 from driven_rig import driven, simulated_alike
 from lockstep import BoardPort, LockstepClock
+from stated import words as stated_words
+from test_drive_processes import ANTENNATE, ATTEMPTS, NO_SERVO
 from twin_rig import rig
 
 from antennate import simulate
@@ -408,3 +415,73 @@ def test_signed_datagrams_carry_it() -> None:
     signed[20] ^= 1
     assert host.take(bytes(signed), clock) == (b"", False)
     assert host.tally.forged == 1
+
+
+@contextmanager
+def wired(folder: Path) -> Iterator[tuple[list[str], Any]]:
+    """A twin of the robot in a process of its own: its addresses, and what takes orders."""
+    words = [*ANTENNATE, "twin", "--robot", "scuttle3d", "--scene", "flat", "--orders", "-"]
+    pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, stderr=subprocess.DEVNULL, cwd=folder, **pipes) as process:
+        assert process.stdout is not None
+        places = json.loads(process.stdout.readline())
+        try:
+            yield ["--esp32", places["esp32"], "--bus", places["bus"]], process.stdin
+        finally:
+            process.kill()
+
+
+def drive_by_command(run: Path) -> tuple[int, str, str]:
+    """`drive` with a sensor that falls silent in it: exit code, what it said on both streams."""
+    words = ["drive", "--arm", "--no-touch-check", "--robot", "scuttle3d", "--controller", "climb"]
+    words += ["--dry-run", "3", "--duration", "4", *NO_SERVO, "--out", str(run)]
+    words += stated_words(RobotSpec.named("scuttle3d"))
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with (
+        wired(run.parent) as (places, orders),
+        subprocess.Popen([*ANTENNATE, *words, *places], **pipes) as process,
+    ):
+        assert process.stderr is not None
+        lines = list[str]()
+        for line in process.stderr:
+            lines.append(line)
+            sent = re.search(r" sent=(\d+) ", line)
+            if sent and int(sent[1]) > 0:
+                break
+        orders.write("fault imu=silent\n")
+        orders.flush()
+        said, more = process.communicate()
+    return process.returncode, said, "".join([*lines, more])
+
+
+@pytest.mark.ci
+def test_the_command_drives_on_without_it(tmp_path: Path) -> None:
+    """Exit code 0, named in the status line and in the last lines; its log replays to the bit.
+
+    A machine that stands still lets the watchdogs end it, as they must; then there is another one.
+    """
+    run, attempt = tmp_path / "1", 1
+    code, said, status = drive_by_command(run)
+    while code and attempt < ATTEMPTS:
+        attempt += 1
+        run = tmp_path / str(attempt)
+        code, said, status = drive_by_command(run)
+    assert code == 0, status
+    result = json.loads((run / "result.json").read_text())
+    named = "IMU: the inertial sensor gives nothing that can be used (no answer)"
+    assert named in status
+    assert result["imu_readings"]["missing"] > 100
+    assert result["imu_readings"]["ok"] > 100
+    assert result["worst_state"] in ("DEGRADED", "HOLD")
+    if result["worst_state"] == "DEGRADED":  # the machine was never late
+        assert named in said.replace("\n", " ")
+    assert "torque is off, verified" in said
+    log = run / result["logs"][0]
+    with LogReader(log) as reader:
+        ticks = [tick for _, tick in reader.groups() if tick is not None]
+    assert np.isnan(ticks[-1].angular_velocity).all()
+    assert sum(np.isfinite(tick.angular_velocity).all() for tick in ticks) > 100
+    words = [*ANTENNATE, "log", "replay", str(log), "--json"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["different_commands"] == 0

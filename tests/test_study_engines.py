@@ -7,6 +7,7 @@ import functools
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -606,3 +607,16 @@ def test_every_command_goes_on_with_the_same_numbers(name: str, words: list[str]
         elif path.name not in ("command.txt", "report.html", "trials.jsonl"):
             assert again.read_bytes() == path.read_bytes(), path
     assert Path("run/trials.jsonl").exists()
+
+
+def test_snakemake_runs_the_snakefile_and_leaves_the_same_table() -> None:
+    if shutil.which("snakemake") is None:
+        pytest.skip("snakemake is not installed; `uv run --with snakemake pytest` brings it")
+    Path("plan.toml").write_text('experiment = "antenna"\n[vary]\ncoil_mm = [3.5, 4.0]\n')
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    words = ["snakemake", "--cores", "2", "--config", "study=plan.toml", "--snakefile"]
+    words.append(str(ROOT / "examples" / "snakemake" / "Snakefile"))
+    done = subprocess.run(words, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert main(["study", "plan.toml", "--out", "whole", "--workers", "1"]) == 0
+    assert Path("run/trials.csv").read_bytes() == Path("whole/trials.csv").read_bytes()
