@@ -1,4 +1,4 @@
-"""What says where a run was made: processors of one name, and the code of all distributions."""
+"""What says where a run was made: processors of one name."""
 
 from __future__ import annotations
 
@@ -13,10 +13,7 @@ from pathlib import Path
 import pytest
 from test_replaced_runs import SLOW, killed_once, program
 
-import dynamixel_bus
-import geometric_locomotion
 from antennate.studies import work
-from antennate.studies.identity import code
 from antennate.studies.trial_file import TRIALS, line, read_trials
 
 WORDS = ["study", "plan.toml", "--trust-code", "--out", "run", "--workers", "1", "--no-figures"]
@@ -99,24 +96,3 @@ def test_processors_of_one_name_are_told_apart(
         assert work.processor() == name
     finally:
         work.processor.cache_clear()
-
-
-@pytest.mark.parametrize(
-    ("room", "file"), [(geometric_locomotion, "legged.py"), (dynamixel_bus, "model.py")]
-)
-def test_the_code_of_a_run_is_that_of_the_distributions_below_too(
-    room: object, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    root = Path(str(getattr(room, "__file__", ""))).parent
-    copy = tmp_path / root.name
-    copy.mkdir()
-    for path in root.glob("*.py"):
-        (copy / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(room, "__file__", str(copy / "__init__.py"))
-    code.cache_clear()
-    before = code()
-    (copy / file).write_bytes((copy / file).read_bytes() + b"\n# changed\n")
-    code.cache_clear()
-    changed = [name for name, sum_ in code().items() if before[name] != sum_]
-    code.cache_clear()
-    assert changed == [f"{root.name}/{file}"]
