@@ -17,10 +17,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from antennate.cli import main
-from antennate.lookup import ADDED
-from antennate.sim.engine_setup import dropped
-from antennate.studies.pool import core_count
+pytest_plugins = ["antennate_fixtures"] if find_spec("antennate") else []
+"""Those of `tests/`; the distributions below `antennate` are tested without it, too."""
 
 settings.register_profile("any machine", deadline=None)  # how long an example takes says nothing
 settings.load_profile("any machine")
@@ -42,18 +40,9 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
     atexit.register(shutil.rmtree, kept, ignore_errors=True)
 
 
-EVERY_RUN = "not slow and not ci"
-"""Marks of the tests of `uv run pytest`, as `addopts` in pyproject.toml has it."""
-
 HERE = tempfile.mkdtemp(prefix="tests-")
 """An empty folder to run in, so that no robot.toml that a user left in the clone is read."""
 atexit.register(shutil.rmtree, HERE, ignore_errors=True)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """A worker for each core, and one more where tests wait for programs that they started."""
-    return core_count() + (config.getoption("markexpr") != EVERY_RUN)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -115,45 +104,6 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder, which is the working directory."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-@pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
-    """Run a command that is refused: nothing on stdout, one line on stderr, which is returned."""
-
-    def run(*words: object) -> str:
-        capsys.readouterr()
-        assert main([*map(str, words)]) == 2
-        out, err = capsys.readouterr()
-        assert out == ""
-        assert err.endswith("\n")
-        assert err.count("\n") == 1, err
-        return err
-
-    return run
-
-
-@pytest.fixture(autouse=True)
-def _one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands that are told no number run in this process; starting others takes a second each."""
-    monkeypatch.setattr("antennate.cli.experiment.core_count", lambda: 1)
-
-
-@pytest.fixture(autouse=True)
-def _registries_stay_as_they_are() -> Iterator[None]:
-    """What a test adds to a registry is known in its process from then on."""
-    before = {group: dict(objects) for group, objects in ADDED.items()}
-    yield
-    for group, objects in ADDED.items():
-        objects.clear()
-        objects.update(before.get(group, {}))
-
-
-@pytest.fixture(autouse=True)
-def _the_engine_leaves_no_log() -> Iterator[None]:
-    """It writes its warnings to `MUJOCO_LOG.TXT` in the working directory, that of the clone."""
-    with dropped():
-        yield
 
 
 OPTIONAL = {

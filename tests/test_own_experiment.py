@@ -173,7 +173,7 @@ def test_without_the_laboratory_the_rest_is_there_and_says_what_is_missing(
     assert "compete" not in out
     missing = (
         "expected the package antennate-lab, which has gait, found none; "
-        "install it with `pip install ./antennate/packages/antennate-lab`"
+        "install it with `pip install ./antennate/packages/*`"
     )
     assert main(["gait"]) == 2
     assert missing in capsys.readouterr().err

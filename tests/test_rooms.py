@@ -1,7 +1,8 @@
-"""Each distribution alone: one version for all; each builds, installs and runs its example."""
+"""Each distribution alone: what it imports, one version; each builds, installs and runs."""
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shutil
@@ -103,6 +104,46 @@ def environment(uv: str, folder: Path, *installed: object) -> Path:
 def packages_of(uv: str, programs: Path) -> set[str]:
     listed = done(uv, "pip", "freeze", "--python", programs / "python", folder=programs)
     return {re.split(r"==| @ ", line)[0] for line in listed.splitlines()}
+
+
+def imported(file: Path) -> Iterator[str]:
+    """Modules that a file imports when it runs; types alone are no import."""
+    nodes: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            nodes += ast.iter_child_nodes(node)
+
+
+def test_imports_go_down_in_the_drawing_of_the_rooms() -> None:
+    """That of CONTRIBUTING.md, from top to bottom; the two lowest import none of ours."""
+    drawn = re.findall(r"^packages/([\w-]+)/", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)
+    assert set(drawn) == {*ROOMS, *UPPER}
+    names = {room.replace("-", "_"): room for room in drawn}
+    for i, room in enumerate(drawn):
+        files = (ROOT / "packages" / room / "src").rglob("*.py")
+        tops = {name.partition(".")[0] for file in files for name in imported(file)}
+        others = {names[top] for top in tops & names.keys()} - {room}
+        assert others <= (set() if room in ROOMS else {*drawn[i + 1 :]}), room
+
+
+def test_imports_go_down_in_the_table_of_layers() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("| package | what it holds |")[2]
+    rows = [
+        re.findall(r"`(\w+)`", row) for row in re.findall(r"^\| (`[^|]*) \|", text, re.MULTILINE)
+    ]
+    rank = {name: i for i, row in enumerate(rows) for name in row}
+    root = ROOT / "packages" / "antennate" / "src" / "antennate"
+    assert {path.name for path in root.iterdir() if (path / "__init__.py").is_file()} <= {*rank}
+    for file in root.rglob("*.py"):
+        layer = file.relative_to(root).parts[0].removesuffix(".py")
+        for name in imported(file) if layer in rank else ():
+            other = name.removeprefix("antennate.").partition(".")[0]
+            if name.startswith("antennate.") and other in rank:
+                assert rank[layer] <= rank[other], f"{file}: {name}"
 
 
 def test_all_have_one_version() -> None:

@@ -59,6 +59,8 @@ def test_slow():
 @pytest.mark.ci
 def test_a_process_in_a_test_of_every_run_is_refused_unless_it_is_marked(tmp_path: Path) -> None:
     shutil.copy(ROOT / "conftest.py", tmp_path)
+    (tmp_path / "tests").mkdir()
+    shutil.copy(ROOT / "tests" / "antennate_fixtures.py", tmp_path / "tests")
     (tmp_path / "test_them.py").write_text(TESTS)
     words = [
         "-n",

@@ -91,9 +91,8 @@ def former(words: Sequence[str]) -> str:
     return ""
 
 
-def installation(package: str) -> str:
-    """How to get a package of ours; it follows words such as `install it with`."""
-    return f"`pip install ./antennate/packages/{package}`, with the clone as ./antennate"
+INSTALLATION = "`pip install ./antennate/packages/*`, with the clone as ./antennate"
+"""How to get all distributions of ours; it follows words such as `install it with`."""
 
 
 def extra(name: str, package: str = "antennate") -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError, in_one_line
-from antennate.messages import installation, nearest, shortened
+from antennate.messages import INSTALLATION, nearest, shortened
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -99,7 +99,7 @@ def unknown(name: str) -> str:
     if name in LABORATORY:
         return (
             f"expected the package antennate-lab, which has {name}, found none; install it with "
-            f"{installation('antennate-lab')}"
+            f"{INSTALLATION}"
         )
     known = names()
     hint = nearest(name, known)
