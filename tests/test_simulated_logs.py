@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -38,7 +40,7 @@ from antennate.sim.world import World
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.simulated import Decisions, SimulatedLog, TickLog
 from antennate.telemetry.ticks import Tick
-from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES
+from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS, JOINT_STATES, MOTION
 from antennate.telemetry.twin_log import LogQueue
 from antennate.telemetry.writer import LogWriter
 from antennate.types import AntennaFrame, Contact, JointCommand, Maneuver
@@ -433,6 +435,65 @@ def test_ticks_written_at_once_are_those_written_one_by_one(
         assert [each.pack() for each in reader] == [each.pack() for each in kept]
 
 
+COUNTED = np.array([0, 5, 7])
+WELL = np.array(["", "", ""])
+CHANGED = {
+    "counted later": {"missed": COUNTED},
+    "states": {"state": np.array(["OK", "", "HOLD"]), "note": np.array(["", "look", ""])},
+    "causes": {"state": WELL, "causes": np.array([["a: 1"], ["a: 2"], ["b"]])},
+    "an IMU that the robot has not": {name: np.ones((3, 3)) for name in MOTION},
+    "no measured joints": {"positions": np.zeros((3, 0))},
+    "too large": {"contact": np.array([[0, 1], [0, 2**63], [0, 0]], np.uint64)},
+    "negative": {"missed": -COUNTED},
+    "not whole": {"maneuver": np.array([0.0, 1.0, 2.0])},
+    "much too large": {"maneuver": np.array([0, 1, 2**70], object)},
+    "of text": {"phase": np.array(["1", "2", "3"])},
+}
+"""Columns of three ticks in place of those that all ticks have, or beside them."""
+
+
+@pytest.mark.parametrize("before", ["", "OK"])
+@pytest.mark.parametrize("changed", CHANGED.values(), ids=CHANGED)
+def test_ticks_written_at_once_have_the_topics_and_refusals_of_each(
+    changed: dict[str, np.ndarray[Any, Any]], before: str, tmp_path: Path
+) -> None:
+    """A tick before them leaves a state, after which a tick without one is an event."""
+    quiet = {"phase": 0.5, "maneuver": 1, "contact": (0, 1), "state": "", "causes": ()}
+    given = columns([replace(each, **quiet) for each in made(3)], ()) | changed
+    first = replace(made(1)[0], state=before)
+    beside = {COORDINATES: COORDINATES.type.encode(0, (1.0, 2.0))}
+    refused = {}
+    with LogWriter(tmp_path / "one by one.mcap", HEADER) as log:
+        log.write(first)
+        try:
+            for place in range(3):
+                row = {name: column.tolist()[place] for name, column in given.items()}
+                log.write(Tick(number=2 + place, **row))
+                if place == 1:
+                    log.add(COORDINATES, 3, 0, beside[COORDINATES])
+        except LogError as error:
+            refused["one by one"] = str(error)
+    with LogWriter(tmp_path / "at once.mcap", HEADER) as log:
+        log.write(first)
+        try:
+            log.write_many(given, {1: beside})
+        except LogError as error:
+            refused["at once"] = str(error)
+    assert refused.get("at once") == refused.get("one by one")
+    assert messages(tmp_path / "at once.mcap") == messages(tmp_path / "one by one.mcap")
+
+
+def test_what_went_wrong_later_is_logged_and_no_tick_is_none(tmp_path: Path) -> None:
+    given = columns(made(3), ()) | {"missed": COUNTED}
+    with LogWriter(tmp_path / "log.mcap", HEADER) as log:
+        log.write_many({name: column[:0] for name, column in given.items()}, {})
+        log.write_many({}, {})
+        assert log.written == 0
+        log.write_many(given, {})
+    with LogReader(tmp_path / "log.mcap") as reader:
+        assert [each.missed for each in reader] == [0, 5, 7]
+
+
 def messages(path: Path) -> list[tuple[str, Message]]:
     """Messages of a file as the package `mcap` reads them, with their topics, in their order."""
     with path.open("rb") as file:
@@ -523,6 +584,38 @@ def test_a_person_who_is_impatient_while_it_is_closed_costs_no_tick(tmp_path: Pa
     assert done.returncode == -2, done.stderr
     with LogReader(tmp_path / "log.mcap") as log:
         assert sum(1 for _ in log) == log.end == 300
+
+
+FORKED = f"""
+import os, sys
+sys.path[:0] = {sys.path!r}
+from test_simulated_logs import HEADER, Path, TickLog, as_made, made
+
+folder = Path(sys.argv[1])
+for name in ("parent.mcap", "child.mcap"):
+    with TickLog(folder / name, HEADER, as_made) as log:
+        for tick in made(300):
+            log.add(tick)
+    child = os.fork() if name == "parent.mcap" else 0
+    if child:
+        sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+os._exit(0)
+"""
+"""A child that writes a log of its own after that of its parent."""
+
+
+@pytest.mark.ci
+def test_a_forked_child_writes_a_log_as_its_parent_did(tmp_path: Path) -> None:
+    words = [sys.executable, "-W", "ignore", "-c", FORKED, str(tmp_path)]
+    with subprocess.Popen(words, start_new_session=True) as forked:
+        try:
+            assert forked.wait(60) == 0
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(forked.pid, signal.SIGKILL)
+    for name in ("parent", "child"):
+        with LogReader(tmp_path / f"{name}.mcap") as log:
+            assert sum(1 for _ in log) == log.end == 300
 
 
 @pytest.mark.ci

@@ -634,13 +634,13 @@ def choose(x: Floats, y: Floats, points: NDArray[np.int64], chance: bool) -> Fit
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FittedModels:
     """Models of all that the paper speaks of in a group."""
 
     models: dict[str, Fitted]
 
     @classmethod
-    def of(cls, rows: Rows, group: Group) -> Outcome:
+    def of(cls, rows: Rows, group: Group) -> FittedModels:
         """Fitted to trials."""
         return cls(
             {
@@ -796,7 +796,7 @@ def weigh(name: str, files: Sequence[Path], write: bool) -> None:
     """Tell what the paper's data leave of the ranges, and perhaps write it."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
-    outcome = Outcome.of(rows, group)
+    outcome = FittedModels.of(rows, group)
     x = prior(unknowns, DRAWS).x
     told = outcome.at(x)
     likelihoods = outcome.likelihoods(told, group.paper)
@@ -900,7 +900,7 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     """A study of settings drawn from what is left; by a power of the likelihood it is a search."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     draws = prior(unknowns, DRAWS, told.seed)
-    outcome = Outcome.of(read(files, group, unknowns), group)
+    outcome = FittedModels.of(read(files, group, unknowns), group)
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
     likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
@@ -1035,7 +1035,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     hidden = read(files[:1], group, unknowns)
-    outcome = Outcome.of(read(files[1:], group, unknowns), group)
+    outcome = FittedModels.of(read(files[1:], group, unknowns), group)
     x = prior(unknowns, DRAWS).x
     chances = outcome.at(x)
     told = inside = 0

@@ -45,7 +45,7 @@ EACH = 10
 LIMIT = 100.0
 """Time after which a trial has failed [s]."""
 FREQUENCY = 0.8
-"""Of the gait [Hz], unless another is asked for: that of `sides.py`, with its reason in sides.md."""
+"""Of the gait [Hz], unless another is asked for: that of `sides.py`, as sides.md explains."""
 PLACE = 0.4
 """How far apart jams of one place are, at most [m]: a corridor's width."""
 SCENES = ("tunnel", "corner", "uturn", "room", "deadend")

@@ -128,22 +128,22 @@ def invalid(config: DatasetConfig, kind: str, trial: int, reason: str) -> Episod
     )
 
 
-Outcome = Found[DatasetConfig, DatasetResult, Windows]
+FoundWindows = Found[DatasetConfig, DatasetResult, Windows]
 """All episodes and their windows."""
 
 
-def windows_of(found: Outcome, kind: Kind) -> Windows:
+def windows_of(found: FoundWindows, kind: Kind) -> Windows:
     """Columns of the windows of all episodes of a kind."""
     parts = [windows for (of, _), windows in found.drawn.items() if of == kind]
     return joined(columns_of(kind, found.config.robot), parts)
 
 
-def by_kind(found: Outcome) -> dict[Kind, Windows]:
+def by_kind(found: FoundWindows) -> dict[Kind, Windows]:
     """Columns of the windows of all episodes, by kind."""
     return {kind: windows_of(found, kind) for kind in found.config.kinds}
 
 
-def summarise(found: Outcome) -> DatasetResult:
+def summarise(found: FoundWindows) -> DatasetResult:
     """The result of a run: the baselines estimate the labels of its windows."""
     config = found.config
     windows = by_kind(found)
@@ -241,11 +241,11 @@ def files(config: DatasetConfig) -> Files:
     return {"README.md": _card, **tables}
 
 
-def _card(found: Outcome) -> str:
+def _card(found: FoundWindows) -> str:
     return card(found.config, by_kind(found))
 
 
-def _parquet(found: Outcome, kind: Kind) -> bytes:
+def _parquet(found: FoundWindows, kind: Kind) -> bytes:
     return parquet(found.config, kind, windows_of(found, kind))
 
 

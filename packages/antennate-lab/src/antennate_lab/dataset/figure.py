@@ -13,7 +13,7 @@ from antennate.studies.columns import Column
 from antennate_lab.dataset.columns import TASKS
 from antennate_lab.dataset.config import TESTS
 from antennate_lab.dataset.estimates import BASELINES, MAE, Errors, TaskResult
-from antennate_lab.dataset.experiment import TITLES, Outcome
+from antennate_lab.dataset.experiment import TITLES, FoundWindows
 
 _MARKS = {
     "test": ("o", style.INK),
@@ -23,7 +23,7 @@ _MARKS = {
 
 
 @style.styled
-def figures(outcome: Outcome) -> dict[str, Figure]:
+def figures(outcome: FoundWindows) -> dict[str, Figure]:
     """Errors of the baselines in each task, on the three splits of test."""
     results = outcome.result().tasks
     tasks = [task for task in TASKS if task.name in results]

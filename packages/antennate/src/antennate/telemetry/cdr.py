@@ -78,6 +78,11 @@ class MessageType:
             raise LogError(f"expected a {self.name} of numbers that fit, found: {error}") from None
         return _HEADER + body
 
+    def holds(self, columns: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether numbers fit into their fields; names that are no fields are passed over."""
+        given = [field for field in self.fields if field.name in columns]
+        return all(_fits(columns[field.name], field.code) for field in given)
+
     def vary(self, data: bytes, columns: Mapping[str, NDArray[Any]]) -> list[bytes]:
         """Messages that differ from a given one in some of their numbers alone.
 
@@ -85,7 +90,12 @@ class MessageType:
             data: The bytes of the given one.
             columns: Numbers of each message by field, shape (n,), or (n, several) where the field
                 has several. Names that are no fields are passed over.
+
+        Raises:
+            LogError: A number does not fit.
         """
+        if not self.holds(columns):
+            raise LogError(f"expected a {self.name} of numbers that fit, found others")
         names, formats, offsets = list[str](), list[Any](), list[int]()
         body, at = data[len(_HEADER) :], 0
         for field in self.fields:
@@ -133,6 +143,16 @@ def _field(line: str) -> Field:
     kind, several, count, name = match.groups()
     code = "" if kind == "string" else _CODES[kind]
     return Field(name, code, None if several and not count else int(count or 0))
+
+
+def _fits(column: NDArray[Any], code: str) -> bool:
+    """Whether `struct` packs each number by its code; NumPy would convert what it does not."""
+    if code in ("d", "?"):
+        return column.dtype.kind in "biuf"
+    if not code or column.dtype.kind not in "biu":
+        return False
+    ends = np.iinfo(code)
+    return not column.size or ends.min <= int(column.min()) <= int(column.max()) <= ends.max
 
 
 def _put(body: bytearray, field: Field, value: Any) -> None:

@@ -1,12 +1,13 @@
 """The log of a simulated robot: what a drive logs, and the physics beside it.
 
 Simulated time runs much faster than a robot's, so ticks are collected as they are and written many
-at once, by a thread: the simulation goes on meanwhile, as the engine lets other threads run.
+at once. A thread does it, which Ctrl-C does not stop in the middle of a message; it saves no time.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -135,6 +136,9 @@ class TickLog:
 def _encoder() -> ThreadPoolExecutor:
     """The thread of all logs of this process."""
     return ThreadPoolExecutor(1, "logs")
+
+
+os.register_at_fork(after_in_child=_encoder.cache_clear)  # no thread lives on in a forked child
 
 
 class Decisions:

@@ -44,7 +44,7 @@ _NEITHER = (math.nan, math.nan)
 
 Pair = tuple[float, float]
 Columns = Mapping[str, NDArray[Any]]
-"""Numbers of ticks by the names of `Tick`, shape (n,), or (n, several) where a tick has several."""
+"""Ticks by the names of the fields of `Tick`, shape (n,), or (n, several) where one has several."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,15 +229,28 @@ class Tick:
         return cls(**values)
 
 
+def ticks_of(columns: Columns, first: int) -> Iterator[Tick]:
+    """Ticks one by one, from this number on; what is missing has its default in all of them."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    for number, row in enumerate(rows, first):
+        yield Tick(**dict(zip(columns, row, strict=True)) | {"number": number})
+
+
+def uniform(columns: Columns) -> bool:
+    """Whether there are ticks, all have messages of the same topics, and their numbers fit."""
+    sizes = [len(column) for column in columns.values()]
+    return any(sizes) and columns.keys().isdisjoint(_OF_SOME) and TICK.holds(columns)
+
+
 def messages_of(columns: Columns, names: tuple[str, ...], stamps: Ints) -> dict[Topic, list[bytes]]:
     """Messages of many ticks by topic, those that `Tick.messages` gives of each.
 
     Args:
-        columns: Numbers of the ticks; what is missing has its default in all of them.
+        columns: The ticks, `uniform`; what is missing has its default in all of them.
         names: Names of the joints.
         stamps: Time of the messages of each tick [ns], shape (n,).
     """
-    first = Tick(**{name: column[0].tolist() for name, column in columns.items()})
+    first = next(ticks_of({name: column[:1] for name, column in columns.items()}, 0))
     more = {
         JOINT_COMMANDS: {"position": columns["angles"]},
         JOINT_STATES: {name: columns[kind] for kind, name in _ONE.items() if kind in columns},
@@ -261,6 +274,8 @@ def _getter(kind: MessageType) -> Callable[[Tick], tuple[Any, ...]]:
 _ALL = _getter(TICK)
 _OWN = tuple((topic, _getter(topic.type)) for topic in (ANTENNA, MANEUVER, COUNTERS, SUPERVISOR))
 """Topics whose messages are fields of a tick."""
+_OF_SOME = {field.name for topic in (COUNTERS, SUPERVISOR) for field in topic.type.fields}
+"""Fields with messages of the ticks alone that have something to say there."""
 _NUMBERS = tuple(f.name for f in TICK.fields if f.code and f.name not in (*JOINTS[1:], *MOTION))
 
 
