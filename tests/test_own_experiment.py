@@ -235,6 +235,18 @@ def test_numbers_of_numpy_are_kept_and_other_objects_refused(
     assert "Traceback" not in err
 
 
+def test_a_result_that_holds_itself_is_refused_in_one_line(
+    dice: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = DICE.replace("eyes=int(rng.integers(1, 7))", "eyes=endless()")
+    endless = "\n\ndef endless():\n    rows = []\n    rows.append(rows)\n    return rows\n"
+    (dice / "site" / "dice_study.py").write_text(text + endless)
+    assert main(["dice", "--trials", "2", *ONE, "--out", "run"]) == 2
+    err = capsys.readouterr().err
+    assert "expected a result that can be kept, found one that holds itself" in err
+    assert err.count("\n") == 1, err
+
+
 def test_a_module_that_ends_the_program_hides_no_other(
     dice: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

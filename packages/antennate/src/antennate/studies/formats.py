@@ -181,7 +181,20 @@ def _toml(value: Any) -> str:
 
 
 def encoded(value: Any) -> Any:
-    """A value as what JSON can hold."""
+    """A value as what JSON can hold.
+
+    Raises:
+        TypeError: It has a part that cannot be kept, or holds itself.
+    """
+    try:
+        return _encoded(value)
+    except RecursionError:
+        raise TypeError(
+            "expected a result that can be kept, found one that holds itself or is nested too deep"
+        ) from None
+
+
+def _encoded(value: Any) -> Any:
     match value:
         case Enum():
             return {"@": _name(value), "value": value.value}
@@ -193,16 +206,16 @@ def encoded(value: Any) -> Any:
         case BaseModel():
             return {"@": _name(value), "fields": value.model_dump_json()}
         case tuple():
-            return {"@": "tuple", "of": encoded([*value])}
+            return {"@": "tuple", "of": _encoded([*value])}
         case list():
-            return [encoded(item) for item in value]
+            return [_encoded(item) for item in value]
         case Mapping():
             if all(isinstance(key, str) and key != "@" for key in value):
-                return {key: encoded(item) for key, item in value.items()}
-            return {"@": "dict", "of": [[encoded(k), encoded(v)] for k, v in value.items()]}
+                return {key: _encoded(item) for key, item in value.items()}
+            return {"@": "dict", "of": [[_encoded(k), _encoded(v)] for k, v in value.items()]}
     if not is_dataclass(value) or isinstance(value, type):
         raise TypeError(f"expected a result that can be kept, found {type(value).__name__}")
-    said = {field.name: encoded(getattr(value, field.name)) for field in fields(value)}
+    said = {field.name: _encoded(getattr(value, field.name)) for field in fields(value)}
     return {"@": _name(value), **said}
 
 
