@@ -53,6 +53,8 @@ def offered(script: Path, *words: str) -> list[str]:
         (["drive", "--controller", "m"], []),  # a robot has none
         (["tunnel", "--engine", ""], ["local", "dask", "slurm", "slurm-local", "warp"]),
         (["drive", "--robot", ""], ["scuttle", "hexapod"]),
+        (["robot", ""], ["scuttle", "hexapod", "--robot", "--out"]),
+        (["robot", "--robot", ""], ["scuttle", "hexapod"]),
         (["gait", "--gait", "b"], ["b11bl0"]),
         (["tunnel", "--control.gait", "b"], ["b11bl0"]),
         (["drive", "--control", "pa"], []),
@@ -89,6 +91,9 @@ def test_fish_gets_a_line_for_each_flag(capsys: pytest.CaptureFixture[str]) -> N
     assert all(line.startswith("complete -c antennate ") for line in lines)
     wire = "seen_subcommand_from antenna' -l wire -xa 'stainless_302 music_wire"
     assert sum(wire in line for line in lines) == 1
+    for name in ("", " -l robot"):
+        robot = f"seen_subcommand_from robot'{name} -xa 'scuttle "
+        assert sum(robot in line for line in lines) == 1
 
 
 def test_zsh_reads_the_script_of_bash(script: Path, capsys: pytest.CaptureFixture[str]) -> None:

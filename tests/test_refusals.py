@@ -239,11 +239,12 @@ tracks --files a.csv --points.left a :: points: right: expected as many points
 tracks --files a.csv --points.left a b --points.right none --criteria.flex 1 :: criteria.flex: expected the default, as it is not read with two points
 """
 ROBOT = """
-robot check :: --robot: expected scuttle, scuttle3d, hexapod or a TOML file, found 'check'
-robot scutle :: expected scuttle, scuttle3d, hexapod or a TOML file (did you mean scuttle?), found 'scutle'
-robot --export mjcf elsewhere :: --robot: expected scuttle, scuttle3d, hexapod or a TOML file, found 'elsewhere'
-robot hexapod scuttle :: expected flags only, found 'scuttle'
-robot --export mjc :: --export: expected one of mjcf or urdf, found mjc
+robot check :: error: expected scuttle, scuttle3d, hexapod or a TOML file, found 'check'; a folder for the results is given as --out FOLDER
+robot scutle :: error: expected scuttle, scuttle3d, hexapod or a TOML file (did you mean scuttle?), found 'scutle'
+robot --robot scutle :: error: --robot: expected scuttle, scuttle3d, hexapod or a TOML file (did you mean scuttle?), found 'scutle'
+robot --export mjcf elsewhere :: error: expected scuttle, scuttle3d, hexapod or a TOML file, found 'elsewhere'; a folder for the results is given as --out FOLDER
+robot hexapod scuttle :: expected flags only, found 'scuttle'; a folder for the results is given as --out FOLDER
+robot --export mjc :: --export: expected one of mjcf or urdf, found mjc; a folder for the results is given as --out FOLDER
 robot --export mjcf --scene tunle :: --scene: expected one of tunnel, :: did you mean tunnel?
 robot --export mjcf --scene tunnel --robot.width 0.5 :: at least robot.width, 0.5 m, found 0.4 m
 robot --export mjcf --scene tunnel --seed -4 :: --seed: expected a number of at least 0, found -4

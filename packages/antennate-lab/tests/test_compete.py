@@ -652,10 +652,24 @@ def test_shards_together_are_the_same_bytes_also_of_a_process_that_dies(
     assert main(["study", "merge", "part1", "part2", "--no-figures", "--out", "all"]) == 0
     for name in ("trials.csv", "result.json", "README.md", "config.toml"):
         assert Path("all", name).read_bytes() == Path("whole", name).read_bytes()
+
+
+@pytest.mark.ci
+def test_a_shard_of_hidden_seeds_is_refused_and_leaves_the_folder_as_it_is(
+    entries: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--controllers", "open", "--scenes", SHORT, "--trials", "1", "--no-figures"]
+    words += ["--workers", "1", "--hidden"]
+    assert main(["compete", *words, "--out", "run"]) == 0
+    Path("run/result.json").unlink()  # as of a run that goes on
+    before = {path: path.read_bytes() for path in Path("run").rglob("*.*")}
     capsys.readouterr()
-    assert main(["compete", *words, "--hidden", "--shard", "1/2", "--out", "none"]) == BAD_INPUT
-    assert "each shard would draw a seed of its own" in capsys.readouterr().err
-    assert not Path("none").exists()
+    for how in ("--resume", "--overwrite"):
+        given = [*words, "--shard", "1/2", how, "--out", "run"]
+        assert main(["compete", *given]) == BAD_INPUT
+        assert "each shard would draw a seed of its own" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in Path("run").rglob("*.*")} == before
+    assert not [*Path().glob("run.old*")]
 
 
 # seeds

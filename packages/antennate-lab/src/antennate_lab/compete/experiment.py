@@ -151,11 +151,6 @@ def run(
     """Run all episodes."""
     workers = workers_from(workers)
     workers = replace(workers, engine=workers.engine or Processes())
-    if workers.shard is not None and config.hidden:
-        raise ConfigError(
-            "--shard: expected no --hidden beside it, as each shard would draw a seed of its own; "
-            "give --seed"
-        )
     planned = draws(config)
     _NOTE.info(foretold(config, workers))
 
@@ -207,6 +202,11 @@ EXPERIMENT = Experiment.of_folder(
     settled=prepared,
     files=lambda config: {"README.md": lambda outcome: readme(outcome.result(), outcome.rows)},
     workers="here",
+    unshared=lambda config: (
+        "expected no --hidden beside it, as each shard would draw a seed of its own; give --seed"
+        if config.hidden
+        else ""
+    ),
     captions={
         "ranks": "Rank of each controller with its 95 % interval, and how often it succeeded with "
         "Wilson's.",

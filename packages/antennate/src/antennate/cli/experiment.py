@@ -133,11 +133,8 @@ def _require_possible(experiment: Experiment[Any, Any], options: Options, config
         raise ConfigError(
             f"--shard: expected a folder without a finished run, found {RESULT} in {options.out}"
         )
-    if experiment.tasks is not None and not experiment.tasks(config):
-        raise ConfigError(
-            "--shard: expected trials that are known before the run, found a plan whose trials "
-            "follow from others"
-        )
+    if why := experiment.unshared(config):
+        raise ConfigError(f"--shard: {why}")
 
 
 _MOST_SHARDS = 999_999

@@ -222,7 +222,7 @@ def _bash(options: Mapping[str, Sequence[Option]]) -> str:
     ]
     flags = []
     for command, own in options.items():
-        words = [w for o in own for w in (o.values if o.positional else [o.offered])]
+        words = [w for o in own for w in (*(o.values if o.positional else ()), *_flags(o))]
         flags.append(f"                '{command}') words='{' '.join([*words, *_HELP])}';;")
     parts = [
         f"        {name}) parts='{' '.join(names)}';;" for name, names in COMMAND_GROUPS.items()
@@ -230,6 +230,11 @@ def _bash(options: Mapping[str, Sequence[Option]]) -> str:
     names = " ".join([*dict.fromkeys(name.split()[0] for name in options), *_OWN])
     lines = {"parts": parts, "values": values, "flags": flags}
     return _BASH % {"commands": names, **{name: "\n".join(each) for name, each in lines.items()}}
+
+
+def _flags(option: Option) -> Sequence[str]:
+    """The flag that is offered, if any: a group has one, even where it may be given without."""
+    return [option.offered] if option.metavar == "NAME|FILE" or not option.positional else []
 
 
 def _fish(commands: Mapping[str, str], options: Mapping[str, Sequence[Option]]) -> Iterator[str]:
@@ -251,8 +256,8 @@ def _fish(commands: Mapping[str, str], options: Mapping[str, Sequence[Option]]) 
             values = " -r" * bool(option.metavar)
             if option.values:
                 values = f" -xa {_quoted(' '.join(option.values))}"
-            name = f" -l {option.offered[2:]}" * (not option.positional)
-            if name or option.values:
+            names = [""] if option.positional and option.values else []
+            for name in (*names, *(f" -l {flag[2:]}" for flag in _flags(option))):
                 yield f"{start} {_quoted(seen)}{name}{values} -d {_quoted(option.meaning)}"
         for flag in _HELP:
             yield f"{start} {_quoted(seen)} -l {flag[2:]}"

@@ -243,7 +243,10 @@ class Options(ResultOptions, RobotFileOptions):
 
 def command(argv: Sequence[str]) -> int:
     """Describe the robot, and write the diagram and the bill, or export it."""
-    config, options = parse_robot("robot", DESCRIPTION, DescribedRobot, argv, Options)
+    try:
+        config, options = parse_robot("robot", DESCRIPTION, DescribedRobot, argv, Options)
+    except ConfigError as error:
+        raise ConfigError(_with_folder(str(error), argv)) from None
     robot = config.robot
     files, result = None, {}
     if options.export is not None:
@@ -261,6 +264,14 @@ def command(argv: Sequence[str]) -> int:
         folder.finish(result)
         show_result(result, options, VIEW.tables(result), VIEW.sentence(result))
     return OK
+
+
+def _with_folder(why: str, argv: Sequence[str]) -> str:
+    """Why words are refused, without a flag that nobody typed; perhaps one of them is a folder."""
+    if why.startswith(("--robot: ", "--export: ", "expected flags only")):
+        why += "; a folder for the results is given as --out FOLDER"
+    typed_flags = {word.partition("=")[0] for word in argv}
+    return why if "--robot" in typed_flags else why.removeprefix("--robot: ")
 
 
 def _description(robot: RobotSpec, zeros: ZerosParams) -> tuple[dict[str, str], dict[str, Any]]:

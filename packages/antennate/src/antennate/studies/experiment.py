@@ -131,8 +131,9 @@ class Experiment(Generic[Config, Out]):
         workers: Where its trials may run: none (it has no trials on workers), here (processes of
             this machine) or anywhere (on other machines, too).
         tasks: tasks(config) -> an identity for each task. Tasks that stay the same with more trials
-            have the same, so a finished run can take more. None: that of its `Trials`. Without any
-            each trial follows from others, and a run has no shards.
+            have the same, so a finished run can take more. None: that of its `Trials`.
+        unshared: unshared(config) -> why a configuration cannot be run in shards: what is expected
+            and found; empty if it can.
         of_file: of_file(path) -> the configuration of a FILE that is given without a flag; None
             where only --config takes one.
         counted: What its steps are, beside the bar; else the name of the command stands there.
@@ -155,6 +156,7 @@ class Experiment(Generic[Config, Out]):
     body: Callable[[Any, Mapping[str, str]], str] | None = None
     workers: Literal["none", "here", "anywhere"] = "anywhere"
     tasks: Callable[[Config], Sequence[Any]] | None = None
+    unshared: Callable[[Config], str] = lambda config: ""
     of_file: Callable[[Path], Config] | None = None
     counted: str = ""
 

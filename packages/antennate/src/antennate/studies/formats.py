@@ -34,6 +34,7 @@ _NUMBERS = {
     float: re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?(e[+-]?[0-9]+)?|-?inf|nan"),
 }
 """Numbers as they are written."""
+_ENDLESS = "one that holds itself or is nested too deep"
 _FORMULA = ("=", "+", "-", "@")
 _BAR = re.compile(r"`([^`]*\|[^`]*)`|\|")
 
@@ -51,7 +52,10 @@ def strict(value: Any) -> Any:
 
 def to_json(value: Any) -> str:
     """Strict JSON, indented, as result.json holds it."""
-    return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
+    try:
+        return json.dumps(strict(value), indent=2, allow_nan=False, default=_refuse) + "\n"
+    except RecursionError:
+        raise BadInputError(f"expected a result that can be kept, found {_ENDLESS}") from None
 
 
 def pieces(content: str | bytes | Iterator[str]) -> Iterator[bytes]:
@@ -189,9 +193,7 @@ def encoded(value: Any) -> Any:
     try:
         return _encoded(value)
     except RecursionError:
-        raise TypeError(
-            "expected a result that can be kept, found one that holds itself or is nested too deep"
-        ) from None
+        raise TypeError(f"expected a result that can be kept, found {_ENDLESS}") from None
 
 
 def _encoded(value: Any) -> Any:

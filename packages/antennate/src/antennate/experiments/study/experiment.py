@@ -170,6 +170,12 @@ EXPERIMENT = Experiment.of_folder(
     result=StudyResult,
     settled=checked(check),
     tasks=planned,
+    unshared=lambda config: (
+        "expected trials that are known before the run, found a plan whose trials follow from "
+        "others"
+        if config.plan == "optuna"
+        else ""
+    ),
     captions={
         "effects": "The largest effects with their intervals, and how far noise alone would reach.",
         "map": "The response over two parameters, a map for each condition.",
