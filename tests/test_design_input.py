@@ -74,6 +74,18 @@ def test_what_does_not_suit_the_plan_is_one_line(
     assert expected in refusal(capsys, "study", "bad.toml")
 
 
+def test_former_keys_of_a_search_are_hinted_at_in_its_file_and_words_alone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("trials.toml").write_text("[evaluate.wall]\ntrials = 3\n")
+    said = refusal(capsys, "tunnel", "--config", "trials.toml")
+    assert "evaluate: expected a known key, found 'evaluate'" in said
+    Path("search.toml").write_text(f"{HEAD}{SHORT['FORCE']}\n{SHORT['GOOD']}\n")
+    said = refusal(capsys, "study", "search.toml", "--proposals", "8")
+    assert "(did you mean --points?), found '--proposals'" in said
+    assert "(did you mean" not in refusal(capsys, "tracks", "--proposals", "8")
+
+
 def test_lists_of_a_range_are_for_searches(capsys: pytest.CaptureFixture[str]) -> None:
     Path("bad.toml").write_text(
         'experiment = "wall"\nplan = "sobol"\n'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
@@ -111,16 +111,15 @@ def shown(value: Any) -> str:
 _RENAMED = {
     "arms": ("controllers", "profiles"),
     **dict.fromkeys(_OF_ANTENNA, ("antenna",)),
-    "proposals": ("points",),
-    "search": ("vary",),
-    "evaluate": ("experiment", "trials", "settings", "maximize", "minimize"),
 }
 """New names of what had another one in an earlier version."""
 _GONE = ("solver",)
 """Parameters that are no more; all is done as with their defaults."""
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
+def nearest(
+    word: str, known: Iterable[str], former: Mapping[str, Sequence[str]] | None = None
+) -> str:
     """A hint at the choice that was perhaps meant or at what to do instead, or nothing.
 
     A flag or key is also found by its last part: `--free-width` by `--tunnel.free-width`.
@@ -128,13 +127,14 @@ def nearest(word: str, known: Iterable[str]) -> str:
     Args:
         word: What was given.
         known: The valid choices.
+        former: What choices were called in an earlier version, and their names of now.
     """
     choices = {choice.lstrip("-"): choice for choice in known}
     wanted = word.lstrip("-").lower()
     if wanted in _GONE:
         return " (it is gone: leave it out)"
     ends = [name for name in choices if name.endswith(f".{wanted}")]
-    renamed = [name for name in _RENAMED.get(wanted, ()) if name in choices]
+    renamed = [name for name in (_RENAMED | dict(former or {})).get(wanted, ()) if name in choices]
     close = (
         renamed
         or ends[:2]

@@ -303,4 +303,7 @@ def _require_none(flag: str, known: Mapping[str, Option]) -> None:
     if flag in _ELSEWHERE:
         raise ConfigError(f"expected a flag of this command, found {flag}; {_ELSEWHERE[flag]}")
     if flag:
-        raise ConfigError(f"expected a known flag{nearest(flag, known)}, found {shown(flag)}")
+        models = {option.model for option in known.values()}
+        former = {k: v for model in models for k, v in getattr(model, "former", {}).items()}
+        meant = nearest(flag, known, former)
+        raise ConfigError(f"expected a known flag{meant}, found {shown(flag)}")

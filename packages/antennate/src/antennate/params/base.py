@@ -69,11 +69,13 @@ class Params(Strict):
         shared: Whether its file serves other commands too, and so may hold what is not read here.
         offered: Names that a field takes among others, by field, for help and completion. To list
             them may load the modules of all, so nothing else does.
+        former: What fields were called in an earlier version, and their names of now.
     """
 
     unread: ClassVar[tuple[str, ...]] = ()
     shared: ClassVar[bool] = False
     offered: ClassVar[Mapping[str, Collection[str]]] = {}
+    former: ClassVar[Mapping[str, Sequence[str]]] = {}
 
     def unread_here(self) -> Mapping[str, str]:
         """Further ones that nothing reads because of other values, and why. They are flags."""

@@ -122,7 +122,8 @@ def describe(
     if kind == "extra_forbidden":
         key, group = str(path[-1]), dotted(path[:-1])
         known = _keys(model, path[:-1])
-        what = f"a known key{f' of {group}' if group else ''}{nearest(key, known)}"
+        former = {} if group else getattr(model, "former", {})
+        what = f"a known key{f' of {group}' if group else ''}{nearest(key, known, former)}"
         return f"{where(path)}: expected {what}, found {shown(key)}{more}"
     place = where(path) if path else "the file"
     if kind == "json_invalid":

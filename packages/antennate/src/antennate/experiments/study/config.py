@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Tag, field_validator
 from pydantic.fields import FieldInfo
@@ -30,6 +30,12 @@ OF_SEARCH = (
 
 class StudyConfig(Planned):
     """Everything that decides the outcome of `antennate study`."""
+
+    former: ClassVar[Mapping[str, Sequence[str]]] = {
+        "proposals": ("points",),
+        "search": ("vary",),
+        "evaluate": ("experiment", "trials", "settings", "maximize", "minimize"),
+    }
 
     experiment: str = number(
         "tunnel", "1", "assumed: the question of the paper", examples=["tunnel", "wall"]
