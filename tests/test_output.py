@@ -225,6 +225,22 @@ def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     assert pip in pages
 
 
+def test_the_page_names_the_extras_that_the_locked_versions_leave_out() -> None:
+    lock = (ROOT / "requirements.lock").read_text()
+    locked = {name.lower() for name in re.findall(r"^([\w.-]+)==", lock, re.MULTILINE)}
+    left_out = set()
+    for name in ("antennate", "antennate-lab"):
+        project = tomllib.loads((ROOT / "packages" / name / "pyproject.toml").read_text())[
+            "project"
+        ]
+        for extra_name, needed in project["optional-dependencies"].items():
+            if not {re.split(r"[^\w.-]", each)[0] for each in needed} <= locked:
+                left_out.add(extra_name)
+    page = " ".join((ROOT / "docs" / "install.md").read_text().split())
+    said = re.findall(r"It brings all extras but ((?:`\w+`(?:, | and )?)+), tests", page)
+    assert set(re.findall(r"\w+", said[0])) - {"and"} == left_out
+
+
 TALKS = """
 import os
 

@@ -796,10 +796,10 @@ def weigh(name: str, files: Sequence[Path], write: bool) -> None:
     """Tell what the paper's data leave of the ranges, and perhaps write it."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     rows = read(files, group, unknowns)
-    outcome = FittedModels.of(rows, group)
+    fitted = FittedModels.of(rows, group)
     x = prior(unknowns, DRAWS).x
-    told = outcome.at(x)
-    likelihoods = outcome.likelihoods(told, group.paper)
+    told = fitted.at(x)
+    likelihoods = fitted.likelihoods(told, group.paper)
     weights = weights_of(likelihoods)
     result = {
         "trials": len(rows.x),
@@ -807,7 +807,7 @@ def weigh(name: str, files: Sequence[Path], write: bool) -> None:
         "mean": {n: round(float(np.nanmean(y)), 3) for n, y in rows.outcomes.items()},
         "models": {
             n: {"chosen": m.name, "loss": round(m.loss[0], 4), "constant": round(m.loss[1], 4)}
-            for n, m in outcome.models.items()
+            for n, m in fitted.models.items()
         },
         "effective_draws": round(1.0 / float((weights**2).sum()), 1),
         "evidence": {n: round(float(v.mean()), 5) for n, v in likelihoods.items()},
@@ -900,9 +900,9 @@ def following(name: str, files: Sequence[Path], told: argparse.Namespace) -> str
     """A study of settings drawn from what is left; by a power of the likelihood it is a search."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     draws = prior(unknowns, DRAWS, told.seed)
-    outcome = FittedModels.of(read(files, group, unknowns), group)
+    fitted = FittedModels.of(read(files, group, unknowns), group)
     said = {n: statement for n, statement in group.paper.items() if n in (told.only or group.paper)}
-    likelihoods = outcome.likelihoods(outcome.at(draws.x), said)
+    likelihoods = fitted.likelihoods(fitted.at(draws.x), said)
     weights = weights_of({n: likely**told.power for n, likely in likelihoods.items()})
     if told.count > (some := int((weights > 0).sum())):
         refuse(
@@ -1035,9 +1035,9 @@ def recover(name: str, files: Sequence[Path]) -> None:
     """Say whether hidden settings lie within what their own data leave."""
     group, unknowns = GROUPS[name], Unknowns.of(study_file(name))
     hidden = read(files[:1], group, unknowns)
-    outcome = FittedModels.of(read(files[1:], group, unknowns), group)
+    fitted = FittedModels.of(read(files[1:], group, unknowns), group)
     x = prior(unknowns, DRAWS).x
-    chances = outcome.at(x)
+    chances = fitted.at(x)
     told = inside = 0
     for place in sorted(set(hidden.points.tolist())):
         here = hidden.points == place
@@ -1046,7 +1046,7 @@ def recover(name: str, files: Sequence[Path]) -> None:
             known = y[here][np.isfinite(y[here])]
             if len(known):
                 said[n] = group.paper[n].again(known)
-        weights = weights_of(outcome.likelihoods(chances, said))
+        weights = weights_of(fitted.likelihoods(chances, said))
         print(f"hidden setting {place}: {said}, {1 / float((weights**2).sum()):.0f} draws")
         for k, (n, found) in enumerate(left_of(unknowns.names, x, weights).items()):
             if found["narrowed"] > NARROWED:
