@@ -599,7 +599,6 @@ for name in ("parent.mcap", "child.mcap"):
     child = os.fork() if name == "parent.mcap" else 0
     if child:
         sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-os._exit(0)
 """
 """A child that writes a log of its own after that of its parent."""
 
