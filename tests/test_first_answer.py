@@ -27,7 +27,7 @@ from antennate.studies.work import Here
 def test_a_long_run_says_after_each_quarter_how_it_stands(
     parts: int, tables: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    interim = Interim()
+    interim = Interim(["timed", "closed", "open"])
     with progress("trials", lambda: drawn_table(interim.table())) as step:
         for done in range(1, parts + 1):
             outcome = "success" if done % 2 else "left"
@@ -36,11 +36,27 @@ def test_a_long_run_says_after_each_quarter_how_it_stands(
     said = capsys.readouterr().err
     assert re.findall(r"So far, (\d+ trials)", said) == tables
     if tables:
-        assert re.findall(r"^ *(open|timed) +(\d+) +(\d+) *$", said, re.M) == [
-            *(("open", "2", "2"), ("timed", "3", "3")),
-            *(("open", "2", "2"), ("timed", "8", "8")),
-            *(("open", "2", "2"), ("timed", "13", "13")),
+        assert re.findall(r"^ *(open|closed|timed) +(.+?) +(\d+) *$", said, re.M) == [
+            *(("timed", "3 of 6", "3"), ("open", "2 of 4", "2")),
+            *(("timed", "8 of 16", "8"), ("open", "2 of 4", "2")),
+            *(("timed", "13 of 26", "13"), ("open", "2 of 4", "2")),
         ]
+
+
+def test_trials_that_say_nothing_are_no_failures_and_a_study_of_values_has_no_successes() -> None:
+    interim = Interim()
+    for outcome in ("success", "invalid", "left"):
+        interim.add({"controller": "mine/left.py:left", "outcome": outcome})
+    interim.add({"controller": "mine/left.py:left", "status": "crashed"})
+    table = interim.table()
+    assert table is not None
+    assert table.columns == ["successes", "crashed", "invalid", "left the scene"]
+    assert table.rows == [("left", ["1 of 2", "1", "1", "1"])]
+    values = Interim()
+    values.add({"profile": "tapered", "status": "ok"})
+    table = values.table()
+    assert table is not None
+    assert (table.columns, table.rows) == (["ok"], [("tapered", ["1"])])
 
 
 def test_controllers_take_turns_so_that_half_of_a_run_tells_of_each() -> None:

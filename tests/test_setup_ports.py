@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +12,8 @@ from setup_rig import Script
 
 from antennate.cli import keys
 from antennate.cli.keys import TerminalPerson
-from antennate.errors import BadInputError
-from antennate.hardware.setup.person import Quit, find_port, ports_like
+from antennate.errors import BadInputError, ConfigError
+from antennate.hardware.setup.person import Quit, all_ports, find_port, ports_like
 
 
 class Ports:
@@ -103,3 +104,10 @@ def test_no_standard_input_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", None)
     with pytest.raises(BadInputError, match="found no standard input"):
         TerminalPerson().ask("go on?")
+
+
+def test_without_pyserial_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serial.tools", None)
+    monkeypatch.delitem(sys.modules, "antennate.hardware.ports.serial_line", raising=False)
+    with pytest.raises(ConfigError, match=r"expected pyserial for real ports, .* --extra hardware"):
+        all_ports()

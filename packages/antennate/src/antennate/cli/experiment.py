@@ -200,7 +200,7 @@ def _outcome(
     if options.log and experiment.logs is not None:
         run.claim_names(f"{LOGS}/{name}" for name in experiment.logs(config))
         how["logs"] = run.path / LOGS
-    interim = Interim()
+    interim = Interim(_conditions(config))
 
     def on_row(row: Any) -> None:
         run.append(row)
@@ -215,6 +215,12 @@ def _outcome(
         told(package_of(experiment.config)),
     ):
         return experiment.run(config, workers, step, on_row, **how)
+
+
+def _conditions(config: Params) -> tuple[str, ...]:
+    """Names of the conditions of a run in the order of its tables, if its configuration says."""
+    names = ("conditions", "controllers", "profiles")
+    return next((getattr(config, name) for name in names if hasattr(config, name)), ())
 
 
 def _end(

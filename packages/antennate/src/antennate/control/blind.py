@@ -252,7 +252,7 @@ def _timed_reads(control: ControlParams, knows: Collection[str]) -> tuple[str, .
 KINDS = (
     ControllerKind(
         name="timed",
-        about="backs off and turns by the clock, whatever it feels: what closed has to beat",
+        about="backs off and turns by the clock, whatever it feels",
         make=timed,
         reads=_timed_reads,
         colour="#E69F00",

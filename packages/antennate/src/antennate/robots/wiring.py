@@ -183,7 +183,7 @@ def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) 
     main = power.rails[0].voltage
     for step, text in enumerate(
         (
-            f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more",
+            f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more\ncan feed a stall",
             f"fuse {power.fuse:g} A",
             f"emergency stop\n{power.stall:.0f} A",
         )

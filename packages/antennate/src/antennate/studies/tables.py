@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
+from antennate.control.readings import short_names
 from antennate.jackknife import ENOUGH
 from antennate.studies.columns import Column, Ends, columns, shown
 
@@ -68,10 +69,14 @@ def few(trials: Iterable[int]) -> str:
 
 
 class Interim:
-    """How the trials that have ended came out, while others run."""
+    """How the trials that have ended came out, while others run.
 
-    def __init__(self) -> None:
-        self._counts: dict[str, Counter[str]] = {}
+    Args:
+        conditions: Names of the conditions in the order of their lines; others come behind.
+    """
+
+    def __init__(self, conditions: Iterable[str] = ()) -> None:
+        self._counts: dict[str, Counter[str]] = {name: Counter() for name in conditions}
 
     def add(self, row: Any) -> None:
         """Count a row: a dataclass or a mapping with a condition and an outcome."""
@@ -82,23 +87,40 @@ class Interim:
             self._counts.setdefault(condition, Counter())[str(outcome)] += 1
 
     def table(self) -> Table | None:
-        """A line for each condition; None if it tells no more than how many."""
-        found = {outcome for counts in self._counts.values() for outcome in counts}
-        outcomes = sorted(found, key=lambda outcome: (outcome != "success", outcome))
+        """A line for each condition with a trial; None if it tells no more than how many."""
+        known = {name: counts for name, counts in self._counts.items() if counts}
+        found = {outcome for counts in known.values() for outcome in counts}
+        others = sorted(found - {"success"})
+        judged = not found <= _STATUSES
+        short = short_names(known)
         rows = [
-            (name, [str(counts[outcome]) for outcome in outcomes])
-            for name, counts in sorted(self._counts.items())
+            (
+                short[name],
+                [
+                    *([_of_judged(counts)] if judged else []),
+                    *(str(counts[outcome]) for outcome in others),
+                ],
+            )
+            for name, counts in known.items()
         ]
-        ended = sum(counts.total() for counts in self._counts.values())
-        tells = len(outcomes) > 1 or any(name != _ANY for name in self._counts)
-        words = [_WORDS.get(outcome, outcome) for outcome in outcomes]
+        ended = sum(counts.total() for counts in known.values())
+        tells = len(found) > 1 or any(name != _ANY for name in known)
+        words = [*["successes"] * judged, *(_WORDS.get(outcome, outcome) for outcome in others)]
         return Table(f"So far, {ended} trials", words, rows) if tells else None
+
+
+def _of_judged(counts: Counter[str]) -> str:
+    """Successes of the trials that say something, as `1 of 2`."""
+    valid = sum(count for outcome, count in counts.items() if outcome not in _STATUSES)
+    return f"{counts['success']} of {valid}"
 
 
 _CONDITIONS = ("controller", "profile")
 """Columns that tell a condition."""
-_WORDS = {"success": "successes", "timeout": "out of time", "left": "left the scene"}
+_WORDS = {"timeout": "out of time", "left": "left the scene"}
 """Outcomes as tables of results name them."""
+_STATUSES = {"ok", "nan", "invalid", "failed", "crashed", "hung"}
+"""What stands in place of an outcome where a trial has none, or says nothing."""
 _ANY = "trials"
 """Stands for all of them where there are no conditions."""
 

@@ -41,7 +41,7 @@ _OUTLINE = 0.7
 """Width of lines around the robot [points]: its antennae are thinner than that."""
 
 _OUTCOMES = {
-    "success": "out, {:.1f} s",
+    "success": "crossed, {:.1f} s",
     "timeout": "out of time",
     "left": "left the scene",
     "overturned": "overturned",

@@ -20,7 +20,6 @@ from urllib.parse import urlsplit
 
 from antennate.errors import BadInputError, ConfigError, reason
 from antennate.files import open_regular
-from antennate.messages import extra
 from antennate.params.hardware import NetworkParams
 from dynamixel_bus.port import Line, Port, PortError
 
@@ -130,13 +129,8 @@ def _place(address: str, flag: str) -> tuple[str, int]:
 
 
 def _serial(path: str, baud: int, flag: str) -> Callable[[], Line]:
-    try:
-        from antennate.hardware.ports.serial_line import SerialFinder
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"expected pyserial for real ports, found no module {error.name}; install it "
-            f"with {extra('hardware')}"
-        ) from None
+    from antennate.hardware.ports.serial_line import SerialFinder
+
     return SerialFinder(path, baud, flag)
 
 

@@ -22,11 +22,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from serial.tools import list_ports
-
+from antennate.errors import ConfigError
 from antennate.hardware.ports.errors import explain
+from antennate.messages import extra
 from dynamixel_bus import ports
 from dynamixel_bus.port import PortError
+
+try:
+    from serial.tools import list_ports
+except ModuleNotFoundError as error:
+    raise ConfigError(
+        f"expected pyserial for real ports, found no module {error.name}; install it with "
+        f"{extra('hardware')}"
+    ) from None
 
 
 class SerialPort(ports.SerialPort):
