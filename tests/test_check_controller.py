@@ -241,7 +241,7 @@ BROKEN = {
     ): "alone to answer as in a batch, found another yaw",
     ResetsAll: "the other rows to go on when one is reset",
     ResetsNothing: "a row that is reset to answer as a new one",
-    WalksBlind: "expected HOLD while an antenna reads nan",
+    WalksBlind: "expected HOLD while an antenna reads nan, found FORWARD",
     adding(
         "CreepsBlind", "leg", lambda self, frame: 1e-4 * frame.t[:, None, None]
     ): "expected joint targets that stand still in HOLD, found leg moves",

@@ -174,6 +174,23 @@ def test_a_study_knows_the_bounds_of_what_it_compares() -> None:
         assert few.points[0].response95 is None
 
 
+def test_a_study_calls_controllers_as_tunnel_does_and_counts_few_trials_by_point() -> None:
+    rows = [
+        {"point": point, "controller": name, "trial": 0, "status": "ok", "outcome": "success"}
+        for point in range(8)
+        for name in ("open", "mine/left.py:left")
+    ]
+    points = [{"tunnel.strewn": point} for point in range(8)]
+    found = studied(StudyConfig(plan="list"), points, {}, "controller", rows, 16, 16)
+    study = experiments.load("study")
+    (table,) = study.tables(found)
+    assert [head.partition(":")[0] for head in table.columns] == ["open", "left"]
+    assert "open 8 of 8" in study.sentence(found)
+    assert "left 8 of 8" in study.sentence(found)
+    assert "left.py" not in study.sentence(found)
+    assert "Fewer than 5 trials per point decide nothing" in study.sentence(found)
+
+
 def test_nothing_of_nothing_is_never_said() -> None:
     rows = [row("closed", 0, 20.0)]
     config = TunnelConfig(controllers=("open", "closed"), trials=3)
@@ -189,6 +206,9 @@ def test_nothing_of_nothing_is_never_said() -> None:
         assert "0 of 0" not in text
         assert "0 to 100" not in text
     assert "open without a valid trial" in texts[0]
+    found = crossed(TunnelConfig(controllers=("open",), trials=3), frame(lost))
+    assert "No trial of open is valid: " in TUNNEL.sentence(found)
+    assert not TUNNEL.tables(found)
 
 
 ABOUT = [
@@ -220,24 +240,30 @@ class Order(HTMLParser):
 def test_a_line_each_says_what_the_controllers_are_and_the_report_begins_with_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In the terminal above the table, in the report above it and behind the picture."""
+    """In the terminal above the table, in the report below the sentence, above the picture."""
     monkeypatch.chdir(tmp_path)
     words = ["--trials", "1", "--time-limit", "0.5", "--scene", "flat", "--workers", "1"]
     assert main(["tunnel", *words, "--out", "one"]) == 0
     printed = capsys.readouterr().out
     page = Order(Path("one/report.html"))
     assert page.seen[0] == "img"
+    assert "has to beat" not in page.text
     for text in (printed, page.text):
         places = [text.index(line) for line in ABOUT]
         assert places == sorted(places)
         assert places[-1] < text.index("Controllers")
         assert text.count(FEW) == 1
-    assert page.text.index("<img>") < page.text.index(ABOUT[0]) < page.text.index("<table>")
+    places = [page.text.index(text) for text in ("Trials that succeeded", *ABOUT, "<img>")]
+    assert places == sorted(places)
     alts = re.findall('<img alt="([^"]*)"', Path("one/report.html").read_text())
     assert alts == list(TUNNEL.captions.values())
     assert main(["report", "--compare", "one", "one"]) == 0
     both = Order(Path("comparison.html")).text
     assert all(both.count(line) == 1 for line in [*ABOUT, FEW])
+    assert main(["report", "--compare", "one", "one"]) == 2
+    refused = capsys.readouterr().err
+    assert "choose another with --out, or give --overwrite" in refused
+    assert "overwrite=True" not in refused
     assert both.index(ABOUT[-1]) < both.index("Controllers")
 
 

@@ -157,8 +157,7 @@ def replacing(path: Path, overwrite: bool = False) -> Iterator[Path]:
         raise
     except FileExistsError:
         raise OutputError(
-            f"{path}: expected no such file, found one; choose another name, --overwrite or "
-            "overwrite=True"
+            f"{path}: expected no such file, found one; choose another name or give overwrite=True"
         ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error

@@ -38,7 +38,10 @@ def ordered(result: Standing) -> list[str]:
 
 
 def tables(result: Standing) -> Sequence[Table]:
-    """Controllers, scenes, pairs; and what differs from a table that was checked."""
+    """Controllers, scenes, pairs; and what differs from a table that was checked.
+
+    Where no episode is valid there is none of the first three.
+    """
     names = ordered(result)
     short = short_names(names)
     rows = {short[name]: result.controllers[name] for name in names}
@@ -49,7 +52,9 @@ def tables(result: Standing) -> Sequence[Table]:
         Table.of("Controllers", rows, note=note, preface=about(names)),
         Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
     ]
-    if result.paired:
+    if len(none_valid(result)) == len(names):
+        parts.clear()
+    elif result.paired:
         parts.append(_pair_table(result.paired.values(), short))
     if result.check is not None and result.check.differ:
         parts.insert(0, _check_table(result.check))

@@ -18,10 +18,10 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.options import FoxgloveOptions, option
 from antennate.cli.pages import MODULE
-from antennate.cli.results import ResultOptions, log_of, show_result
+from antennate.cli.results import ResultOptions, log_of, require_new, show_result
 from antennate.cli.terminal import BAD_INPUT, OK, progress, stop_signals
 from antennate.control.readings import condition
-from antennate.errors import FAILURES, ConfigError, OutputError
+from antennate.errors import FAILURES, ConfigError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
 from antennate.messages import command_words, one_line, typed
 from antennate.params.base import Params, from_values
@@ -105,8 +105,7 @@ def command(argv: Sequence[str]) -> int:
     if options.json:
         raise ConfigError(f"--json: expected `info` beside it, found {options.action}")
     target = _target(path, options)
-    if target.exists() and not options.overwrite:
-        raise OutputError(f"expected no such file, found {target}; choose --out or --overwrite")
+    require_new(target, options.overwrite)
     actions: Mapping[str, Callable[[Path, Path], LogReader]] = {
         "recover": _recover,
         "export": _export,

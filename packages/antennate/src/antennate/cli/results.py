@@ -90,6 +90,15 @@ def folder_for(
         sys.stderr.write(f"{done} {folder.path}{before}\n")
 
 
+def require_new(path: Path, overwrite: bool) -> None:
+    """Refuse a file that is there, unless it may be replaced."""
+    if path.exists() and not overwrite:
+        raise OutputError(
+            f"{path}: expected no such file, found one; choose another with --out, or give "
+            "--overwrite"
+        )
+
+
 def log_of(path: Path) -> Path:
     """The log that is meant by its name, or by the folder of a run that has one."""
     if not path.is_dir():
@@ -117,7 +126,7 @@ def show_result(
     sentence: str,
     explained: str = "",
 ) -> None:
-    """Print the result: as JSON, or a sentence, then its tables and where they are explained."""
+    """Print the result: as JSON, or a sentence, then its tables and the file that explains them."""
     if options.json:
         write_result(to_json(result))
         return
@@ -129,8 +138,12 @@ def show_result(
         if i == 0:
             output.print()
         print_table(table)
-    if explained:
+    if explained and (_CLONE / explained).exists():
         output.print(Text(f"What the rows mean: {explained}"), soft_wrap=True)
+
+
+_CLONE = Path(__file__).parent / "../../../../.."
+"""Where the folder docs is, if this is a clone and no installed package."""
 
 
 def drawn_table(table: Table) -> Any:
@@ -255,6 +268,7 @@ def command(argv: Sequence[str]) -> int:
         raise OutputError(f"--out: expected no file that the page is made of, found {place}")
     if own and listed(runs[0]) is not None:
         RunDirectory.open(runs[0]).claim_names([REPORT])
+    require_new(place, own or options.overwrite)
     write_whole(place, text.encode(), overwrite=own or options.overwrite)
     sys.stderr.write(f"written to {place}\n")
     return OK

@@ -312,8 +312,8 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
         f"{rail.voltage:g} V": {**asdict(rail), "servos": len(rail.ids)} for rail in power.rails
     }
     note = (
-        f"A plug of a servo's cable carries at most 3 A: feed the chain for each {power.per_feed} "
-        f"servos, at {power.feeds} places."
+        f"A plug of a servo's cable carries at most 3 A, so feed power into the chain for every "
+        f"{power.per_feed} servos: {power.feeds} feeds."
     )
     rows = [
         (name, [NONE if row[key] is None else str(row[key]) for key in _COLUMNS])

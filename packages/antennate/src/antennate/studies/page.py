@@ -125,9 +125,14 @@ def numbers(table: Table) -> str:
     short = all(len(cell) < 30 for _, cells in table.rows for cell in cells)
     kind = "numbers" if short else ""  # short cells stand in columns, texts are left as they flow
     note = paragraphs(table.note, "muted")
-    lines = (line.partition(":") for line in table.preface.splitlines())
-    preface = "".join(f"<p><strong>{escape(a)}</strong>{b}{escape(c)}</p>" for a, b, c in lines)
-    return f"{preface}<h2>{escape(table.title)}</h2>{grid(columns, rows, kind)}{note}"
+    before = definitions(table.preface)
+    return f"{before}<h2>{escape(table.title)}</h2>{grid(columns, rows, kind)}{note}"
+
+
+def definitions(text: str) -> str:
+    """Lines of the form `name: what it is`, a paragraph each."""
+    lines = (line.partition(":") for line in text.splitlines())
+    return "".join(f"<p><strong>{escape(a)}</strong>{b}{escape(c)}</p>" for a, b, c in lines)
 
 
 def is_broad(table: Table) -> bool:

@@ -10,7 +10,7 @@ import json
 import shlex
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,7 @@ from antennate.studies.run_files import (
     TABLE,
     when_run,
 )
-from antennate.studies.tables import FEW, Table
+from antennate.studies.tables import FEW, FEW_PER_POINT, Table
 from antennate.studies.trial_file import TRIALS
 
 _MOST_REASONS = 20
@@ -118,11 +118,14 @@ def report(run: RunDirectory, view: View) -> str:
         else view.sentence(result)
     )
     parts.append(page.paragraphs(headline, "headline"))
+    tables = [] if result is None or view.body else view.tables(result)
+    parts += [page.definitions(table.preface) for table in tables]
     parts.append(page.block(run.text(BY_HAND), wrap=True))
     films = "".join(page.captioned(film, name) for name, film in _films(run).items())
     parts.append(f'<div class="pair">{films}</div>' if films else "")
     if result is not None:
-        parts.append(_shown(run, result, view))
+        bare = [replace(table, preface="") for table in tables]
+        parts.append(_shown(run, result, bare, view))
     parts.append(f"<h2>How it was run</h2>{page.paragraphs(_when(run, result))}")
     parts.append(page.block(_command(run, view), wrap=True))
     parts += [_failures(run), _settings(run, view), _versions(run)]
@@ -171,12 +174,11 @@ _SHOWN = ("controllers", "profiles")
 """Parameters whose entries have a film each."""
 
 
-def _shown(run: RunDirectory, result: Result, view: View) -> str:
+def _shown(run: RunDirectory, result: Result, tables: Sequence[Table], view: View) -> str:
     """Figures beside tables, or what the command shows in their place."""
     images = _images(run, view)
     if view.body is not None:
         return view.body(result, images)
-    tables = view.tables(result)
     words = "".join(page.numbers(table) for table in tables if not page.is_broad(table))
     figures = [page.captioned(image, view.caption(name)) for name, image in images.items()]
     broad = "".join(page.numbers(table) for table in tables if page.is_broad(table))
@@ -254,10 +256,11 @@ def compare(runs: Sequence[RunDirectory], view: View) -> str:
     parts.append(page.paragraphs(view.about.split("\n\n")[0], "muted"))
     sentences = [view.sentence(result) for result in results]
     for name, run, text in zip(names, runs, sentences, strict=True):
-        alone = page.paragraphs(text.replace(FEW, "").strip())
+        alone = page.paragraphs(text.replace(FEW, "").replace(FEW_PER_POINT, "").strip())
         parts.append(f"<h2>{page.escape(name)}</h2>{alone}")
         parts.append(page.block(_command(run, view), wrap=True))
-    parts.append(page.paragraphs(FEW if any(FEW in text for text in sentences) else ""))
+    said = [few for few in (FEW, FEW_PER_POINT) if any(few in text for text in sentences)]
+    parts += map(page.paragraphs, said)
     parts.append(_differing("Parameters", names, [_flat(run.text(CONFIG)) for run in runs]))
     parts.append(_differing("Versions", names, [run.versions() for run in runs]))
     parts += map(page.numbers, _side_by_side(names, [view.tables(r) for r in results]))

@@ -54,18 +54,20 @@ def of_valid(
 
 
 FEW = f"Fewer than {ENOUGH} trials decide nothing; their means have no interval."
+FEW_PER_POINT = FEW.replace("trials", "trials per point")
 
 
-def few(trials: Iterable[int]) -> str:
+def few(trials: Iterable[int], per_point: bool = False) -> str:
     """What is said where valid trials are too few for an interval of a mean; empty if they are not.
 
     Args:
         trials: Valid trials of each condition or point; those without any do not count.
+        per_point: Whether they are those of a point of a study.
     """
     some = [count for count in trials if count]
     if not some or min(some) >= ENOUGH:
         return ""
-    return FEW
+    return FEW_PER_POINT if per_point else FEW
 
 
 class Interim:

@@ -100,13 +100,14 @@ def _of_taper(found: Taper) -> Table:
 def _of_sensor(found: Sensor) -> Table:
     step = -(-(len(found.curve) - 1) // (_BENDS - 1))
     way = "rise" if found.polarity > 0 else "fall"
+    kind = "flex sensor" if found.kind == "flex" else "pressure strip"
     clipped = "\nThe range is clipped by the converter." if found.clipped else ""
     measures = columns(Point)
     return Table(
         "Sensor: static curve",
         [measure.title for measure in measures],
         [(f"{p.flex_deg:.0f} deg", [m.cell(p) for m in measures]) for p in found.curve[::step]],
-        f"A {found.kind} flex sensor: counts {way} with flex, over {found.counts_span:.0f} "
+        f"A {kind}: counts {way} with flex, over {found.counts_span:.0f} "
         f"counts.\nLoop: {100 * found.loop_width_share:.0f} % of the span wide. Creep: "
         f"{found.creep_counts:.0f} counts. Noise: {found.noise_sd_counts:.1f} counts.{clipped}",
     )

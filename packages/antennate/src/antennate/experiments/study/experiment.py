@@ -51,7 +51,7 @@ def _points(result: StudyResult) -> Table:
     for cell in result.points:
         by_point.setdefault(cell.point, []).append(cell)
     measure = result.measure
-    heads = [f"{name}: {measure.title}" if name else measure.title for name in names]
+    heads = [f"{result.label(name)}: {measure.title}" if name else measure.title for name in names]
     rows = [
         (
             str(number),
@@ -94,7 +94,8 @@ def _effects(result: StudyResult) -> Table:
             name,
             [
                 *(measures.cell(measure, *of[target].size) for target in targets),
-                ", ".join(t or "yes" for t, each in of.items() if each.above_noise) or NONE,
+                ", ".join(result.label(t) or "yes" for t, each in of.items() if each.above_noise)
+                or NONE,
             ],
         )
         for name, of in ranked
@@ -106,7 +107,7 @@ def _effects(result: StudyResult) -> Table:
         rows.insert(0, (f"noise of {result.sample}", [*floors, ""]))
     return Table(
         "Effects",
-        [*(target or measure.title for target in targets), "above the noise"],
+        [*(result.label(target) or measure.title for target in targets), "above the noise"],
         rows,
         note.format(measure.title),
     )
@@ -122,7 +123,7 @@ def _targets(result: StudyResult) -> tuple[list[str], str]:
 
 def _few(result: StudyResult) -> str:
     """What is said where a point has few trials."""
-    return few(cell.trials - cell.invalid for cell in result.points)
+    return few((cell.trials - cell.invalid for cell in result.points), per_point=True)
 
 
 def sentence(result: StudyResult) -> str:
@@ -132,7 +133,7 @@ def sentence(result: StudyResult) -> str:
     points = len({cell.point for cell in result.points})
     text = f"{result.experiment} at {points} points, {_ended(result)}"
     rates = [
-        (f"{name} " if name else "")
+        (f"{result.label(name)} " if name else "")
         + of_valid(each.successes, each.trials - each.invalid, each.wilson95)
         for name, each in result.conditions.items()
         if isinstance(each, Successes) and each.success_share is not None
@@ -150,7 +151,7 @@ def _depends(result: StudyResult) -> str:
     """What the response depends on, of the last target: the parameters above the noise."""
     _, last = _targets(result)
     known = result.known_effects(last)
-    what = "the " + " of ".join(filter(None, [result.measure.label, last]))
+    what = "the " + " of ".join(filter(None, [result.measure.label, result.label(last)]))
     above = [effect.parameter for effect in known if effect.above_noise]
     of = result.sample
     if above:
@@ -181,6 +182,7 @@ EXPERIMENT = Experiment.of_folder(
         "map": "The response over two parameters, a map for each condition.",
         "tradeoff": "Every design by its objectives, with the front, the references, and those run "
         "again with their intervals.",
-        "points": "The response against each parameter, with the interval of each point.",
+        "points": "The response against each parameter, with the interval of each point; "
+        "conditions stand a little aside of each other.",
     },
 )

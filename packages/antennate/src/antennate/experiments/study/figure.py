@@ -14,6 +14,7 @@ from antennate.experiments.study.effects import SUCCESS, Elementary, Slope
 from antennate.experiments.study.result import Cell, CellOfSuccesses, StudyResult
 from antennate.studies.columns import NONE, Column, shown
 from antennate.studies.experiment import Done
+from antennate.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +25,8 @@ _MOST_SIZES = 12
 _MOST_MAPS = 12
 _MOST_COLUMNS = 5
 """Columns of a map whose cells have room for interval and counts."""
+_ASIDE = 0.018
+"""Distance between two conditions at one place, over the width of all places."""
 _LINE = 0.135
 """Height of a line of small text [inches]."""
 _text = functools.partial(measures.text, digits=3)
@@ -56,7 +59,7 @@ def _draw_effects(result: StudyResult) -> Figure:
         known = sorted(result.known_effects(target), key=lambda each: abs(each.size[0] or 0.0))
         _draw_sizes(panel, known[-count:], measure, signed)
         some = f", the {count} largest of {parameters}" if count < parameters else ""
-        panel.set_title(f"{target or measure.label}{some}")
+        panel.set_title(f"{result.label(target) or measure.label}{some}")
     if signed:
         most = max(map(abs, panels[0].get_xlim()))
         panels[0].set_xlim(-most, most)
@@ -131,7 +134,7 @@ def _draw_maps(result: StudyResult) -> Figure:
     for panel, (name, rest) in zip(panels, drawn, strict=True):
         of = [c for c in cells if (c.condition, _rest(titles, c, others)) == (name, rest)]
         image = _draw_map(panel, of, (x, y), ends, measure, full)
-        panel.set_title(", ".join(filter(None, [name, rest])))
+        panel.set_title(", ".join(filter(None, [result.label(name), rest])))
         panel.set_ylabel(titles[y])
     panels[-1].set_xlabel(titles[x])
     title = measure.title
@@ -210,12 +213,14 @@ def _draw_lines(result: StudyResult) -> Figure:
         words = None
         if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
             words = list(dict.fromkeys(map(_text, values)))
-        for name, colour in zip(names, style.series(len(names)), strict=True):
+        shifts = _shifts(len(names), values if words is None else range(len(words)))
+        for name, colour, shift in zip(names, style.series(len(names)), shifts, strict=True):
             own = [cell for cell in cells if cell.condition == name]
             at = [cell.values[axis] for cell in own]
             x = at if words is None else [float(words.index(_text(v))) for v in at]
-            look = {"marker": "o", "color": colour, "label": name or None}
+            look = {"marker": "o", "color": colour, "label": result.label(name) or None}
             rows = [_scaled(cell, measure.scale) for cell in own]
+            x = [each + shift for each in x]
             style.intervals(panel, x, rows, ("response", "response95"), **look)
         if words is not None:
             style.categories(panel, words)
@@ -224,6 +229,12 @@ def _draw_lines(result: StudyResult) -> Figure:
     if len(names) > 1:
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
+
+
+def _shifts(count: int, places: Sequence[float]) -> Floats:
+    """How far aside of its place each condition stands, so that none covers another."""
+    width = float(max(places) - min(places)) or 1.0
+    return _ASIDE * width * (np.arange(count) - (count - 1) / 2)
 
 
 def _scaled(cell: Cell, scale: float) -> dict[str, Any]:

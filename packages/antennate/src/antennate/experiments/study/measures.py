@@ -12,7 +12,7 @@ from antennate import experiments
 from antennate.experiments.study.effects import SUCCESS
 from antennate.params.base import Params
 from antennate.sim.scenes.registry import TUNNEL, shared_limit
-from antennate.studies.columns import Column, columns, named, shown
+from antennate.studies.columns import Column, columns, condition_of, named, shown
 from antennate.studies.experiment import Experiment
 
 _SHARE = Column(SUCCESS, "share of successes", "%", form=".0f", scale=100.0)
@@ -113,6 +113,12 @@ def silent(statuses: Mapping[str, int]) -> str:
     """What is said of trials that say nothing, empty if all are ok."""
     counts = ", ".join(f"{n} {name}" for name, n in statuses.items() if name != "ok")
     return f". Trials that say nothing: {counts}; trials.csv has why" if counts else ""
+
+
+def of_controllers(experiment: str) -> bool:
+    """Whether the conditions of this experiment are controllers."""
+    known = _experiment(experiment)
+    return bool(known and known.row and condition_of(known.row) == "controller")
 
 
 def _experiment(name: str) -> Experiment[Any, Any] | None:

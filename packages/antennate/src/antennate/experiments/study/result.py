@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from antennate.control.readings import short_names
 from antennate.experiments.study.config import StudyConfig
 from antennate.experiments.study.designs import Search
 from antennate.experiments.study.effects import SUCCESS, Elementary, Slope, effects, value
-from antennate.experiments.study.measures import NO_RESULT, bounds, measure_of
+from antennate.experiments.study.measures import NO_RESULT, bounds, measure_of, of_controllers
 from antennate.studies import statistics
 from antennate.studies.columns import Column, Ends, column, tabular
 from antennate.studies.plan import Axes, Kind, Point
@@ -106,6 +107,11 @@ class StudyResult:
     def measure(self) -> Column:
         """The response, with its label and its unit."""
         return measure_of(self.experiment, self.response or "response")
+
+    def label(self, name: str) -> str:
+        """Short name of a condition, or of the difference of two."""
+        short = short_names(self.conditions) if of_controllers(self.experiment) else {}
+        return " minus ".join(short.get(each, each) for each in name.split(" minus "))
 
     @property
     def sample(self) -> str:

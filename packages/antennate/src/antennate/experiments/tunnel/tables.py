@@ -25,7 +25,9 @@ _JOINED = (
 
 
 def tables(result: TunnelResult) -> Sequence[Table]:
-    """The controllers one by one and two by two."""
+    """The controllers one by one and two by two; none where no trial is valid."""
+    if not any(_valid(result)):
+        return ()
     controllers, limit = result.controllers, result.time_limit_s
     until = "its limit, of each trial its own" if limit is None else f"the time limit, {limit:g} s"
     short = short_names(controllers)

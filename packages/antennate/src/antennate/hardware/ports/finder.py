@@ -18,7 +18,7 @@ from queue import Empty, SimpleQueue
 from typing import TypeVar
 from urllib.parse import urlsplit
 
-from antennate.errors import BadInputError, ConfigError, reason
+from antennate.errors import BadInputError, reason
 from antennate.files import open_regular
 from antennate.params.hardware import NetworkParams
 from dynamixel_bus.port import Line, Port, PortError
