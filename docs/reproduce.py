@@ -51,9 +51,9 @@ HEAD = """\
 # The paper, claim by claim
 
 Every claim of the paper ([arXiv:2603.07795](https://arxiv.org/abs/2603.07795)) in our words, the
-criterion it has to meet, what the simulation finds, and a verdict. The criterion, the rival that a
-claim is held against and the best that it can be are written down with the claim, in the program,
-and stand before the result here, in the table of the command and in `result.json`.
+criterion it has to meet, what the simulation finds, and a verdict. Each claim lists its criterion,
+its rival and its best possible verdict. They are written in the program with the claim, and stand
+before the result here, in the table of the command and in `result.json`.
 
 | verdict | meaning |
 |---|---|
@@ -230,13 +230,13 @@ def verdicts(found: Mapping[str, Any], fitted: Rows) -> str:
     return "\n".join(lines) + "\n"
 
 
-def on_index(index: str, found: Mapping[str, Any] | None, fitted: Rows) -> str:
+def on_index(index: str, found: Mapping[str, Any] | None) -> str:
     """The home page with today's counts between its two marks."""
     before, rest = index.split(BEGIN + "\n")
     _, after = rest.split(END)
     line = ""
     if found is not None:
-        line = f"Of its {counts(found, fitted)} {BEST}\n"
+        line = f"Of its {counts(found, {})} {BEST}\n"
     return f"{before}{BEGIN}\n{line}{END}{after}"
 
 
@@ -251,7 +251,7 @@ def main() -> None:
     made = " and ".join(f"`docs/science/{path.name}`" for path in FILES.values())
     finish(__file__, page, source=made)
     index = (ROOT / "index.md").read_text(encoding="utf-8")
-    finish(__file__, on_index(index, found, fitted), "index.md")
+    finish(__file__, on_index(index, found), "index.md")
 
 
 if __name__ == "__main__":

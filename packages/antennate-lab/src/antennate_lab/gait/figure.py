@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from antennate import figures as style
-from antennate.types import Maneuver
+from antennate.types import Floats, Maneuver
 from antennate_lab.gait.experiment import Walks
 from antennate_lab.gait.physics import Walk
 from antennate_lab.gait.result import GaitResult, UnknownNumbers
@@ -105,13 +107,23 @@ def unknown(numbers: UnknownNumbers, configured: float, measured: float | None) 
     alone.sharex(draws)
     _draw_draws(draws, numbers)
     _draw_alone(alone, numbers)
-    alone.axvline(configured, color=style.MUTED, linewidth=1.0, zorder=1)
+    rows = np.arange(len(numbers.parameters))
+    title = "Each alone;\ngrey is the run as configured"
+    _mark(alone, configured, rows, color=style.MUTED, linewidth=1.5)
+    if measured is not None:
+        draws.axvline(measured, color=style.SERIES[4], linestyle=(0, (4, 2)), label="measured")
+        _mark(alone, measured, rows, color=style.SERIES[4], linewidth=2.0)
+        title += ", red what was measured"
+    alone.set_title(title)
     for panel in (draws, alone):
-        if measured is not None:
-            panel.axvline(measured, color=style.SERIES[4], linestyle=(0, (4, 2)), label="measured")
         panel.set_xlabel("body lengths a cycle")
     draws.legend(loc="upper right", frameon=True, facecolor="white", edgecolor="none")
     return figure
+
+
+def _mark(panel: Axes, value: float, rows: Floats, **look: Any) -> None:
+    """A value at each row, in pieces that leave room for the names between the rows."""
+    panel.vlines(value, rows - 0.25, rows + 0.25, zorder=1, **look)
 
 
 def _draw_draws(panel: Axes, numbers: UnknownNumbers) -> None:
@@ -137,9 +149,8 @@ def _draw_alone(panel: Axes, numbers: UnknownNumbers) -> None:
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
             fontsize=8,
-            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
         )
     panel.set_yticks([])
+    panel.grid(visible=False)
     panel.set_ylim(-0.6, len(order) + 0.6)
-    panel.set_title("Each alone;\nthe grey line is the run as configured")
     panel.legend(loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none")

@@ -110,7 +110,11 @@ def _cable(robot: RobotSpec) -> list[str]:
 
 
 def _bus(axes: Axes, places: Sequence[Place]) -> None:
-    x, y = zip((_ADAPTER, _TOP - _STEP), *places, strict=True)
+    """The cable from the adapter on; it enters the first servo from above, beside its feed."""
+    (x, y), *_ = places
+    way = [(_ADAPTER, y)] if x == _ADAPTER else []
+    way = way or [(_ADAPTER, y + 0.4), (x + 0.35, y + 0.4), (x + 0.35, y)]
+    x, y = zip((_ADAPTER, _TOP - _STEP), *way, *places, strict=True)
     axes.plot(x, y, color=_DATA, linewidth=1.6, zorder=1)
 
 
@@ -188,7 +192,8 @@ def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) 
             f"emergency stop\n{power.stall:.0f} A",
         )
     ):
-        _box(axes, (_SUPPLY, _TOP - step * _STEP), text, _MAIN, 1.06)
+        height = 0.42 if "\n" in text.partition("\n")[2] else _HEIGHT
+        _box(axes, (_SUPPLY, _TOP - step * _STEP), text, _MAIN, 1.06, height)
     _line(axes, [(_ADAPTER, _TOP), (_ADAPTER, _TOP - _STEP)], _DATA, 1.6)
     _box(axes, (_ADAPTER, _TOP), "computer", style.INK, 0.9)
     _box(axes, (_ADAPTER, _TOP - _STEP), "USB adapter\n(U2D2)", _DATA, 0.9)
@@ -239,7 +244,7 @@ def _told(power: Supply) -> str:
     main, *others = power.rails
     return "\n".join(
         [
-            f"red: {main.voltage:g} V, a feed for each {power.per_feed} servos of the chain",
+            f"red: {main.voltage:g} V, a feed for every {power.per_feed} servos of the chain",
             *(f"orange: {rail.voltage:g} V" for rail in others),
             "blue: data of the servo bus",
             "black: ground, common to all",

@@ -25,7 +25,7 @@ _MOST_SIZES = 12
 _MOST_MAPS = 12
 _MOST_COLUMNS = 5
 """Columns of a map whose cells have room for interval and counts."""
-_ASIDE = 0.018
+_ASIDE = 0.025
 """Distance between two conditions at one place, over the width of all places."""
 _LINE = 0.135
 """Height of a line of small text [inches]."""
