@@ -246,7 +246,12 @@ def test_trajectories_are_a_grid_with_the_verdict_of_each_trial():
     figure = trajectories()
     titles = [panel.get_title(loc="left") for panel in figure.axes]
     assert len(titles) == len(USUAL) * 4
-    assert titles[:: len(USUAL)] == ["out, 10.0 s", "out, 20.0 s", "out of time", "left the scene"]
+    assert titles[:: len(USUAL)] == [
+        "crossed, 10.0 s",
+        "crossed, 20.0 s",
+        "out of time",
+        "left the scene",
+    ]
     assert len(figure.legends) == 1
     places = np.array([panel.get_position().bounds for panel in figure.axes]).reshape(4, -1, 4)
     assert (np.ptp(places[..., 0], axis=0) < 1e-9).all()  # a column of panels for each controller

@@ -123,7 +123,7 @@ def unknown(numbers: UnknownNumbers, configured: float, measured: float | None) 
 
 def _mark(panel: Axes, value: float, rows: Floats, **look: Any) -> None:
     """A value at each row, in pieces that leave room for the names between the rows."""
-    panel.vlines(value, rows - 0.25, rows + 0.25, zorder=1, **look)
+    panel.vlines(np.full(len(rows), value), rows - 0.35, rows + 0.1, zorder=1, **look)
 
 
 def _draw_draws(panel: Axes, numbers: UnknownNumbers) -> None:
