@@ -85,6 +85,11 @@ def test_each_way_to_end_is_counted_and_together_they_are_all_episodes() -> None
     assert markdown(result).splitlines()[2].endswith("| 2 | 1 | 1 |")
 
 
+def test_without_a_valid_episode_no_table_of_dashes_is_shown() -> None:
+    rows = [replace(row, outcome="invalid", reason="none") for row in rows_of("closed", [5.0])]
+    assert not tables(judged(rows))
+
+
 def test_a_difference_that_two_processors_make_is_a_tie() -> None:
     """200 and 198 of 200; 197 is beyond it."""
     first = rows_of("a", [10.0] * 200)

@@ -219,8 +219,9 @@ def _outcome(
 
 def _conditions(config: Params) -> tuple[str, ...]:
     """Names of the conditions of a run in the order of its tables, if its configuration says."""
-    names = ("conditions", "controllers", "profiles")
-    return next((getattr(config, name) for name in names if hasattr(config, name)), ())
+    values = (getattr(config, name, None) for name in ("conditions", "controllers", "profiles"))
+    known = next((value for value in values if isinstance(value, tuple)), ())
+    return tuple(map(str, known))
 
 
 def _end(
