@@ -349,6 +349,16 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_there(capsys, refused, tmp_p
     assert (tmp_path / "run" / "result.json").read_bytes() == before
 
 
+def test_no_memory_is_one_line(refused, monkeypatch):
+    def none(*args):
+        raise MemoryError
+
+    monkeypatch.setattr(os, "fsync", none)
+    assert refused(*QUICK, "--out", "run").endswith(
+        "error: expected more memory, found none left\n"
+    )
+
+
 def test_a_run_leaves_a_folder_that_explains_itself(capsys, tmp_path):
     assert main([*SMALL, "--seed", "5", "--out", "deep/run"]) == 0
     out, err = capsys.readouterr()

@@ -44,6 +44,7 @@ def dice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: dice-study\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text(
         "[antennate.experiments]\ndice = dice_study:EXPERIMENT\nbroken = dice_study:NOTHING\n"
+        "module = dice_study\n--help = dice_study:EXPERIMENT\nwe ird = dice_study:EXPERIMENT\n"
     )
     monkeypatch.syspath_prepend(str(site))
     monkeypatch.chdir(tmp_path)
@@ -132,6 +133,8 @@ def test_one_that_cannot_be_loaded_is_named_and_does_not_hide_the_others(
 ) -> None:
     with pytest.raises(BadInputError, match="dice_study:NOTHING"):
         experiments.load("broken")
+    with pytest.raises(BadInputError, match="an experiment at dice_study, found <module 'dice_"):
+        experiments.load("module")
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
     assert "dice" in out
@@ -145,8 +148,10 @@ def test_what_lists_all_leaves_out_one_that_cannot_be_loaded_and_says_so(
     assert main(list(words)) == 0
     out, err = capsys.readouterr()
     assert "controllers" in out
-    assert err.count("\n") == 1
+    assert err.count("\n") == 2
     assert "warning: broken: expected an experiment at dice_study:NOTHING" in err
+    assert "warning: module: expected an experiment at dice_study, found <module" in err
+    assert "we ird" not in out
 
 
 def test_two_of_one_name_are_refused_with_both_packages(

@@ -180,7 +180,11 @@ def test_all_that_tells_pip_to_install_antennate_names_the_others() -> None:
     """They are on no index, so pip finds them in the folder alone; uv knows where they are."""
     told = [(path, words) for path, words in installed_by_pip() if OWN_FOLDER.search(words)]
     assert Path("docs", "install.md") in dict(told)
-    assert [(path, words) for path, words in told if "/packages/*" not in words] == []
+    lower = [f"./packages/{room}" for room in ROOMS]
+    all_named = [
+        "/packages/*" in words or all(room in words.split() for room in lower) for _, words in told
+    ]
+    assert [pair for pair, named in zip(told, all_named, strict=True) if not named] == []
 
 
 def test_purcells_swimmer_takes_eight_lines() -> None:

@@ -203,6 +203,9 @@ def _run(name: str, words: Sequence[str], title: str) -> int:
     except FAILURES as error:
         sys.stderr.write(f"{title}: error: {one_line(reason(error))}\n")
         return BAD_INPUT
+    except MemoryError:
+        sys.stderr.write(f"{title}: error: expected more memory, found none left\n")
+        return BAD_INPUT
     except OSError as error:
         where = f"{shortened(str(error.filename))}: " if error.filename is not None else ""
         place = where_of(error, in_packages=False)

@@ -10,13 +10,14 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antennate.errors import BadInputError, in_one_line
-from antennate.messages import INSTALLATION, nearest, shortened
+from antennate.messages import INSTALLATION, nearest, shortened, shown
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -27,6 +28,7 @@ GROUP = "antennate.experiments"
 """Group of the entry points."""
 LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo")
 """Experiments of the distribution `antennate-lab`, which may not be installed."""
+_NAME = re.compile(r"\w[\w-]*")
 FITTED = "fitted"
 """What stands for a file of `fitted`, as in `--config fitted`."""
 
@@ -85,13 +87,17 @@ def load(name: str) -> Experiment[Any, Any]:
     """The experiment of this name."""
     if is_ours(name):
         return importlib.import_module(f"{__name__}.{name}.experiment").EXPERIMENT
+    from antennate.studies.experiment import Experiment
+
     entry = _entry(name)
+    wanted = f"{name}: expected an experiment at {entry.value}, found"
     try:
-        return entry.load()
+        found = entry.load()
     except (Exception, SystemExit) as error:  # a module may end the program when it is imported
-        raise BadInputError(
-            f"{name}: expected an experiment at {entry.value}, found: {in_one_line(error)}"
-        ) from error
+        raise BadInputError(f"{wanted}: {in_one_line(error)}") from error
+    if not isinstance(found, Experiment):
+        raise BadInputError(f"{wanted} {shown(found)}")
+    return found
 
 
 def unknown(name: str) -> str:
@@ -142,5 +148,7 @@ def _entries() -> dict[str, list[EntryPoint]]:
 
     found: dict[str, list[EntryPoint]] = {}
     for entry in installed(GROUP):
+        if not _NAME.fullmatch(entry.name):  # it could not be typed as a command
+            continue
         found.setdefault(entry.name, []).append(entry)
     return found
