@@ -68,6 +68,7 @@ class TwoGaits:
         wave: Amplitude [rad], wave number, lead [rad] and offset [rad] now, shape (B, 4).
         bent: Largest flex of each row, 0 to 1, shape (B,); `soften` lowers the amplitude
             by it.
+        frequency: Frequency [Hz].
         speed: Forward speed by the model [m/s].
         turning: Rate of a turn by the model [rad/s].
     """
@@ -93,6 +94,7 @@ class TwoGaits:
         self._robot, self._soften, self._gait = robot, own.soften, gait
         rates = (AMPLITUDE_RATE, NUMBER_RATE, LEAD_RATE, gait.offset_rate)
         self._most = control.period * np.array(rates)
+        self.frequency = gait.frequency
         self._advance = 2.0 * math.pi * gait.frequency * control.period
         self._swing = 2.0 * math.pi * gait.antenna_frequency * control.period
         self._joint = 2.0 * math.pi * np.arange(1, robot.links) / robot.yaw_count

@@ -87,6 +87,8 @@ class RuleController:
         contact: `Contact` of the last step, shape (B, 2).
         maneuver: `Maneuver` of the last step, shape (B,).
         gait: The gait and its phase.
+        fastest_gait: Fastest gait by which it walks [Hz]: the `frequency` of its gait, that of the
+            control if that gait has none.
         knows: Kinds of knowledge that its rule can use, as of `Knowing`.
         needs: Those that it needs.
     """
@@ -112,6 +114,8 @@ class RuleController:
         self.knows: tuple[Kind, ...] = getattr(rule, "knows", ())
         self.needs: tuple[Kind, ...] = getattr(rule, "needs", ())
         self.gait: Moves = gait or Gait(control.gait, robot, batch, control.period)
+        pace: Floats | float = getattr(self.gait, "frequency", control.gait.frequency)
+        self.fastest_gait = float(np.max(pace))
         self.level: Floats = np.zeros((batch, 2))
         self.contact: Ints = np.full((batch, 2), int(Contact.FREE))
         self.maneuver: Ints = np.full(batch, int(Maneuver.FORWARD))

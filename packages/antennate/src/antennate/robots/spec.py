@@ -309,6 +309,11 @@ class RobotSpec(Params):
         return tuple(group.fastest for _, group, count in self.groups for _ in range(count))
 
     @property
+    def fastest_gait(self) -> float:
+        """Fastest gait at which goals of rolling legs keep up [Hz], inf for lifting legs."""
+        return self.legs.fastest / (2.0 * math.pi) if self.legs.kind == "rolling" else math.inf
+
+    @property
     def servo_names(self) -> tuple[ServoName, ...]:
         """Servo model of each joint."""
         return tuple(group.servo for _, group, count in self.groups for _ in range(count))

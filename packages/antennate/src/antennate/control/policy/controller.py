@@ -166,6 +166,8 @@ class PolicyController:
         contact: `Contact` of the last step, shape (B, 2).
         maneuver: The `Maneuver` nearest to what was done, shape (B,); HOLD of an answer that is no
             number, and where a reading is UNKNOWN.
+        fastest_gait: Fastest gait by which it may walk [Hz]; 0 where its answers move the joints
+            themselves, and legs no faster than their `fastest`.
         void_decisions: Decisions since the reset whose answer was no number, shape (B,).
     """
 
@@ -176,6 +178,8 @@ class PolicyController:
         require_match(policy.contract, control, robot, where)
         interface = policy.contract.interface
         self._policy, self._ticks = policy, interface.ticks
+        paces = {"maneuver": control.gait.frequency, "gait": interface.frequency[1], "joints": 0.0}
+        self.fastest_gait = paces[interface.action]
         self._curves = curves(control)
         self._observer = Observer(interface, control, robot, batch)
         self._actor = make_actor(interface, control, robot, batch)

@@ -91,7 +91,7 @@ def connect(
         bus: Address of the servo bus.
         key: Of a board behind udp://; empty for one without a key.
     """
-    controller = make_controller(config.controller, config.control, config.robot)
+    controller = _controller(config)
     require_own_senses(controller, config.controller, "a drive")
     with contextlib.ExitStack() as stack:
         ports = ("--esp32", esp32, BOARD_BAUD), ("--bus", bus, config.robot.baud)
@@ -102,6 +102,20 @@ def connect(
             for flag, address, baud in ports
         )
         yield prepare(config, board, servos, HostClock(), bus, controller)
+
+
+def _controller(config: DriveConfig) -> Controller:
+    """The controller that is named, if the goals of the legs keep up with its gait."""
+    controller = make_controller(config.controller, config.control, config.robot)
+    pace: float = getattr(controller, "fastest_gait", config.control.gait.frequency)
+    if pace > (most := config.robot.fastest_gait):
+        own = pace != config.control.gait.frequency
+        raise BadInputError(
+            f"{f'gait of {config.controller}' if own else 'control.gait.frequency'}: expected at "
+            f"most {math.floor(1e3 * most) / 1e3:g} Hz, which robot.legs.fastest of "
+            f"{config.robot.legs.fastest:g} rad/s allows, found {pace:g}"
+        )
+    return controller
 
 
 def prepare(
@@ -116,6 +130,7 @@ def prepare(
 
     Without measured zeros and directions it gets no torque. `path` names the bus in error messages.
     """
+    controller = controller or _controller(config)
     board = Board(esp32, config.limits.stale_age)
     await_board(board, clock, bus, config.swapped)
     require_sensor(board.hello, config.sensor_id)
@@ -130,7 +145,7 @@ def prepare(
             master, Joints(config.robot), clock.now, config.limits.following
         ),
         clock=clock,
-        controller=controller or make_controller(config.controller, config.control, config.robot),
+        controller=controller,
         period=config.control.period,
         quality=SignalQuality(
             config.control.conditioning,
