@@ -89,7 +89,11 @@ class GaitParams(Params):
     known: ClassVar[tuple[str, ...]] = tuple(GAITS)
     choice: ClassVar[str] = f"{', '.join(GAITS)} (the first is the default), or a TOML file"
     frequency: float = number(
-        0.6, "Hz", "assumed: legs then turn at 55 % of the servo's no-load speed", gt=0, le=1.0
+        0.6,
+        "Hz",
+        "assumed: legs then turn at 55 % of the servo's no-load speed (docs/science/pace.md)",
+        gt=0,
+        le=1.0,
     )
     """Cycles per second."""
     wave_number: float = number(1.0, "1", "assumed: one wave, as in other robots", gt=0, le=3)
