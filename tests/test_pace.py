@@ -66,6 +66,9 @@ def test_a_policy_is_refused_by_the_fastest_gait_that_it_may_choose(
         constant(Path(f"{high}.onnx"), (0.5,) * 4, made)
     line = said(capsys, "--controller", "1.0.onnx")
     assert line.endswith(f"gait of 1.0.onnx: {ALLOWED}")
+    clock = LockstepClock(twin := watched(TwinConfig())[0])
+    by_keys = TeleopConfig(controller="1.0.onnx")  # which then does not walk
+    assert prepare(by_keys, BoardPort(twin, clock), clock, clock)
     assert "/no/" in said(capsys, "--controller", "0.7.onnx")
     made = contract(action="joints")
     constant(Path("joints.onnx"), (0.5,) * len(made.actions), made)

@@ -105,15 +105,16 @@ def connect(
 
 
 def _controller(config: DriveConfig) -> Controller:
-    """The controller that is named, if the goals of the legs keep up with its gait."""
+    """The controller that is named, if the goals of the legs keep up with the gait that walks."""
     controller = make_controller(config.controller, config.control, config.robot)
-    pace: float = getattr(controller, "fastest_gait", config.control.gait.frequency)
+    frequency = config.control.gait.frequency
+    walks = config.reader == config.controller  # by keys it does not
+    pace: float = getattr(controller, "fastest_gait", frequency) if walks else frequency
     if pace > (most := config.robot.fastest_gait):
-        own = pace != config.control.gait.frequency
+        name = "control.gait.frequency" if pace == frequency else f"gait of {config.controller}"
         raise BadInputError(
-            f"{f'gait of {config.controller}' if own else 'control.gait.frequency'}: expected at "
-            f"most {math.floor(1e3 * most) / 1e3:g} Hz, which robot.legs.fastest of "
-            f"{config.robot.legs.fastest:g} rad/s allows, found {pace:g}"
+            f"{name}: expected at most {math.floor(1e3 * most) / 1e3:g} Hz, which "
+            f"robot.legs.fastest of {config.robot.legs.fastest:g} rad/s allows, found {pace:g}"
         )
     return controller
 
