@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from lockstep import BoardPort, LockstepClock
-from policy_files import constant, contract
 
 from antennate.cli import main
 from antennate.errors import BadInputError
@@ -60,7 +59,10 @@ def test_a_controller_that_sets_its_own_pace_is_refused(
 def test_a_policy_is_refused_by_the_fastest_gait_that_it_may_choose(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    pytest.importorskip("onnxruntime")
+    for package in ("onnx", "onnxruntime"):
+        pytest.importorskip(package)
+    from policy_files import constant, contract
+
     for high in (1.0, 0.7):
         made = contract(action="gait", frequency=(0.2, high))
         constant(Path(f"{high}.onnx"), (0.5,) * 4, made)
