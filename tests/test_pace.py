@@ -31,9 +31,9 @@ def quick(control, robot, batch):
 
 def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The last line of a drive that ends with exit code 2 and leaves nothing behind."""
-    before = sorted(Path().iterdir())
+    before = {*Path().iterdir()}
     assert main(["drive", *words, *PORTS]) == 2
-    assert sorted(Path().iterdir()) == before
+    assert {*Path().iterdir()} <= before | {Path("__pycache__")}  # of a controller's own file
     return capsys.readouterr().err.splitlines()[-1]
 
 
