@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -45,9 +46,10 @@ def _one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def _registries_stay_as_they_are() -> Iterator[None]:
-    """What a test adds to a registry is known in its process from then on."""
-    before = {group: dict(objects) for group, objects in ADDED.items()}
+    """What a test adds to a registry, or by a file of its own to the path, is known ever after."""
+    before, path = {group: dict(objects) for group, objects in ADDED.items()}, [*sys.path]
     yield
+    sys.path[:] = path
     for group, objects in ADDED.items():
         objects.clear()
         objects.update(before.get(group, {}))
