@@ -25,8 +25,7 @@ import numpy as np
 from antennate.antenna import fitting
 from antennate.antenna.calibration import Calibration
 from antennate.antenna.curves import Samples
-from antennate.cli.experiment import carry_out
-from antennate.cli.experiment_options import Options
+from antennate.cli.experiment import Options, carry_out
 from antennate.errors import CalibrationError
 from antennate.experiments.calibrate.experiment import EXPERIMENT
 from antennate.experiments.calibrate.recording import Recording

@@ -19,7 +19,7 @@ import pytest
 
 from antennate import experiments
 from antennate.cli import main
-from antennate.cli.experiment_options import parsed
+from antennate.cli.experiment import parsed
 from antennate.control.registry import RIVAL
 from antennate.experiments import fitted
 from antennate.messages import command_words

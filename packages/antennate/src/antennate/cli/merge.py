@@ -12,8 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.experiment import carry_out, shard_of
-from antennate.cli.experiment_options import Options
+from antennate.cli.experiment import Options, carry_out, shard_of
 from antennate.cli.options import option
 from antennate.cli.results import ResultOptions
 from antennate.errors import BadInputError, ConfigError
