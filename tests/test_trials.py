@@ -16,7 +16,7 @@ from antennate.studies.experiment import Experiment
 from antennate.studies.pool import Workers
 from antennate.studies.trial_file import TrialFile
 from antennate.studies.trials import Trials, no_row, no_step
-from antennate.telemetry.view import Restart
+from antennate.telemetry import Restart
 
 
 class Config(Params):

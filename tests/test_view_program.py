@@ -21,7 +21,7 @@ from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams, RuleParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, picture, snapshot
-from antennate.telemetry.view import Restart
+from antennate.telemetry import Restart
 from antennate.telemetry.view.channel import (
     END,
     ORDER,

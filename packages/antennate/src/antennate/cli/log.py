@@ -31,13 +31,12 @@ from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOGS
 from antennate.studies.tables import Table
-from antennate.telemetry import FilmView
+from antennate.telemetry import PAGE_PORT, FilmView
 from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, parts
 from antennate.telemetry.reader import LogReader, left_out, recover
 from antennate.telemetry.survey import Survey
 from antennate.telemetry.ticks import JOINTS
 from antennate.telemetry.topics import EVENTS, MOTION
-from antennate.telemetry.view import PAGE_PORT
 
 if TYPE_CHECKING:  # these import much, for a page and for films
     from antennate.sim.trial import TrialConfig
@@ -321,7 +320,7 @@ def view(argv: Sequence[str]) -> int:
     _, options = parse("view", VIEW_DESCRIPTION, Params, argv, ShownOptions)
     if options.shown is None:
         raise ConfigError("expected a log or the folder of a run, found none")
-    from antennate.telemetry.view import Restart  # slow to import
+    from antennate.telemetry import Restart
     from antennate.telemetry.view.player import LogPlayer
     from antennate.telemetry.view.process import ViewProcess
 

@@ -21,7 +21,7 @@ from antennate.errors import ConfigError
 from antennate.messages import shortened
 from antennate.params.base import meaning
 from antennate.params.faults import group_of
-from antennate.telemetry.view import FOXGLOVE_PORT, PAGE_PORT
+from antennate.telemetry import FOXGLOVE_PORT, PAGE_PORT
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}

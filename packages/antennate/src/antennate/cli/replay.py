@@ -95,7 +95,7 @@ def _replayed(
             controller = recorded_controller(log.header, config.controller)
             readings = _readings(log, config, options)
             return log, replay(log, controller, log.header, readings=readings), ()
-    from antennate.telemetry.view import Restart  # these import much, for a page
+    from antennate.telemetry import Restart
     from antennate.telemetry.view.player import ReplayPlayer
 
     with page:

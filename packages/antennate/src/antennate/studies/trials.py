@@ -15,6 +15,7 @@ from antennate.studies.columns import Frame, condition_of
 from antennate.studies.pool import Workers, gather
 from antennate.studies.pooling import frame
 from antennate.studies.work import Fail, Failure, Together, no_failure, package_of
+from antennate.telemetry import Restart
 
 if TYPE_CHECKING:
     from antennate.telemetry.view.simulation import SimulationView
@@ -290,8 +291,6 @@ class Trials(Generic[Config]):
         view: SimulationView,
     ) -> None:
         """One trial on a page; begun anew with another seed whenever a person wants that."""
-        from antennate.telemetry.view import Restart  # a page that few runs want
-
         how = {"logs": logs} if logs else {}
         name = f"{condition}, trial {number}" if condition else f"trial {number}"
         while True:

@@ -4,3 +4,19 @@ from typing import Literal
 
 FilmView = Literal["above", "side"]
 """From where a walk is filmed: from above and behind, or from the right of its way."""
+PAGE_PORT = 8777
+"""Usual port of the page (assumed: nothing known uses it)."""
+FOXGLOVE_PORT = 8765
+"""Usual port of the WebSocket of Foxglove."""
+
+
+class Restart(Exception):
+    """A person wants the trial anew, with a seed; a log from its beginning.
+
+    Attributes:
+        seed: The seed.
+    """
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(f"restart with seed {seed}")
+        self.seed = seed

@@ -17,7 +17,7 @@ from antennate.experiments.tunnel.lockstep import Apparatus, Donors, Emit, Locks
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.sim.episode import Episode
 from antennate.sim.world import World
-from antennate.telemetry.view import Restart
+from antennate.telemetry import Restart
 from antennate.types import AntennaFrame, Controller, Floats, JointCommand
 
 if TYPE_CHECKING:

@@ -16,13 +16,13 @@ from antennate.params.control import ControlParams
 from antennate.params.scene import PhysicsParams
 from antennate.sim.shapes import VisibleModel
 from antennate.sim.world import World, compile_world
+from antennate.telemetry import Restart
 from antennate.telemetry.header import Header
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import recorded_controller
 from antennate.telemetry.survey import Record
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import CONTACT_FORCES, COORDINATES, EVENTS
-from antennate.telemetry.view import Restart
 from antennate.telemetry.view.channel import HEADER, POSES, SCENE, TICK, Channel, Poses
 from antennate.telemetry.view.pace import Pace, Tuning
 from antennate.types import Controller, Floats

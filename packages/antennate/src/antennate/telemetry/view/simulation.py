@@ -15,8 +15,8 @@ from antennate.figures import SERIES, rgba
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.shapes import VisibleModel, snapshot
+from antennate.telemetry import Restart
 from antennate.telemetry.ticks import Tick, numbers_of
-from antennate.telemetry.view import Restart
 from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
 from antennate.telemetry.view.pace import Pace, Tuning
 from antennate.types import AntennaFrame, Contact, Controller
