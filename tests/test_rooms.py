@@ -230,7 +230,7 @@ def test_one_runs_its_first_example_beside_those_that_it_needs(
         words = [programs / "antennate", "compete", "--help"]
         refused = subprocess.run(words, capture_output=True, text=True, check=False)
         assert (refused.returncode, refused.stdout) == (2, "")
-        assert "compete: expected the package antennate-lab" in refused.stderr
+        assert "expected the package antennate-lab, which has compete" in refused.stderr
 
 
 @pytest.mark.slow
