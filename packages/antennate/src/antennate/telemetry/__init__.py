@@ -1,4 +1,4 @@
-"""What is kept of a drive: every tick in one file, and its replay as a third world."""
+"""What is kept of a walk: every tick in one file, its replay, its film, and pages that show it."""
 
 from typing import Literal
 
