@@ -18,6 +18,7 @@ import antennate
 import antennate_lab
 import dynamixel_bus
 import geometric_locomotion
+from antennate.experiments import GROUP, LABORATORY
 
 ROOT = Path(__file__).parents[1]
 ROOMS = {
@@ -159,6 +160,12 @@ def test_one_asks_for_the_others_that_it_needs_in_that_version(room: str) -> Non
     project = tomllib.loads((ROOT / "packages" / room / "pyproject.toml").read_text())["project"]
     needed = {need for need in project["dependencies"] if "==" in need}
     assert needed == {f"{other}=={antennate.__version__}" for other in UPPER[room]}
+
+
+def test_the_experiments_of_the_laboratory_are_named_where_it_is_missed() -> None:
+    text = (ROOT / "packages" / "antennate-lab" / "pyproject.toml").read_text()
+    entries = tomllib.loads(text)["project"]["entry-points"][GROUP]
+    assert sorted(LABORATORY) == sorted(entries)
 
 
 @pytest.mark.parametrize("room", [*ROOMS, *UPPER])
