@@ -22,6 +22,7 @@ from sides import AXES, COLUMNS, SCENES, SEEDS, Design, designs, drawn
 
 from antennate.antenna.sensor import counts
 from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
+from antennate.sim.engine import mujoco
 from antennate.sim.knowledge import SIDE_AHEAD, angle_ahead, mean_direction
 from antennate.types import Floats
 
@@ -37,6 +38,13 @@ STEPS = 40
 WINDOWS = {"jammed": 10.0, "decision": 16.0}
 """How much of the past is read at each moment [s]."""
 SETS = {"antennae": ("touch",), "all": ("touch", "body"), "without antennae": ("body",)}
+BEYOND = {"range finders": ("range",), "range finders and body": ("range", "body")}
+"""Read of the ten best alone: what no antenna has."""
+FINDERS = (0.06, 0.02, 0.033, math.radians(60.0))
+"""Place of a range finder before and beside the middle of the head and above the floor [m], and its
+direction from the heading [rad]."""
+CONE, REACH, ERROR = math.radians(27.0), 1.3, 0.02
+"""Field of view [rad], largest distance in strong light and error [m] of a VL53L1X (ST)."""
 BOOTSTRAPS = 500
 AT = {name: i for i, name in enumerate(COLUMNS)}
 YAWS = slice(AT["yaw1"], AT["yaw5"] + 1)
@@ -73,6 +81,37 @@ def flexes(samples: Floats, design: Design) -> Floats:
     sensor = design.robot.antenna.sensor
     straight, bent = (float(counts(sensor, np.array(flex))) for flex in (0.0, math.pi / 2))
     return (straight - samples[:, [AT["left"], AT["right"]]]) / (straight - bent)
+
+
+def ranges(trial: Floats, scene: Any, rng: np.random.Generator) -> Floats:
+    """Readings of two range finders on the head [m], left and right, shape (n, 2).
+
+    The nearest surface of the drawn scene in the cone of each, with an error of each sample and one
+    of each sensor. What can be pushed stands where it began.
+    """
+    spec = mujoco.MjSpec()
+    scene.build(spec)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    before, beside, above, aside = FINDERS
+    spread = np.linspace(-CONE / 2.0, CONE / 2.0, 7)
+    found = np.full((len(trial), 2), REACH)
+    geoms, distances = np.zeros(len(spread), np.int32), np.zeros(len(spread))
+    for row, (x, y, heading) in enumerate(trial[:, [AT["x"], AT["y"], AT["heading"]]].tolist()):
+        ahead = np.array([math.cos(heading), math.sin(heading)])
+        for side, sign in enumerate((1.0, -1.0)):
+            place = [x, y] + before * ahead + sign * beside * np.array([-ahead[1], ahead[0]])
+            angles = heading + sign * aside + spread
+            rays = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+            mujoco.mj_multiRay(
+                *(model, data, np.append(place, above), rays.ravel(), None, 1, -1),
+                *(geoms, distances, None, len(spread), REACH),
+            )
+            met = distances[distances >= 0.0]
+            found[row, side] = met.min() if len(met) else REACH
+    error = rng.normal(0.0, ERROR, 2) + rng.normal(0.0, ERROR, found.shape)
+    return np.clip(found + error, 0.0, REACH)
 
 
 def _segment(values: Floats, first: int, end: int) -> Floats:
@@ -128,16 +167,17 @@ def _moved(
 _MIRRORED = {
     "touch": ([1, 0, 3, 2, 4, 5, 6, 8, 7], np.ones(9)),
     "body": ([*range(12), 13, 12], np.array([-1.0] * 12 + [1.0, 1.0])),
+    "range": ([1, 0, 2, 3, 4, 6, 5], np.ones(7)),
 }
 """Order and signs of the channels of a sequence in a mirror."""
 
 
-def _sequences(trial: Floats, flex: Floats, now: int, seconds: float) -> Any:
+def _sequences(trial: Floats, flex: Floats, far: Floats | None, now: int, seconds: float) -> Any:
     """Sequences up to a moment, by kind, and as in a mirror."""
     maneuver, stage = trial[:, AT["maneuver"]], trial[:, AT["stage"]]
     turn = 1.0 * (maneuver == 1) - (maneuver == 2)
-    kinds = [maneuver == 0, maneuver == 3, turn != 0.0, stage == 1, stage == 2]
-    own = np.stack(kinds, axis=1).astype(float)
+    done = [maneuver == 0, maneuver == 3, turn != 0.0, stage == 1, stage == 2]
+    own = np.stack(done, axis=1).astype(float)
     bases = trial[:, [AT["base_left"], AT["base_right"]]]
     legs = 5.0 * trial[:, [AT["lag_left"], AT["lag_right"]]]
     body = [
@@ -149,8 +189,10 @@ def _sequences(trial: Floats, flex: Floats, now: int, seconds: float) -> Any:
     ]
     every = round(seconds * RATE / STEPS)
     wanted = np.maximum(np.arange(now - every * STEPS, now), 0)
+    kinds = {"touch": [flex, bases, own], "body": body}
+    kinds |= {} if far is None else {"range": [far, own]}
     found = {}
-    for kind, parts in {"touch": [flex, bases, own], "body": body}.items():
+    for kind, parts in kinds.items():
         values = np.concatenate(parts, axis=1)[wanted].reshape(STEPS, every, -1).mean(axis=1)
         order, signs = _MIRRORED[kind]
         found[kind] = (values, values[:, order] * signs)
@@ -164,10 +206,20 @@ def _aside(trial: Floats, route: Floats, now: int) -> float:
     return angle_ahead(route, head, heading, SIDE_AHEAD)
 
 
-def events_of(trial: Floats, design: Design, seed: int) -> dict[str, list[Event]]:
-    """The moments of one episode: jammed, and after backing off and looking."""
+def events_of(
+    trial: Floats, design: Design, seed: int, beyond: bool = False
+) -> dict[str, list[Event]]:
+    """The moments of one episode: jammed, and after backing off and looking.
+
+    Args:
+        trial: Its samples.
+        design: What the robot carried.
+        seed: Of its draw.
+        beyond: Whether range finders are read, too.
+    """
     number = int(trial[0, 0])
     scene, flex = drawn(seed, number), flexes(trial, design)
+    far = ranges(trial, scene, np.random.default_rng([seed, number])) if beyond else None
     maneuver, stage = trial[:, AT["maneuver"]], trial[:, AT["stage"]]
     found: dict[str, list[Event]] = {moment: [] for moment in WINDOWS}
     for begin in (np.flatnonzero((maneuver[1:] == 3) & (maneuver[:-1] != 3)) + 1).tolist():
@@ -194,6 +246,8 @@ def events_of(trial: Floats, design: Design, seed: int) -> dict[str, list[Event]
                 "touch": _touched(flex, stretches, looks),
                 "body": _moved(trial, stretches, looks, end),
             }
+            if far is not None:
+                parts["range"] = _touched(far, stretches, looks)
             found[moment].append(
                 Event(
                     design.name,
@@ -203,7 +257,7 @@ def events_of(trial: Floats, design: Design, seed: int) -> dict[str, list[Event]
                     bool(trial[begin, AT["felt"]]),
                     {kind: odd for kind, (odd, _) in parts.items()},
                     {kind: even for kind, (_, even) in parts.items()},
-                    _sequences(trial, flex, end, WINDOWS[moment]),
+                    _sequences(trial, flex, far, end, WINDOWS[moment]),
                 )
             )
     return found
@@ -221,7 +275,7 @@ def gather(folder: Path, plan: str) -> dict[str, list[Event]]:
         design = known[path.stem.rpartition("_")[0]]
         for number in np.unique(samples[:, 0]):
             trial = samples[samples[:, 0] == number]
-            for moment, some in events_of(trial, design, SEEDS[plan]).items():
+            for moment, some in events_of(trial, design, SEEDS[plan], plan == "best").items():
                 found[moment] += some
     return found
 
@@ -425,15 +479,30 @@ def judge(events: list[Event], kinds: tuple[str, ...]) -> dict[str, dict[str, An
         signed = {label: left_out(table, scenes, own, how)[own] for label, how in OWN.items()}
         signed |= {label: scores[own] for label, scores in shared.items()}
         found[name] = {
-            label: {
-                "auc": round(area(scores), 3),
-                "interval_95": interval(scores, episodes[own]),
-                "interval_99_5": interval(scores, episodes[own], 0.995),
-                "scenes": _by_scene(scores, scenes[own]),
-            }
-            for label, scores in signed.items()
+            label: _told(scores, scenes[own], episodes[own]) for label, scores in signed.items()
         }
     return found
+
+
+def _told(signed: Floats, scenes: Any, episodes: Any) -> dict[str, Any]:
+    """An AUC with its intervals."""
+    return {
+        "auc": round(area(signed), 3),
+        "interval_95": interval(signed, episodes),
+        "interval_99_5": interval(signed, episodes, 0.995),
+        "scenes": _by_scene(signed, scenes),
+    }
+
+
+def pooled(events: list[Event], kinds: tuple[str, ...]) -> dict[str, Any]:
+    """AUC and interval of each estimator, of all designs together: for what no design changes."""
+    table = Table.of(events, kinds)
+    scenes = np.array([event.scene for event in events])
+    episodes = np.array([event.episode for event in events])
+    everyone = np.ones(len(events), dtype=bool)
+    estimators = OWN | {"network": network}
+    signed = {name: left_out(table, scenes, everyone, how) for name, how in estimators.items()}
+    return {label: _told(scores, scenes, episodes) for label, scores in signed.items()}
 
 
 def _by_scene(signed: Floats, scenes: Any) -> dict[str, float]:
@@ -511,6 +580,10 @@ def main(argv: list[str]) -> None:
                 design[moment]["felt"] = round(float(np.mean([e.felt for e in some])), 2)
                 design[moment][label] = told
             print(moment, label, len(events), flush=True)
+        for label, kinds in BEYOND.items() if asked.plan == "best" else ():
+            told = pooled(events, kinds)
+            result.setdefault("beyond", {}).setdefault(moment, {})[label] = told
+            print(moment, label, {name: [e["auc"], *e["interval_95"]] for name, e in told.items()})
     scores = {name: score_of(design) for name, design in result["designs"].items()}
     rank = smoothed(scores)
     for name, design in result["designs"].items():
