@@ -388,6 +388,7 @@ def test_plot_draws_a_log_of_absurd_numbers(
         ([], "expected the name of a log or of a run, found none"),
         (["show", "drive.mcap"], "expected one of info, recover, export, plot or film, found show"),
         (["info", "nothing.mcap"], "nothing.mcap: No such file"),
+        (["nothing.mcap"], "expected a log, found nothing.mcap: No such file"),
         (["info", "text"], "no intact header, 0 intact ticks; damaged places: 1"),
         (["info", "drive.mcap", "--out", "a"], "--out: expected no file for `info`"),
         (["info", "drive.mcap", "--overwrite"], "--overwrite: expected no file for `info`"),

@@ -88,7 +88,7 @@ class LogOptions(ResultOptions):
 
 def command(argv: Sequence[str]) -> int:
     """Look at one log."""
-    if argv and Path(argv[0]).exists():
+    if argv and (argv[0].endswith(".mcap") or Path(argv[0]).exists()):
         argv = ["info", *argv]
     _, options = parse("log", DESCRIPTION, Params, argv, LogOptions)
     if not options.log:
