@@ -19,6 +19,8 @@ _RIGHT_ANGLE = 0.5 * math.pi
 _Id = Annotated[int, Field(ge=0, le=252)]
 _Direction = Literal[-1, 1]
 _Zero = Annotated[int, Field(ge=-MOST_TICKS, le=MOST_TICKS)]
+_Backlash = Annotated[float, Field(ge=0, le=0.2)]
+_Factor = Annotated[float, Field(gt=0, le=2)]
 
 
 class JointParams(Params):
@@ -53,16 +55,19 @@ class JointParams(Params):
             count: Number of its joints.
         """
         for what in ("ids", "directions", "zeros"):
-            if (found := len(getattr(self, what))) not in (0, count):
-                raise ValueError(
-                    f"{name}.{what}: expected one for each of the {count} joints, found {found}"
-                )
+            _require_each(f"{name}.{what}", len(getattr(self, what)), count)
         for zero in self.zeros if math.isfinite(self.largest) else ():
             if not QUARTER <= zero <= STRAIGHT + QUARTER:
                 raise ValueError(
                     f"{name}.zeros must leave a quarter turn to both sides, {QUARTER} to "
                     f"{STRAIGHT + QUARTER} ticks, found {zero}"
                 )
+
+
+def _require_each(name: str, found: int, count: int) -> None:
+    """Refuse a list that is not empty and has not one entry for each of `count` joints."""
+    if found not in (0, count):
+        raise ValueError(f"{name}: expected one for each of the {count} joints, found {found}")
 
 
 class YawParams(JointParams):
@@ -72,6 +77,16 @@ class YawParams(JointParams):
         None, "rad", "assumed: as far as neighbouring legs stay apart", gt=0, le=_RIGHT_ANGLE
     )
     """Largest angle either way; from the robot's geometry if not given."""
+    backlash: tuple[_Backlash, ...] = number(
+        (), "rad", "assumed: none; not measured, a gear of this class has some 0.25 deg"
+    )
+    """Angle that each link turns freely between the ends of the play behind its servo's horn; none
+    if empty. The servo measures the horn."""
+
+    def require_lists(self, name: str, count: int) -> None:
+        """Refuse lists of a wrong length, that of the backlash too."""
+        super().require_lists(name, count)
+        _require_each(f"{name}.backlash", len(self.backlash), count)
 
     @property
     def largest(self) -> float:
@@ -110,6 +125,13 @@ class LegParams(JointParams):
         None, "m", "assumed: from the spine's surface to the width over the legs", ge=0, le=0.5
     )
     """Distance of a lifting leg's foot from its axis at 0 rad, to the side."""
+    friction_factors: tuple[_Factor, ...] = number((), "1", "assumed: all 1, which empty means")
+    """Friction of each leg on the floor over `leg_friction` of the robot."""
+
+    def require_lists(self, name: str, count: int) -> None:
+        """Refuse lists of a wrong length, that of the factors of friction too."""
+        super().require_lists(name, count)
+        _require_each(f"{name}.friction_factors", len(self.friction_factors), count)
 
     @property
     def largest(self) -> float:
@@ -139,6 +161,10 @@ class BaseParams(JointParams):
         le=_RIGHT_ANGLE,
     )
     """Largest angle either way from the mounting angle."""
+    right_stiffness: float = number(1.0, "1", "assumed: springs of one lot", ge=0.1, le=10)
+    """Stiffness of the springs of the right antenna over those of the left one."""
+    right_gain: float = number(1.0, "1", "assumed: flex sensors of one lot", ge=0.1, le=10)
+    """Bend that the right flex sensor feels over what the left one does."""
 
     @property
     def largest(self) -> float:

@@ -3,13 +3,13 @@
 The numbers and their sources are those of the model files (`dynamixel_bus.models`), and so are the
 meanings of a model's fields those of `ServoParams`. In position mode
 
-    drive    u = clip(gain (goal - q), -1, 1),   gain = P / divisor · 4096 / 2π / 885
+    drive    u = clip(gain (goal(t - delay) - q), -1, 1),   gain = P / divisor · 4096 / 2π / 885
     motor    τ = stall · v · u - stall / no_load_speed · ω
     friction |f| ≤ friction + load_friction · |τ|,   against the motion; it holds a shaft at rest
     shaft    (armature + inertia) ω' = τ + f - gravity · sin q
 
 v is the supply over the voltage at which stall torque and no-load speed are given. Without torque
-u and τ are 0.
+u and τ are 0. `replay` takes goals as they arrive, so without the delay.
 """
 
 from __future__ import annotations
@@ -76,6 +76,10 @@ class ServoParams(Params):
     """Friction at the output that is always there."""
     load_friction: float = _rated(XC430_W240, "load_friction")
     """Friction of the gear as a share of the torque of its motor."""
+    delay: float = number(
+        0.0, "s", "assumed: none; the bus and the loop of the servo take some ms", ge=0, le=0.05
+    )
+    """Time from a goal on the bus to the drive that follows it."""
 
     @property
     def model_number(self) -> int:

@@ -156,9 +156,27 @@ class RobotSpec(Params):
         return table
 
     @property
+    def right_antenna(self) -> AntennaSpec:
+        """The right antenna, whose springs may differ from those of the left, `antenna`."""
+        name = "three_coil_stiffness_n_mm_per_deg"
+        stiffness = self.antennae.right_stiffness * getattr(self.antenna, name)
+        return self.antenna.model_copy(update={name: stiffness})
+
+    @property
     def has_imu(self) -> bool:
         """Whether the antenna board carries an inertial sensor."""
         return self.imu.kind == "head"
+
+    @property
+    def leg_frictions(self) -> tuple[float, ...]:
+        """Friction of each leg on the floor, as many as `leg_names`."""
+        factors = self.legs.friction_factors or (1.0,) * self.leg_count
+        return tuple(self.leg_friction * factor for factor in factors)
+
+    @property
+    def backlash(self) -> tuple[float, ...]:
+        """Backlash of each yaw joint [rad], as many as `yaw_names`."""
+        return self.yaw.backlash or (0.0,) * self.yaw_count
 
     @property
     def hip(self) -> float:

@@ -40,6 +40,10 @@ GROUND_FRICTION = 0.3
 Side = Literal["left", "right"]
 STOPS: dict[str, Any] = {"limited": mujoco.mjtLimited.mjLIMITED_TRUE, "range": [-math.pi, math.pi]}
 """Ends of a joint that does not turn without end: half a turn either way (assumed)."""
+PLAY = "_play"
+"""What the name of the hinge of a joint's backlash ends with, after that of the joint."""
+_PLAY_STOP = (0.004, 1.0)
+"""Time constant of the ends of the play [s], the stiffest at the usual timestep, and damping."""
 
 
 def mounting_quaternion(angle: float, side: Side) -> tuple[float, float, float, float]:
@@ -142,7 +146,7 @@ def build_robot(params: RobotSpec) -> mujoco.MjSpec:
             _add_link_joints(spec, link, i, params)
         _add_link_shape(link, params)
         for s, sign in enumerate(SIDE_SIGN):
-            _add_leg(spec, link, params.leg_names[len(SIDES) * i + s], sign, params)
+            _add_leg(spec, link, len(SIDES) * i + s, sign, params)
         parent = link
     if params.antenna_count:
         _attach_antennae(spec, params)
@@ -176,6 +180,7 @@ def _add_servo(spec: mujoco.MjSpec, joint: str, servo: ServoParams) -> None:
     actuator.set_to_position(kp=servo.stiffness)
     actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
     actuator.forcerange = [-servo.stall_torque, servo.stall_torque]
+    actuator.delay = servo.delay
 
 
 def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: RobotSpec) -> None:
@@ -185,6 +190,16 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
     servo = params.servos.of(params.yaw.servo)
     _add_hinge(link, yaw, _YAW, at, servo, **STOPS)
     _add_servo(spec, yaw, servo)
+    if backlash := params.backlash[i - 1]:
+        link.add_joint(
+            name=yaw + PLAY,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=_YAW,
+            pos=at,
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            range=[-backlash / 2, backlash / 2],
+            solref_limit=_PLAY_STOP,
+        )
     servo = params.servos.of(params.pitch.servo)
     more = STOPS if params.pitch_count else {"stiffness": params.pitch.stiffness}
     _add_hinge(link, pitch, _PITCH, at, servo, **more)
@@ -211,9 +226,10 @@ def _add_link_shape(link: mujoco.MjsBody, params: RobotSpec) -> None:
 
 
 def _add_leg(
-    spec: mujoco.MjSpec, link: mujoco.MjsBody, name: str, sign: float, params: RobotSpec
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, sign: float, params: RobotSpec
 ) -> None:
     """A rolling leg turns about its axle; a lifting one about the spine, upwards if positive."""
+    name = params.leg_names[i]
     lateral = sign * (params.width - params.leg_width) / 2
     lifting = params.legs.kind == "lifting"
     hip = sign * params.hip if lifting else lateral
@@ -226,7 +242,7 @@ def _add_leg(
         pos=[0.0, lateral - hip, -params.leg_eccentricity],
         size=[params.leg_radius, params.leg_width / 2, params.leg_radius],
         mass=params.leg_mass,
-        friction=[params.leg_friction, 0, 0],
+        friction=[params.leg_frictions[i], 0, 0],
         priority=1,
         condim=3,
         contype=LEG_BIT,
@@ -242,13 +258,15 @@ def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
         side = "left" if sign > 0 else "right"
         turn = mounting_quaternion(params.antenna.base_angle, side)
         place = [params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0]
-        part = build_antenna(params.antenna, servo, side)
+        antenna = params.antenna if sign > 0 else params.right_antenna
+        part = build_antenna(antenna, servo, side)
         if params.elevation_count:
             carrier = _add_elevation(spec, head, params.elevation_names[i], place, sign, params)
             frame = carrier.add_frame(quat=mounting_quaternion(0.0, side))
         else:
             frame = head.add_frame(pos=place, quat=turn)
         spec.attach(part, frame=frame, prefix=prefix)
+        spec.actuator(prefix + BASE).delay = servo.delay
 
 
 def _add_elevation(

@@ -35,8 +35,8 @@ class Disturbance:
     Attributes:
         joint_bias: Error of the zero of each yaw joint [rad], shape (Y,).
         slip_ticks: Ticks from one friction of the legs to the next.
-        bends: 1 for each flex sensor that bends with its antenna, 0 for one that stays straight,
-            shape (2,).
+        bends: What each flex sensor feels of the bend of its antenna, 0 for one that stays
+            straight, shape (2,).
         imu_bias: Zeros of the inertial sensor [rad/s], then [m/s²], shape (6,); empty without one.
     """
 
@@ -52,7 +52,7 @@ class Disturbance:
         self.slip_ticks = max(1, round(variation.slip_time / period))
         self._noise = np.zeros((0, 2))
         self.joint_bias: Floats = rng.normal(0.0, variation.joint_bias, robot.yaw_count)
-        self.bends: Floats = np.ones(2)
+        self.bends: Floats = np.array([1.0, robot.antennae.right_gain])
         if variation.broken != "none":
             random = variation.broken == "random"
             side = int(rng.integers(2)) if random else ("left", "right").index(variation.broken)
@@ -95,7 +95,7 @@ class Disturbance:
         if tick % self.slip_ticks:
             return None
         factor = np.exp(self._rng.normal(0.0, self._variation.slip_log_sd, self._robot.leg_count))
-        return np.clip(self._robot.leg_friction * factor, 0.02, 2.0)
+        return np.clip(np.array(self._robot.leg_frictions) * factor, 0.02, 2.0)
 
 
 def _imu(robot: RobotSpec, batch: int) -> Imu:

@@ -44,6 +44,8 @@ PREFIX = "robot/"
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.0005)
 """Least and largest impedance of contacts, and the depth of the largest [m]: `solimp`."""
+_LINEAR = 1
+"""Goals between two of a servo with a delay are on a line, so that a delay may be any."""
 
 
 def new_spec(physics: PhysicsParams) -> mujoco.MjSpec:
@@ -86,6 +88,15 @@ def add_robot(spec: mujoco.MjSpec, robot: RobotSpec, physics: PhysicsParams) -> 
     spec.attach(build_robot(robot), frame=frame, prefix=PREFIX)
     spec.body(PREFIX + robot.link_names[0]).add_freejoint(name=PREFIX + "root")
     set_contacts(spec, physics)
+    for name in robot.joint_names:
+        _hold_goals(spec.actuator(PREFIX + name), physics.timestep)
+
+
+def _hold_goals(servo: mujoco.MjsActuator, timestep: float) -> None:
+    """Give a servo with a delay room for the goals that are under way."""
+    if servo.delay:
+        servo.nsample = math.ceil(servo.delay / timestep - 1e-9) + 1
+        servo.interp = _LINEAR
 
 
 def compile_world(
@@ -146,6 +157,7 @@ class World:
         self.data = mujoco.MjData(model)
         self.places = places = Places(model, robot, PREFIX)
         self._drive = places.drives
+        self._late: Bools = model.actuator_delay[places.drives] > 0.0
         self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
         stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
@@ -190,6 +202,7 @@ class World:
         q[self.root + 3 : self.root + 7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
         q[self.places.yaw] = yaw
         q[self.places.legs] = leg.ravel()
+        self.skip_delay(goals=self.drives())
         mujoco.mj_forward(self.model, self.data)
 
     def state(self) -> Floats:
@@ -223,6 +236,19 @@ class World:
         """Set all joint targets as `command` does, without a check."""
         self._ctrl[self._drive] = drive
 
+    def skip_delay(self, which: Bools | bool = True, goals: Floats | None = None) -> None:
+        """Let goals of servos arrive at once, and drop those that are under way.
+
+        Args:
+            which: Servos that it is done for, in the order of `command`, shape (n,); or all.
+            goals: The goals [rad], shape (n,); those of the last command by default.
+        """
+        goals = self._ctrl[self._drive] if goals is None else goals
+        for i in np.flatnonzero(self._late & which).tolist():
+            servo = self._drive[i]
+            held = np.full((self.model.actuator_history[servo, 0], 1), goals[i])
+            mujoco.mj_initCtrlHistory(self.model, self.data, servo, None, held)
+
     def drives(self) -> Floats:
         """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
         return self._qpos[self.places.driven]
@@ -230,6 +256,7 @@ class World:
     def place_drives(self, angles: Floats) -> None:
         """Put all driven joints at angles [rad], shape (n,), without physics."""
         self._qpos[self.places.driven] = angles
+        self.skip_delay(goals=angles)
         mujoco.mj_forward(self.model, self.data)
 
     def stand_on_tail(self) -> None:

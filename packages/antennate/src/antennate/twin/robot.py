@@ -161,7 +161,10 @@ class TwinRobot:
         return (self._ticks + 1) * self._period
 
     def begin_tick(self) -> Floats | None:
-        """A tick begins: the pulls of the servos, shape (n, 6), None before any has torque."""
+        """A tick begins: pulls of the servos, and which have a drive, shape (n, 7).
+
+        None before any has torque.
+        """
         self._ticks += 1
         self.bus.advance(self._ticks * self._period)
         self.t = max(self.t, self._ticks * self._period)
@@ -177,7 +180,9 @@ class TwinRobot:
             return None
         self._standing = False
         end = (self._ticks + 1) * self._period
-        return np.array([servo.pull(end, self._period) for servo in self.servos])
+        pulls = [servo.pull(end, self._period) for servo in self.servos]
+        driven = [servo.motion.driven for servo in self.servos]
+        return np.column_stack([pulls, driven])
 
     def move(self, pulls: Floats | None) -> Floats | None:
         """The physics of a tick: position, speed and drive of the shafts then, shape (3, n).
@@ -186,9 +191,10 @@ class TwinRobot:
         """
         if pulls is None:
             return None
-        goals, gain, push, brake, low, high = pulls.T
+        goals, gain, push, brake, low, high, driven = pulls.T
         self.command = self._joints.command(goals)
         self._body.write(self.command)
+        self._body.world(0).skip_delay(driven == 0.0)  # friction holds, not a goal
         bounds = np.sort(self._sign * np.stack([low, high]), axis=0)
         drives = np.vstack([gain, self._sign * push, brake, bounds])
         self._body.world(0).servo_drives.set(drives)

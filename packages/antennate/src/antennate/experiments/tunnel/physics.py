@@ -307,10 +307,10 @@ class TrialMonitor:
         hinges = len(world.bends())
         if not hinges:
             return SpringLoad()
-        antenna = world.robot.antenna
+        antenna, right = world.robot.antenna, world.robot.right_antenna
         angles = np.frombuffer(self._bends).reshape(-1, hinges)
         held = np.clip(angles, -antenna.range, antenna.range)
-        return largest_load(held, antenna.spring_stiffness())
+        return largest_load(held, antenna.spring_stiffness() + right.spring_stiffness())
 
     def result(self, world: Watched) -> TrialResult:
         """The row of the trial, which has ended."""

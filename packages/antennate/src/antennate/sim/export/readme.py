@@ -41,10 +41,12 @@ What the files hold
 -------------------
 Bodies    link0 is the head, behind it link1 and so on; leg_l0, leg_r0, ...; of antennae, if there
           are any, antenna_l_base, antenna_l_hinge0 and so on to the tip, antenna_r_... likewise
-Joints    as their bodies; between links yaw1, ... and pitch1, ...; the free joint is root
+Joints    as their bodies; between links yaw1, ... and pitch1, ...; the free joint is root;
+          yaw1_play, ... is the play behind the horn of a servo that has backlash
 Servos    actuators with the names of their joints; ctrl is the goal [rad]. The torque is
           gain (ctrl - angle), limited to that at standstill, less the joint's damping times its
-          speed: the line of torque and speed of the servo
+          speed: the line of torque and speed of the servo. One with a delay takes ctrl so much
+          later, in mujoco 3.17 or newer; walk.py lets it hold its angle until then
 Sensors   JOINT_angle [rad], JOINT_speed [rad/s], JOINT_torque [N·m] of each servo;
           antenna_l_angle0 [rad], ... of the hinges; antenna_l_touch0 [N], ... sum of the normal
           forces on a link; antenna_l_flex [rad], the sum of the hinges under the flex sensor;
@@ -66,7 +68,8 @@ Limits of goals, and how fast goals move. ctrlrange holds the first; the engine 
 Chance of a trial; there is none of it in gait.csv. An error of a joint's zero is added to its goal:
 {chance}
 From antenna_l_flex to the counts of a board: hysteresis, creep, divider, converter and noise of the
-flex sensor. In Python that is antennate.antenna.sensor.SensorChain.
+flex sensor. In Python that is antennate.antenna.sensor.SensorChain. It takes antenna_r_flex times
+{gain:g}, what the right sensor feels over the left one.
 Servos without torque, or with other gains and limits: the twin alone sets them.
 """
 _URDF = """\
@@ -123,6 +126,7 @@ def mjcf_readme(
         gears=_lines(f"{name}: {share:g}" for name, share in shares.items()),
         goals=_lines(f"{name}: {_limit(angle)}, {speed:g} rad/s" for name, angle, speed in goals),
         chance=_lines(f"{n} = {f.default}: {meaning(VariationParams, n)}" for n, f in fields),
+        gain=robot.antennae.right_gain,
         floor=FLOOR_BIT,
         ground=FLOOR_BIT | GROUND_BIT,
         obstacle=OBSTACLE_BIT,

@@ -34,7 +34,7 @@ _FOR_MUJOCO = {"fusestatic": "false", "discardvisual": "false"}
 yourdfpy passes over it."""
 LACKS = (
     "springs: antenna hinges and locked pitch joints",
-    "the law of the servos: gain, armature, friction that grows with the load",
+    "the law of the servos: gain, delay, armature, friction that grows with the load",
     "contact: friction, stiffness, which parts may touch; the crown of a leg",
     "sensors: flex, touch, joints, head",
     "a free base: most readers fix link0 to the world",

@@ -75,6 +75,10 @@ def head_in_model(model: mujoco.MjModel, walk: Walk) -> Floats:
     mujoco.mj_resetDataKeyframe(model, data, model.key(START).id)
     mujoco.mj_forward(model, data)
     servos = [model.actuator(name).id for name in walk.servos]
+    for servo in np.flatnonzero(model.actuator_delay).tolist():
+        angle = data.qpos[model.jnt_qposadr[model.actuator_trnid[servo, 0]]]
+        held = np.full((model.actuator_history[servo, 0], 1), angle)
+        mujoco.mj_initCtrlHistory(model, data, servo, None, held)
     steps = round(model.numeric(PERIOD).data[0] / model.opt.timestep)
     numerics = {model.numeric(i).name for i in range(model.nnumeric)}
     share = model.numeric(GEARS).data if GEARS in numerics else np.zeros(model.nu)

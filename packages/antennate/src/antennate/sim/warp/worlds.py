@@ -73,7 +73,7 @@ def _version(name: str) -> str:
         return ""
 
 
-_STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force")
+_STATE = ("qpos", "qvel", "ctrl", "qacc_warmstart", "actuator_force", "time", "history")
 _STATIC = ("geom_xpos", "geom_xmat")
 """Arrays of what does not move, which Warp computes for the first world alone."""
 _UNREAD = ("bvh_", "dof_M0")
@@ -173,6 +173,8 @@ class WarpWorlds:
             self._write(held, row, np.broadcast_to(value, held.shape[1:]))
 
     def _write(self, held: Any, row: int, value: Any) -> None:
+        if not held.size:  # as the history of servos without a delay
+            return
         part = held[row : row + 1]
         shape = (*part.shape, *getattr(held.dtype, "_shape_", ()))
         part.assign(np.asarray(value).reshape(shape))
