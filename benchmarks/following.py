@@ -60,8 +60,7 @@ class Trial:
         self._control = make_controller(name, config.control, config.robot)
         self._control.reset(np.array([0]), start.phase)
         self._monitor = TrialMonitor(start.episode(config.time_limit), name)
-        kinds = [config.robot.servos.of(kind) for kind in config.robot.servo_names]
-        self._stall = np.array([kind.stall_torque for kind in kinds])
+        self._stall = np.array([servo.stall_torque for servo in config.robot.joint_servos])
         self.following = Following(self._joints, FollowingParams())
         self._goals = self._joints.positions(body.world(0).drives())
         self.following.arm(self._goals, dict.fromkeys(config.robot.ids, FULL_DRIVE))

@@ -99,6 +99,6 @@ def _best(
 
 def _able(robot: RobotSpec, gait: GaitParams, points: Floats, walked: Cycle) -> Bools:
     """Whether the yaw servos have the torque, on their line at the fastest moment."""
-    servo = robot.servos.of(robot.yaw.servo)
+    servo = robot.servo_of(robot.yaw)
     speed = 2.0 * math.pi * gait.frequency * points[:, 0]
     return walked.torque <= servo.stall_torque * (1.0 - speed / servo.no_load_speed)

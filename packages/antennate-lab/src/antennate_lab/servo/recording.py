@@ -57,7 +57,9 @@ class ServoConfig(Params):
     """Everything that decides the outcome of `antennate servo`."""
 
     unread: ClassVar[tuple[str, ...]] = tuple(
-        f"servos.{name}.p_gain" for name in ServosParams.model_fields
+        f"servos.{name}.{what}"
+        for name in ServosParams.model_fields
+        for what in ("p_gain", "delay")
     )
     recording: tuple[str, ...] = number((), "1", "assumed: has to be named", metavar="FILE")
     """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""

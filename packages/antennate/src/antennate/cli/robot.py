@@ -26,7 +26,7 @@ from antennate.hardware.ports.finder import is_udp, read_key
 from antennate.messages import typed
 from antennate.params.base import Config, Params, read_file
 from antennate.params.hardware import ZerosParams
-from antennate.robots.parts import Rail, Supply, bill, servos_of, supply
+from antennate.robots.parts import Rail, Supply, bill, supply
 from antennate.robots.spec import RobotSpec
 from antennate.studies.columns import NONE, Column
 from antennate.studies.formats import to_csv
@@ -292,7 +292,7 @@ def _joints(robot: RobotSpec, zeros: ZerosParams) -> Iterator[tuple[str, dict[st
     lists = {"zero": robot.zeros, "direction": robot.directions}
     lacking = {what: unmeasured(robot, zeros, [f"{what}s"]) for what in lists}
     for at, (name, number, servo) in enumerate(
-        zip(robot.joint_names, robot.ids, servos_of(robot), strict=True)
+        zip(robot.joint_names, robot.ids, robot.joint_servos, strict=True)
     ):
         mode = "extended position" if robot.modes[number] == EXTENDED_MODE else "position"
         known = {w: None if name in lacking[w] else values[at] for w, values in lists.items()}

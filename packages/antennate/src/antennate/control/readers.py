@@ -13,10 +13,11 @@ from antennate.robots.joints import BaseParams, ElevationParams
 from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
 
+_GROUPS = ("yaw", "legs", "antennae", "pitch", "elevation")
 HARDWARE_ALONE = (
     *(
         f"robot.{group}.{name}"
-        for group in ("yaw", "legs", "antennae", "pitch", "elevation")
+        for group in _GROUPS
         for name in ("ids", "directions", "zeros", "limit", "fastest")
         if (group, name) != ("yaw", "limit")
     ),
@@ -48,6 +49,7 @@ SIMULATION_ALONE = (
             "imu.accel_bias",
         )
     ),
+    *(f"robot.{group}.gain_factor" for group in _GROUPS),
     *paths_of(ServosParams, "robot.servos"),
     *paths_of(AntennaSpec, "robot.antenna"),
 )
@@ -56,7 +58,7 @@ _OF_FOLLOWING = {
     f"robot.servos.{servo}.{name}"
     for servo in ServosParams.model_fields
     for name in ("p_gain", "gain_divisor", "no_load_speed")
-}
+} | {f"robot.{group}.gain_factor" for group in _GROUPS}
 UNDRIVEN = tuple(path for path in SIMULATION_ALONE if path not in _OF_FOLLOWING)
 """Parameters that a drive does not read; by models of its servos it judges if joints follow."""
 
@@ -72,6 +74,8 @@ def unused(robot: RobotSpec) -> dict[str, str]:
         reasons |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
     if robot.pitch.kind == "actuated":
         reasons["robot.pitch.stiffness"] = "only pitch joints of the kind locked have it"
+    else:
+        reasons["robot.pitch.gain_factor"] = "only pitch joints of the kind actuated have it"
     if not robot.elevation_count:
         names = (name for name in ElevationParams.model_fields if name != "kind")
         paths = (f"robot.elevation.{name}" for name in names)

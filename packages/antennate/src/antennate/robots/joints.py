@@ -41,6 +41,8 @@ class JointParams(Params):
         gt=0,
     )
     """Fastest that goals move."""
+    gain_factor: float = number(1.0, "1", "assumed: as of other servos of the model", ge=0.1, le=10)
+    """Gain of the position loop of the group's servos over that of their model."""
 
     @property
     def largest(self) -> float:

@@ -42,8 +42,8 @@ def body_of(robot: RobotSpec, frequency: float) -> Body:
     """The body of a robot that walks at a frequency [Hz]."""
     weight = np.full(robot.links, GRAVITY * (robot.link_mass + 2 * robot.leg_mass))
     weight[0] += GRAVITY * robot.antenna_count * robot.antenna.mass
-    pitch = robot.servos.of(robot.pitch.servo).stiffness
-    yaw = robot.servos.of(robot.yaw.servo)
+    pitch = robot.servo_of(robot.pitch).stiffness
+    yaw = robot.servo_of(robot.yaw)
     return Body(
         link_pitch=robot.link_pitch,
         link_weight=weight,
@@ -59,7 +59,7 @@ def feet_of(robot: RobotSpec, gait: GaitParams, wave_number: Floats, phase: Floa
 
     Legs follow their goals as their servos do: rolling ones lag by a constant angle.
     """
-    servo, omega = robot.servos.of(robot.legs.servo), _TURN * gait.frequency
+    servo, omega = robot.servo_of(robot.legs), _TURN * gait.frequency
     lateral = (robot.width - robot.leg_width) / 2
     if robot.legs.kind == "rolling":
         lag = omega * servo.damping / servo.stiffness

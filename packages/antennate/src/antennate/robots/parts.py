@@ -81,14 +81,9 @@ class Supply:
         return 0.8 * capacity / self.walking
 
 
-def servos_of(robot: RobotSpec) -> list[ServoParams]:
-    """The servo model of every joint."""
-    return [robot.servos.of(g.servo) for _, g, count in robot.groups for _ in range(count)]
-
-
 def supply(robot: RobotSpec) -> Supply:
     """The supply of a robot, from its description."""
-    servos = servos_of(robot)
+    servos = robot.joint_servos
     rails = tuple(
         _rail(
             voltage,
@@ -158,7 +153,7 @@ def bill(robot: RobotSpec) -> list[Part]:
 def _servos(robot: RobotSpec) -> list[Part]:
     counts: Counter[tuple[ServoModel, str]] = Counter()
     names = [name for name, _, count in robot.groups for _ in range(count)]
-    for servo, name in zip(servos_of(robot), names, strict=True):
+    for servo, name in zip(robot.joint_servos, names, strict=True):
         counts[servo.servo, name] += 1
     cables = len(robot.ids) + 1
     return [

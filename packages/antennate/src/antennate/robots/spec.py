@@ -29,7 +29,7 @@ from antennate.robots.joints import (
     PitchParams,
     YawParams,
 )
-from antennate.robots.servos import ServoName, ServosParams
+from antennate.robots.servos import ServoName, ServoParams, ServosParams
 from antennate.types import SIDES
 from dynamixel_bus.model import EXTENDED_MODE, POSITION_MODE
 
@@ -335,6 +335,18 @@ class RobotSpec(Params):
     def servo_names(self) -> tuple[ServoName, ...]:
         """Servo model of each joint."""
         return tuple(group.servo for _, group, count in self.groups for _ in range(count))
+
+    def servo_of(self, group: JointParams) -> ServoParams:
+        """Servo of the joints of a group: its model, with the gain that it has there."""
+        model = self.servos.of(group.servo)
+        if group.gain_factor == 1.0:
+            return model
+        return model.model_copy(update={"gain_divisor": model.gain_divisor / group.gain_factor})
+
+    @property
+    def joint_servos(self) -> tuple[ServoParams, ...]:
+        """Servo of each joint."""
+        return tuple(self.servo_of(group) for _, group, count in self.groups for _ in range(count))
 
     @property
     def models(self) -> dict[int, int]:

@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
 from antennate.robots.antenna import BASE
-from antennate.robots.parts import Supply, servos_of, supply
+from antennate.robots.parts import Supply, supply
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.types import SIDES
@@ -49,7 +49,7 @@ def wiring(robot: RobotSpec) -> Figure:
     axes.set_axis_off()
     axes.set_xlim(0.0, style.WIDTH)
     axes.set_ylim(low, 0.0)
-    servos = dict(zip(robot.joint_names, servos_of(robot), strict=True))
+    servos = dict(zip(robot.joint_names, robot.joint_servos, strict=True))
     order = _cable(robot)
     _bus(axes, [places[name] for name in order])
     converter = _CONVERTER - _lower(robot)

@@ -187,7 +187,7 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
     """A yaw joint with its servo, and a pitch joint that is locked or has one too."""
     at = [params.link_pitch / 2, 0.0, 0.0]
     yaw, pitch = params.yaw_names[i - 1], params.pitch_names[i - 1]
-    servo = params.servos.of(params.yaw.servo)
+    servo = params.servo_of(params.yaw)
     _add_hinge(link, yaw, _YAW, at, servo, **STOPS)
     _add_servo(spec, yaw, servo)
     if backlash := params.backlash[i - 1]:
@@ -200,7 +200,7 @@ def _add_link_joints(spec: mujoco.MjSpec, link: mujoco.MjsBody, i: int, params: 
             range=[-backlash / 2, backlash / 2],
             solref_limit=_PLAY_STOP,
         )
-    servo = params.servos.of(params.pitch.servo)
+    servo = params.servo_of(params.pitch)
     more = STOPS if params.pitch_count else {"stiffness": params.pitch.stiffness}
     _add_hinge(link, pitch, _PITCH, at, servo, **more)
     if params.pitch_count:
@@ -233,7 +233,7 @@ def _add_leg(
     lateral = sign * (params.width - params.leg_width) / 2
     lifting = params.legs.kind == "lifting"
     hip = sign * params.hip if lifting else lateral
-    servo = params.servos.of(params.legs.servo)
+    servo = params.servo_of(params.legs)
     leg = link.add_body(name=name, pos=[0.0, hip, 0.0])
     _add_hinge(leg, name, [sign, 0.0, 0.0] if lifting else _PITCH, [0.0, 0.0, 0.0], servo)
     leg.add_geom(
@@ -253,7 +253,7 @@ def _add_leg(
 
 def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
-    servo = params.servos.of(params.antennae.servo)
+    servo = params.servo_of(params.antennae)
     for i, (prefix, sign) in enumerate(zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True)):
         side = "left" if sign > 0 else "right"
         turn = mounting_quaternion(params.antenna.base_angle, side)
@@ -278,7 +278,7 @@ def _add_elevation(
     params: RobotSpec,
 ) -> mujoco.MjsBody:
     """The body that carries an antenna's base and turns it up; x is the antenna's direction."""
-    servo = params.servos.of(params.elevation.servo)
+    servo = params.servo_of(params.elevation)
     half = sign * params.antenna.base_angle / 2
     body = head.add_body(name=name, pos=place, quat=[math.cos(half), 0.0, 0.0, math.sin(half)])
     body.add_joint(

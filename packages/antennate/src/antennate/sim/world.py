@@ -160,7 +160,7 @@ class World:
         self._late: Bools = model.actuator_delay[places.drives] > 0.0
         self.gears = Gears(model, robot, PREFIX)
         names = [PREFIX + n for n in robot.joint_names]
-        stall = np.array([robot.servos.of(n).stall_torque for n in robot.servo_names])
+        stall = np.array([servo.stall_torque for servo in robot.joint_servos])
         self.servo_drives = ServoDrives(model, names, stall)
         self.root = places.root
         self._steps = 0

@@ -94,8 +94,7 @@ class TwinRobot:
         self._joints = Joints(robot)
         self.command = self._joints.command(np.array(robot.zeros, float))
         self._sign: Floats = np.array(robot.directions, float)
-        kinds = [robot.servos.of(name) for name in robot.servo_names]
-        self._stall: Floats = np.array([kind.stall_torque for kind in kinds])
+        self._stall: Floats = np.array([servo.stall_torque for servo in robot.joint_servos])
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id, robot.has_imu)
         self._boot_id = boot_id

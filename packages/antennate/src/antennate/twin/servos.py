@@ -30,17 +30,18 @@ five times what the watchdogs of servos with torque allow, less than a program t
 
 def servos_of(robot: RobotSpec) -> list[DrivenServo]:
     """The servos as the robot needs them: of its models, in its operating modes."""
-    kinds = [robot.servos.of(name) for name in robot.servo_names]
     return [
         _servo(servo, kind, robot.modes[servo], robot.baud)
-        for servo, kind in zip(robot.ids, kinds, strict=True)
+        for servo, kind in zip(robot.ids, robot.joint_servos, strict=True)
     ]
 
 
 def factory_new(robot: RobotSpec) -> list[DrivenServo]:
     """The servos of a robot as they come out of their boxes."""
-    kinds = (robot.servos.of(name) for name in robot.servo_names)
-    return [DrivenServo(kind.servo, kind.servo["id"].default or 1, drive=kind) for kind in kinds]
+    return [
+        DrivenServo(kind.servo, kind.servo["id"].default or 1, drive=kind)
+        for kind in robot.joint_servos
+    ]
 
 
 def _servo(servo: int, kind: ServoParams, mode: int, baud: int) -> DrivenServo:

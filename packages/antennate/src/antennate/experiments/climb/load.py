@@ -26,7 +26,7 @@ class PitchLoad:
     def __init__(self, world: World) -> None:
         robot = world.robot
         self._at = robot.places("pitch")
-        servo = robot.servos.of(robot.pitch.servo)
+        servo = robot.servo_of(robot.pitch)
         self._stall, self._slope = servo.stall_torque, servo.damping
         self._ampere = servo.stall_current / servo.stall_torque
         self._ticks = self._high = self._full = 0

@@ -58,7 +58,7 @@ class Following:
         well: Callable[[int], bool] = lambda servo: True,
     ) -> None:
         robot = joints.robot
-        kinds = [robot.servos.of(name) for name in robot.servo_names]
+        kinds = robot.joint_servos
         self._ids, self._names, self._well = joints.ids, robot.joint_names, well
         self._share, self._shortfall = params.share, params.shortfall
         self._time, self._stuck_time = params.time, params.stuck_time
