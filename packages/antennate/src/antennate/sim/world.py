@@ -246,8 +246,10 @@ class World:
         goals = self._ctrl[self._drive] if goals is None else goals
         for i in np.flatnonzero(self._late & which).tolist():
             servo = self._drive[i]
-            held = np.full((self.model.actuator_history[servo, 0], 1), goals[i])
-            mujoco.mj_initCtrlHistory(self.model, self.data, servo, None, held)
+            samples = self.model.actuator_history[servo, 0]
+            before = self.t + self.model.opt.timestep * np.arange(-samples, 0.0)[:, None]
+            held = np.full((samples, 1), goals[i])
+            mujoco.mj_initCtrlHistory(self.model, self.data, servo, before, held)
 
     def drives(self) -> Floats:
         """Angles of all driven joints, in the order of `command` [rad], shape (n,)."""
