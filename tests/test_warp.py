@@ -188,6 +188,19 @@ def test_each_world_has_parameters_of_its_own(warp: Any) -> None:
 
 
 @pytest.mark.slow
+def test_delay_backlash_and_unequal_legs_are_those_of_the_cpu_engine(warp: Any) -> None:
+    plays = [{"yaw": {"backlash": (0.0, 0.0175, 0.0, play, 0.0)}} for play in (0.01, 0.03)]
+    more = {
+        "servos": {"xc430_w240": {"delay": 0.013}, "xl330_m288": {"delay": 0.02}},
+        "legs": {"friction_factors": (0.5, 1.0) * 6},
+    }
+    cpu, gpu = on_both([flat(**more, **play) for play in plays], 0.6)
+    assert np.abs(gpu - cpu).max() < 1e-4
+    prompt, _ = on_both([flat(), flat()], 0.6)
+    assert np.abs(prompt[-1] - cpu[-1]).max() > 2e-3, "they matter"
+
+
+@pytest.mark.slow
 def test_each_world_has_walls_of_its_own(warp: Any) -> None:
     near = [Wall(0.6), Wall(0.2)]
     cpu, gpu = on_both([flat(), flat()], 1.0, near)
