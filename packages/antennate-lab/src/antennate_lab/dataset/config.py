@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 from pydantic import Field, model_validator
 
 from antennate.antenna.statics import Profile
-from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unread_pace, unused
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import BenchPhysicsParams, PhysicsParams
@@ -149,7 +149,7 @@ class DatasetConfig(Params):
     held_out_speeds: tuple[_Factor, _Factor] = number(
         (1.3, 1.5), "1", "assumed: faster, and apart from `speeds`"
     )
-    """Range of that factor in the split test_speed alone."""
+    """Range of that factor in the split test_speed alone; its walks may be too fast for a robot."""
     averaging_time: float = number(0.1, "s", "assumed: T_avg, ten samples", gt=0, le=1)
     """Running mean of the readings before estimates look at them; the data are not averaged."""
     touch_flex: float = number(
@@ -177,7 +177,8 @@ class DatasetConfig(Params):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and the step of legs that do not lift."""
-        return unused(self.robot) | unread_lift(self.robot, "gait")
+        legs = unread_pace(self.robot) | unread_lift(self.robot, "gait")
+        return unused(self.robot) | legs
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> DatasetConfig:
@@ -220,6 +221,9 @@ class DatasetConfig(Params):
                 f"held_out_speeds: expected a range apart from speeds, {low:g} to {high:g}, found "
                 f"{least:g} to {most:g}"
             )
+        self.robot.require_pace(
+            "gait.frequency with the largest of speeds", self.gait.frequency * high
+        )
         fastest = self.gait.frequency * max(high, most)
         if fastest > 1.0:
             raise ValueError(

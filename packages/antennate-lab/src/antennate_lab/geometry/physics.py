@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unread_pace, unused
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.params.scene import PhysicsParams
@@ -85,7 +85,8 @@ class GeometryConfig(Params):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and the step of legs that do not lift."""
-        return unused(self.robot) | unread_lift(self.robot, "gait")
+        legs = unread_pace(self.robot) | unread_lift(self.robot, "gait")
+        return unused(self.robot) | legs
 
     @property
     def rolls(self) -> bool:
@@ -108,6 +109,7 @@ class GeometryConfig(Params):
     @model_validator(mode="after")
     def _agree(self) -> GeometryConfig:
         require_whole_steps("rate", self.rate, self.physics.timestep)
+        self.robot.require_pace("gait.frequency", self.gait.frequency)
         require_wave(self.robot, self.gait)
         widest = self.gait.model_copy(update={"amplitude": self.largest})
         require_wave(self.robot, widest)
@@ -158,7 +160,7 @@ def named_gaits(config: GeometryConfig) -> dict[str, GaitParams]:
         gaits = {
             name: gait for name, gait in gaits.items() if name == "gait" or gait != config.gait
         }
-    faster = min(1.15 * config.gait.frequency, 1.0)
+    faster = min(1.15 * config.gait.frequency, config.robot.fastest_gait, 1.0)
     gaits["gait at 1.15 f"] = config.gait.model_copy(update={"frequency": faster})
     return gaits
 

@@ -112,7 +112,9 @@ class _Runs:
         batch, period = len(rows), self._control.period
         offsets = 0.37 * np.array(rows, float)
         try:
-            controller = make_controller(self._factory, self._control, self._robot, batch)
+            controller = make_controller(
+                self._factory, self._control, self._robot, batch, walks=False
+            )
             watched = _Watched(controller)
             checked = CheckedController(watched, self._robot, batch)
             checked.reset(np.arange(batch), offsets)

@@ -19,7 +19,7 @@ HARDWARE_ALONE = (
         f"robot.{group}.{name}"
         for group in _GROUPS
         for name in ("ids", "directions", "zeros", "limit", "fastest")
-        if (group, name) != ("yaw", "limit")
+        if (group, name) not in (("yaw", "limit"), ("legs", "fastest"))
     ),
     "robot.antenna.sensor.rate",
     "robot.baud",
@@ -88,6 +88,12 @@ def unused(robot: RobotSpec) -> dict[str, str]:
         paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))
         reasons |= dict.fromkeys(paths, "the robot has no antennae")
     return reasons
+
+
+def unread_pace(robot: RobotSpec) -> dict[str, str]:
+    """The speed of goals of legs where the simulation does not read it, and why."""
+    why = "a simulation holds only legs that roll to it"
+    return {"robot.legs.fastest": why} if robot.legs.kind == "lifting" else {}
 
 
 _POLICY = ("rate", "gait.", "conditioning", "rule.threshold", "rule.hysteresis")

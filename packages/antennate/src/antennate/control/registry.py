@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from numbers import Real
 from typing import Any
 
 from antennate import checks
@@ -12,6 +14,7 @@ from antennate.control.readers import UNREAD_BY_POLICIES, unread_lift
 from antennate.control.readings import OWN, about_readings, parts_of
 from antennate.errors import ConfigError, MissingPackageError, raised
 from antennate.lookup import Registry, Shipped
+from antennate.messages import shown
 from antennate.params.base import paths_of
 from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
@@ -135,6 +138,7 @@ def make_controller(
     control: ControlParams | None = None,
     robot: RobotSpec | None = None,
     batch: int = 1,
+    walks: bool = True,
 ) -> Controller:
     """A controller of `batch` robots, as it begins.
 
@@ -143,10 +147,12 @@ def make_controller(
         control: Numbers of the control, the defaults if not given.
         robot: The robot, the default one if not given.
         batch: Number of robots B, at least 1: the first axis of all its arrays.
+        walks: Whether it moves the robot, as it does not in a replay; then goals of the legs have
+            to keep up with its gait.
 
     Raises:
         ConfigError: There is no controller of that name, it cannot be made, it cannot walk the
-            robot, or one of the others is none.
+            robot, its gait is too fast for the legs, or one of the others is none.
     """
     factory = CONTROLLERS.find(name) if isinstance(name, str) else name
     control = ControlParams() if control is None else control
@@ -173,6 +179,13 @@ def make_controller(
         raise ConfigError(
             f"expected a controller with reset and step, found {name!r} without {lacking[0]}"
         )
+    if walks:
+        frequency = control.gait.frequency
+        pace = getattr(controller, "fastest_gait", frequency)
+        if not isinstance(pace, Real) or math.isnan(pace):
+            raise ConfigError(f"{name!r}: expected fastest_gait in Hz, found {shown(pace)}")
+        own = "control.gait.frequency" if pace == frequency else f"gait of {name}"
+        robot.require_pace(own, float(pace))
     return controller
 
 

@@ -331,6 +331,22 @@ class RobotSpec(Params):
         """Fastest gait at which goals of rolling legs keep up [Hz], inf for lifting legs."""
         return self.legs.fastest / (2.0 * math.pi) if self.legs.kind == "rolling" else math.inf
 
+    def require_pace(self, name: str, frequency: float) -> None:
+        """Refuse a gait that goals of the legs cannot keep up with.
+
+        Args:
+            name: What has that frequency, for the message.
+            frequency: Cycles a second [Hz].
+
+        Raises:
+            ConfigError: It is faster than `fastest_gait`.
+        """
+        if frequency > self.fastest_gait:
+            raise ConfigError(
+                f"{name}: expected at most {math.floor(1e3 * self.fastest_gait) / 1e3:g} Hz, which "
+                f"robot.legs.fastest of {self.legs.fastest:g} rad/s allows, found {frequency:g}"
+            )
+
     @property
     def servo_names(self) -> tuple[ServoName, ...]:
         """Servo model of each joint."""

@@ -322,7 +322,7 @@ def recorded_controller(header: Header, name: str | None = None) -> Controller:
             f"{', '.join(header.knows)}, which is not in the log; give --controller NAME for one "
             "that decides upon the readings"
         )
-    made = make_controller(wanted, header.params, header.robot)
+    made = make_controller(wanted, header.params, header.robot, walks=False)
     require_own_senses(made, wanted, "a replay")
     made.reset(np.array([0]), header.phase)
     return made

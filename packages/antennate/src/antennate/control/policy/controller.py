@@ -178,8 +178,7 @@ class PolicyController:
         require_match(policy.contract, control, robot, where)
         interface = policy.contract.interface
         self._policy, self._ticks = policy, interface.ticks
-        paces = {"maneuver": control.gait.frequency, "gait": interface.frequency[1], "joints": 0.0}
-        self.fastest_gait = paces[interface.action]
+        self.fastest_gait = interface.fastest_gait(control.gait.frequency)
         self._curves = curves(control)
         self._observer = Observer(interface, control, robot, batch)
         self._actor = make_actor(interface, control, robot, batch)

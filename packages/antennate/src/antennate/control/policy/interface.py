@@ -49,7 +49,7 @@ class PolicyInterface(Params):
     turn_offset: float = number(0.52, "rad", "assumed: as escape.turn_offset", gt=0, le=1.0)
     """Yaw offset of a turn; the largest one where the gait is decided."""
     frequency: tuple[float, float] = number(
-        (0.2, LARGEST_FREQUENCY), "Hz", "assumed: from a third of the usual one to the fastest"
+        (0.2, 0.8), "Hz", "assumed: a third of the usual one to the fastest (docs/science/pace.md)"
     )
     """Slowest and fastest gait that it can choose."""
 
@@ -57,6 +57,15 @@ class PolicyInterface(Params):
         """What belongs to another action."""
         theirs = {"maneuver": ("frequency",), "gait": (), "joints": ("frequency", "turn_offset")}
         return dict.fromkeys(theirs[self.action], f"the action {self.action!r} does not have it")
+
+    def fastest_gait(self, frequency: float) -> float:
+        """Fastest gait by which it may walk [Hz]; 0 where its answers move the joints themselves.
+
+        Args:
+            frequency: That of the gait in which it chooses maneuvers [Hz].
+        """
+        paces = {"maneuver": frequency, "gait": self.frequency[1], "joints": 0.0}
+        return paces[self.action]
 
     @model_validator(mode="after")
     def _range(self) -> PolicyInterface:

@@ -36,7 +36,8 @@ def check(config: TunnelConfig) -> None:
         try:
             made = make_controller(name, config.control, config.robot)
         except ConfigError as error:
-            raise ConfigError(f"--controllers: {error}") from error
+            where = "" if str(error).startswith("control.") else "--controllers: "
+            raise ConfigError(f"{where}{error}") from error
         given |= dict.fromkeys(given_to(made, name, config.knows))
     if given:
         from antennate.sim.knowledge import require_route  # not of robots that know nothing

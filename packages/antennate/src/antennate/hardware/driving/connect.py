@@ -105,18 +105,10 @@ def connect(
 
 
 def _controller(config: DriveConfig) -> Controller:
-    """The controller that is named, if the goals of the legs keep up with the gait that walks."""
-    controller = make_controller(config.controller, config.control, config.robot)
-    frequency = config.control.gait.frequency
-    walks = config.reader == config.controller  # by keys it does not
-    pace: float = getattr(controller, "fastest_gait", frequency) if walks else frequency
-    if pace > (most := config.robot.fastest_gait):
-        name = "control.gait.frequency" if pace == frequency else f"gait of {config.controller}"
-        raise BadInputError(
-            f"{name}: expected at most {math.floor(1e3 * most) / 1e3:g} Hz, which "
-            f"robot.legs.fastest of {config.robot.legs.fastest:g} rad/s allows, found {pace:g}"
-        )
-    return controller
+    """The controller that is named; by keys it does not walk, but the gait does."""
+    if not (walks := config.reader == config.controller):
+        config.robot.require_pace("control.gait.frequency", config.control.gait.frequency)
+    return make_controller(config.controller, config.control, config.robot, walks=walks)
 
 
 def prepare(
