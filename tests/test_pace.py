@@ -1,7 +1,8 @@
-"""A drive refuses a gait that the goals of its legs cannot keep up with, before it opens a port.
+"""Drives and simulations refuse a gait that the goals of the legs cannot keep up with.
 
 A leg that rolls turns once in a gait cycle: at f [Hz] it needs 2 pi f [rad/s]. Goals of the default
-legs move 4.5 rad/s at most, which is 0.716 Hz.
+legs move 5.26 rad/s at most, which is 0.837 Hz: a servo of 1.7 N m and 65 rev/min at 11.1 V then
+keeps a fifth of its torque at 10.8 V, as 10.8/11.1 - 0.837/(65/60) = 0.200.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.twin.config import TwinConfig, watched
 
 PORTS = ["--esp32", "/no/a", "--bus", "/no/b"]
-ALLOWED = "expected at most 0.716 Hz, which robot.legs.fastest of 4.5 rad/s allows, found 1"
+ALLOWED = "expected at most 0.837 Hz, which robot.legs.fastest of 5.26 rad/s allows, found 1"
 OWN = """
 from antennate.control.registry import make_controller
 
@@ -80,7 +81,7 @@ def test_a_policy_is_refused_by_the_fastest_gait_that_it_may_choose(
 @pytest.mark.parametrize(
     "words",
     [
-        ["--control.gait.frequency", "0.716"],
+        ["--control.gait.frequency", "0.837"],
         ["--control.gait.frequency", "1", "--robot.legs.fastest", "6.29"],
     ],
 )
@@ -97,6 +98,6 @@ def test_legs_that_do_not_roll_keep_up_with_any_gait() -> None:
 @pytest.mark.parametrize("command", [DriveConfig, TeleopConfig])
 def test_a_session_at_such_a_pace_is_not_prepared(command: type[DriveConfig]) -> None:
     clock = LockstepClock(twin := watched(TwinConfig())[0])
-    config = command.model_validate({"control": {"gait": {"frequency": 0.72}}})
-    with pytest.raises(BadInputError, match=r"at most 0\.716 Hz.* found 0\.72$"):
+    config = command.model_validate({"control": {"gait": {"frequency": 0.84}}})
+    with pytest.raises(BadInputError, match=r"at most 0\.837 Hz.* found 0\.84$"):
         prepare(config, BoardPort(twin, clock), clock, clock)

@@ -18,7 +18,7 @@ from antennate.messages import nearest, shown
 from antennate.params.base import LARGEST_SEED
 from antennate.params.faults import describe
 from antennate.sim.episode import require_times
-from antennate_lab.compete.config import LARGEST_TABLE, require_unreserved
+from antennate_lab.compete.config import LARGEST_TABLE, plain, require_unreserved
 from antennate_lab.compete.episodes import EpisodeRow
 from antennate_lab.compete.scenes import tunnel_config
 
@@ -40,11 +40,11 @@ def read_rows(path: Path) -> list[EpisodeRow]:
     _, names = next(lines)
     _require_columns(path, names)
     rows, places = list[EpisodeRow](), dict[tuple[str, str, int, int], int]()
-    scenes = set[str]()
+    known = set[tuple[str, str]]()
     for number, cells in lines:
         if why := wrong_count(names, cells, ""):
             raise ConfigError(f"{path}: line {number}: {why}")
-        row = _row(path, number, dict(zip(names, cells, strict=True)), scenes)
+        row = _row(path, number, dict(zip(names, cells, strict=True)), known)
         key = (row.controller, row.scene, row.seed, row.trial)
         if (first := places.setdefault(key, number)) != number:
             raise ConfigError(
@@ -77,8 +77,8 @@ def _require_columns(path: Path, names: Sequence[str]) -> None:
             )
 
 
-def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> EpisodeRow:
-    """The row of a line. Its scene is looked up unless it is among `scenes`, and put there."""
+def _row(path: Path, number: int, line: dict[str, str], known: set[tuple[str, str]]) -> EpisodeRow:
+    """The row of a line; controller and scene are looked up unless among `known`, and put there."""
     if lacking := [name for name in ("controller", "scene", "outcome") if not line[name]]:
         raise ConfigError(f"{path}: line {number}: expected {lacking[0]}, found none")
     none = {name: "" for name in _WORDS if line.get(name, "").lower() in MISSING}
@@ -86,9 +86,9 @@ def _row(path: Path, number: int, line: dict[str, str], scenes: set[str]) -> Epi
         row = _ROW.validate_python(line | none)
         require_unreserved(row.seed)
         _require_sound(row, limited="limit_s" in line)
-        if row.scene not in scenes:
+        if (both := (row.controller, row.scene)) not in known:
             tunnel_config(row.scene, row.controller, row.seed)
-            scenes.add(row.scene)
+            known.add(both)
     except ValidationError as error:
         raise ConfigError(f"{path}: line {number}: {describe(error, EpisodeRow)}") from None
     except (ValueError, ConfigError) as error:
@@ -103,7 +103,7 @@ def _require_sound(row: EpisodeRow, limited: bool) -> None:
         row: The row.
         limited: Whether its table says the limit; the time of a failure is compared with no other.
     """
-    CONTROLLERS.check(row.controller)
+    CONTROLLERS.check(plain(row.controller))
     require_times(row.time_s, row.limit_s, CLOSE)
     limit, free = row.limit_s, row.outcome == "success" or not limited
     rules = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import secrets
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
@@ -40,6 +41,15 @@ SCENES_OF_BOARD = (
 readings that are 15 ms late, which at 100 Hz are used two ticks later."""
 
 
+PART = re.compile(r"\+(?=[a-z0-9_.]+=)")
+"""What parts a controller or a scene from its parameters, and these from each other."""
+
+
+def plain(text: str) -> str:
+    """The name of a controller or a scene without the parameters behind it."""
+    return PART.split(text)[0]
+
+
 class CompeteConfig(Params):
     """Everything that decides the outcome of `antennate compete`."""
 
@@ -52,7 +62,8 @@ class CompeteConfig(Params):
         min_length=1,
     )
     """Controllers: names of `tunnel --controllers`, those of installed packages, MODULE:NAME,
-    FILE.py:NAME, or FILE.onnx."""
+    FILE.py:NAME, or FILE.onnx, each with other numbers of the control behind a +, as
+    geometric+gait.frequency=0.8."""
     scenes: tuple[str, ...] = number(
         SCENES_OF_BOARD,
         "1",
@@ -94,14 +105,15 @@ class CompeteConfig(Params):
         return dict.fromkeys(names, "the file of check says it")
 
     def names_in_files(self) -> Iterable[str]:
-        """Controllers and scenes of the table that is checked."""
+        """Controllers and scenes without their parameters, and those of a table that is checked."""
+        yield from map(plain, (*self.controllers, *self.scenes))
         with contextlib.suppress(OSError, ValueError, BadInputError):  # told where it is read
             path = Path(self.check or "")
             data = read_limited(path, LARGEST_TABLE, ConfigError) if self.check else b""
             lines = from_csv(decoded(path, data, ConfigError)) if data else []
             columns = ("controller", "scene")
-            return dict.fromkeys(str(line.get(name)) for line in lines for name in columns)
-        return ()
+            named = dict.fromkeys(str(line.get(name)) for line in lines for name in columns)
+            yield from map(plain, named)
 
     @field_validator("seed")
     @classmethod
@@ -111,13 +123,13 @@ class CompeteConfig(Params):
     @field_validator("controllers")
     @classmethod
     def _known_controllers(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(map(CONTROLLERS.check, names))
+        return tuple(CONTROLLERS.check(plain(name)) + name[len(plain(name)) :] for name in names)
 
     @field_validator("scenes")
     @classmethod
     def _known_scenes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            check_name(name.partition("+")[0])
+            check_name(plain(name))
         return names
 
     @model_validator(mode="after")

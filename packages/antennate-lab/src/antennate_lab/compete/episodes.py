@@ -105,7 +105,7 @@ def run_episodes(draws: Sequence[tuple[Draw]], emit: Callable[[int, Any], None])
         made[:] = [Apart(functools.partial(make_controller, *how), first.decision_limit)]
         return made[0]
 
-    name = condition(first.controller, config.readings[0])
+    name = condition(config.controllers[0], config.readings[0])
     try:
         run_trials(config, name, [*places], take, apparatus=Apparatus(make))
     finally:

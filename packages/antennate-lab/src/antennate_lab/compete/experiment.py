@@ -30,7 +30,7 @@ from antennate.types import AntennaFrame, Controller
 from antennate_lab.compete.apart import Apart
 from antennate_lab.compete.checking import read_rows
 from antennate_lab.compete.comparison import compared
-from antennate_lab.compete.config import DEVELOPMENT, CompeteConfig, settled
+from antennate_lab.compete.config import DEVELOPMENT, CompeteConfig, plain, settled
 from antennate_lab.compete.episodes import Draw, EpisodeRow, lost, run_episodes
 from antennate_lab.compete.page import readme, sentence, tables
 from antennate_lab.compete.result import CompeteResult
@@ -99,7 +99,7 @@ def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> st
     try:
         for scene, seed in cells:
             settings = tunnel_config(scene, name, seed)
-            make = partial(make_controller, name, settings.control, settings.robot)
+            make = partial(make_controller, plain(name), settings.control, settings.robot)
             with contextlib.closing(Apart(make, limit)) as made:
                 if made.needs:
                     instance = draw_scene(settings, scene_of(settings), 0)
@@ -110,7 +110,7 @@ def _trouble_of(name: str, cells: Sequence[tuple[str, int]], limit: float) -> st
     except ControllerError as error:
         return f"{name!r}: {error}"
     except (ConfigError, SceneError) as error:
-        return str(error)
+        return f"{name!r}: {error}" if str(error).startswith("control.") else str(error)
     return ""
 
 

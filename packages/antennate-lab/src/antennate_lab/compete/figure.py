@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from antennate import figures as style
-from antennate.control.readings import short_names
 from antennate.control.registry import looks
 from antennate.studies.experiment import Done
 from antennate_lab.compete.page import ordered
 from antennate_lab.compete.result import Standing
-from antennate_lab.compete.scenes import label
+from antennate_lab.compete.scenes import label, labels
 from antennate_lab.compete.standings import Rows, profiles
 
 _DARK = 0.83
@@ -41,7 +40,7 @@ def ranks(result: Standing) -> Figure:
     """Rank and success of each controller with their intervals, a line each."""
     names = ordered(result)
     colours = {name: colour for name, (colour, _) in looks(names).items()}
-    short = style.plain(short_names(names))
+    short = style.plain(labels(names))
     figure = style.canvas(style.WIDTH, 2 * (0.9 + 0.27 * len(names)))
     rank, success = figure.subplots(2, 1)
     for i, name in enumerate(names):
@@ -74,7 +73,7 @@ def _interval(panel: Axes, at: int, value: float, ends: Any, colour: str) -> Non
 def scenes(result: Standing) -> Figure:
     """Share of successes, a line a scene and a column a controller."""
     names, places = ordered(result), list(result.scenes)
-    short = style.plain(short_names(names))
+    short = style.plain(labels(names))
     shares = np.array(
         [[cells[name].success_share for name in names] for cells in result.scenes.values()], float
     )
@@ -102,7 +101,7 @@ def profile(rows: Rows, names: Sequence[str]) -> Figure:
     factors, by_name = profiles(rows)
     shares = {name: by_name[name] for name in names}
     drawn = looks(shares)
-    short = style.plain(short_names(shares))
+    short = style.plain(labels([*shares]))
     figure = style.canvas(style.WIDTH, 3.6)
     panel = figure.subplots()
     for name, share in shares.items():

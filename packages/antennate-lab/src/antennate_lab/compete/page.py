@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from antennate.control.loop import void_sentence
-from antennate.control.readings import short_names
 from antennate.control.registry import about
 from antennate.studies.columns import columns, shown
 from antennate.studies.tables import Table
 from antennate_lab.compete.comparison import ENOUGH, Check, Differing, refusal
-from antennate_lab.compete.config import DEVELOPMENT
+from antennate_lab.compete.config import DEVELOPMENT, plain
 from antennate_lab.compete.episodes import EpisodeRow
 from antennate_lab.compete.result import CompeteResult, Pair, Standing, none_valid
-from antennate_lab.compete.scenes import label
+from antennate_lab.compete.scenes import label, labels
 from antennate_lab.compete.standings import ALPHA
 
 _NOTE = (
@@ -43,13 +42,13 @@ def tables(result: Standing) -> Sequence[Table]:
     Where no episode is valid there is none of the first three.
     """
     names = ordered(result)
-    short = short_names(names)
+    short = labels(names)
     rows = {short[name]: result.controllers[name] for name in names}
     privileged = [name for name, row in rows.items() if row.given]
     words = f"{', '.join(privileged)}: given what only a simulation knows. " if privileged else ""
     note = _NOTE.format(given=words)
     parts = [
-        Table.of("Controllers", rows, note=note, preface=about(names)),
+        Table.of("Controllers", rows, note=note, preface=about(map(plain, names))),
         Table("Successes by scene", [short[n] for n in names], _scene_lines(result, names)),
     ]
     if len(none_valid(result)) == len(names):
@@ -132,7 +131,7 @@ def sentence(result: Standing) -> str:
     if result.check is not None:
         return _repeats(result.check)
     rows, names = result.controllers, ordered(result)
-    short = short_names(names)
+    short = labels(names)
     ranked = [name for name in names if rows[name].rank is not None]
     scenes = len(result.scenes)
     entries = [
@@ -183,7 +182,7 @@ def apart(result: Standing) -> str:
 
 def _before(result: Standing, p: Callable[[Pair], float], ahead: Callable[[Pair], float]) -> str:
     """Which controllers are ahead of which, by the p and the lead of each pair."""
-    short = short_names(ordered(result))
+    short = labels(ordered(result))
     behind: dict[str, list[str]] = {}
     for pair in result.paired.values():
         if p(pair) < ALPHA and (lead := ahead(pair)):
@@ -200,7 +199,7 @@ def _before(result: Standing, p: Callable[[Pair], float], ahead: Callable[[Pair]
 def markdown(result: Standing) -> str:
     """The standing and the scenes as tables in Markdown."""
     names = ordered(result)
-    short = {key: name.replace("|", r"\|") for key, name in short_names(names).items()}
+    short = {key: name.replace("|", r"\|") for key, name in labels(names).items()}
     lines = [
         "| controller | rank (95 %) | successes | Wilson 95 % by draws [%] | restricted mean time "
         "[% of limit] (95 %) | speed over successes [m/s] | fell | on its back | INVALID |",

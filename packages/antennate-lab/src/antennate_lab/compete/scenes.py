@@ -1,26 +1,27 @@
-"""A scene with other parameters than its own, as text: `uturn+variation.reading_noise=3`.
+"""A scene or a controller with other parameters, as text: `uturn+variation.reading_noise=3`.
 
-Behind the name of the scene stands for each parameter a +, its dotted name, = and its value, as in
-a TOML file; text needs no quotes. What belongs to the controller cannot be set: a controller with
-other numbers is another controller.
+Behind the name stands for each parameter a +, its dotted name, = and its value, as in a TOML file;
+text needs no quotes. Numbers of the control belong to the controller, `closed+search.patience=4`,
+all others to the scene: a controller with other numbers is another controller.
 """
 
 from __future__ import annotations
 
-import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from antennate.control.readings import YOKED
+from antennate.control.readings import YOKED, short_names
+from antennate.control.registry import unread
 from antennate.errors import ConfigError
 from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import shown
 from antennate.params.base import from_values
+from antennate.params.control import ControlParams
 from antennate.sim.episode import time_limit_of
 from antennate.sim.trial import draw_scene, scene_of
+from antennate_lab.compete.config import PART, plain
 
-_NEXT = re.compile(r"\+(?=[a-z0-9_.]+=)")
 _GROUPS = (
     *("tunnel", "corridors", "ground", "robot", "variation", "physics"),
     *("readings", "time_limit"),
@@ -30,8 +31,9 @@ _GROUPS = (
 
 def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
     """The run of one controller in such a scene."""
-    scene, *parts = _NEXT.split(text)
-    values: dict[str, Any] = {"scene": scene, "seed": seed, "controllers": (controller,)}
+    scene, *parts = PART.split(text)
+    name, *numbers = PART.split(controller)
+    values: dict[str, Any] = {"scene": scene, "seed": seed, "controllers": (name,)}
     for part in parts:
         path, _, value = part.partition("=")
         if path.partition(".")[0] not in _GROUPS:
@@ -39,7 +41,9 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
                 f"scenes: expected a parameter of {', '.join(_GROUPS)}, found {shown(path)} in "
                 f"{shown(text)}"
             )
-        _put(values, path, _value(value), text)
+        _put(values, path, _value(value), "scenes", text)
+    if numbers:
+        values["control"] = _control(name, numbers, controller)
     if "readings" in values:
         values["readings"] = (values["readings"],)
         if values["readings"] == (YOKED,):
@@ -50,7 +54,24 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
         raise ConfigError(f"scenes: {shown(text)}: {error}") from None
 
 
-def _put(values: dict[str, Any], path: str, value: Any, text: str) -> None:
+def _control(name: str, numbers: Sequence[str], text: str) -> ControlParams:
+    """The control of a controller with these numbers, each of which it reads."""
+    values: dict[str, Any] = {}
+    for part in numbers:
+        path, _, value = part.partition("=")
+        _put(values, path, _value(value), "controllers", text)
+    try:
+        control = from_values(ControlParams, values)
+    except ConfigError as error:
+        raise ConfigError(f"controllers: {shown(text)}: {error}") from None
+    idle = unread(name, control)
+    for part in numbers:
+        if (path := part.partition("=")[0]) in idle:
+            raise ConfigError(f"controllers: {shown(text)}: {name} does not read {path}")
+    return control
+
+
+def _put(values: dict[str, Any], path: str, value: Any, what: str, text: str) -> None:
     """Set a value at its dotted path."""
     *groups, name = path.split(".")
     place: Any = values
@@ -58,7 +79,7 @@ def _put(values: dict[str, Any], path: str, value: Any, text: str) -> None:
         place = place.setdefault(group, {}) if isinstance(place, dict) else None
     if not isinstance(place, dict) or name in place:
         raise ConfigError(
-            f"scenes: expected each parameter once, as a group or as a value, found {shown(path)} "
+            f"{what}: expected each parameter once, as a group or as a value, found {shown(path)} "
             f"again in {shown(text)}"
         )
     place[name] = value
@@ -92,7 +113,13 @@ def _value(text: str) -> Any:
 
 
 def label(text: str) -> str:
-    """A short name for tables: the scene, and of each parameter the last part of its name."""
-    scene, *parts = _NEXT.split(text)
+    """A short name for tables: of each parameter behind the name the last part of its own."""
+    scene, *parts = PART.split(text)
     pairs = (part.partition("=") for part in parts)
     return ", ".join([scene, *(f"{p.rpartition('.')[2]}={v}" for p, _, v in pairs)])
+
+
+def labels(names: Sequence[str]) -> dict[str, str]:
+    """A short name of each controller, and its parameters as `label` has them."""
+    short = short_names(map(plain, names))
+    return {name: label(short[plain(name)] + name[len(plain(name)) :]) for name in names}
