@@ -17,8 +17,8 @@ from antennate.types import State
 
 TICK = 2 * math.pi / 4096
 PERIOD = 0.01
-LIMIT = 4.5
-"""Fastest that a goal moves [rad/s]: robot.*.fastest."""
+LIMIT = 5.26
+"""Fastest that a goal of a leg moves [rad/s]: robot.legs.fastest."""
 ROUNDING = TICK / PERIOD
 """Speed of one tick of the servo in one of the loop [rad/s]."""
 

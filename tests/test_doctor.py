@@ -139,7 +139,7 @@ def test_what_a_servo_says_of_itself_is_judged(
 ) -> None:
     """Limits of both models are their manuals'; 2300 ticks are less than 2048 + 332.
 
-    4.5 rad/s are 188 counts of 0.229 rev/min, and 235 with a quarter more.
+    5.26 rad/s are 219 counts of 0.229 rev/min, and 275 with a quarter more.
     """
     rows = wrong(Patient(fault).examine(esp32=False))
     latched = ["bus: hardware errors"] if fault.startswith("servo:18=present") else []

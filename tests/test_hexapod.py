@@ -160,7 +160,7 @@ def test_an_unknown_radius_changes_the_step_of_rolling_legs_by_its_circumference
         rate=50.0,
         physics=PhysicsParams(timestep=0.004, contact_time=0.008),
         robot=RobotSpec(leg_eccentricity=0.0),
-        gait=GaitParams(amplitude=0.0, frequency=1.0),
+        gait=GaitParams(amplitude=0.0, frequency=0.8),
         unknown=("robot.leg_radius=0.022:0.03",),
         draws=2,
         measured=0.4,

@@ -322,7 +322,7 @@ dataset --held-out-speeds 1.0 1.4 :: held_out_speeds: expected a range apart fro
 dataset --walk.windows 9 :: walk.time: expected room for 9 windows :: found 6 s
 dataset --trials 5 :: --trials: expected a number of at least 10, found 5
 dataset --kinds walk walk :: kinds must differ
-dataset --gait.frequency 0.9 :: gait.frequency: expected at most 1 Hz :: found 1.35 Hz
+dataset --gait.frequency 0.7 :: gait.frequency: expected at most 1 Hz :: found 1.05 Hz
 dataset --robot.antenna.roll 0.5 :: robot.antenna.roll: expected 0 :: found 0.5
 dataset --push.depth 0.3 0.1 :: push.depth: expected a range that rises, found 0.3 and 0.1
 dataset --robot hexapod :: robot.antennae.kind: expected a pair of antennae, found none

@@ -42,7 +42,7 @@ EVENT = 1.0
 CONFIG = DriveConfig(dry_run=DRY, duration=1.2)
 """Half a second after the event."""
 SLOW = ControlParams.model_validate({"gait": {"frequency": 0.4}})
-"""Legs leave 2.0 of 4.5 rad/s to catch up with their gait after the start, not 0.7."""
+"""Legs leave 2.7 of 5.26 rad/s to catch up with their gait after the start, not 1.5."""
 
 
 class Log:
@@ -150,7 +150,8 @@ def test_B10_torque_comes_on_with_goals_where_servos_stand_and_they_move_slowly(
     standing = np.rint([servo.position for servo in rig(TwinConfig()).robot.servos])
     assert abs(np.array(log.goals[on]) - standing).max() <= 5
     steps = abs(np.diff(log.goals[on : on + 50], axis=0))
-    assert steps.max() <= math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
+    rest, legs = (math.ceil(most * 0.01 / (2 * math.pi / 4096)) for most in (4.5, 5.26))
+    assert (steps.max(axis=0) <= [rest] * 5 + [legs] * 12 + [rest] * 2).all()
 
 
 @pytest.mark.parametrize(("silence", "armed"), [(0.6, True), (2.5, False)])

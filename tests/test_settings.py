@@ -23,6 +23,8 @@ from dynamixel_bus.servo import Servo
 
 COUNTS = math.ceil(1.25 * 4.5 / (0.229 * 2 * math.pi / 60))
 """A quarter more than the 4.5 rad/s of goals, in units of 0.229 rev/min: 235."""
+LEGS = math.ceil(1.25 * 5.26 / (0.229 * 2 * math.pi / 60))
+"""A quarter more than the 5.26 rad/s of goals of legs: 275."""
 
 
 def set_all(*changes: tuple[int, str, int]) -> Callable[[list[DrivenServo]], None]:
@@ -53,8 +55,8 @@ def set_all(*changes: tuple[int, str, int]) -> Callable[[list[DrivenServo]], Non
             r"max position limit 3071 \(expected at least 3072\) in servos \[18\]",
         ),
         (
-            set_all((10, "velocity_limit", COUNTS - 1)),
-            rf"velocity limit {COUNTS - 1} \(expected at least {COUNTS}\) in servos \[10\]",
+            set_all((10, "velocity_limit", LEGS - 1)),
+            rf"velocity limit {LEGS - 1} \(expected at least {LEGS}\) in servos \[10\]",
         ),
     ],
 )
@@ -109,7 +111,7 @@ def test_B10_profiles_that_another_program_left_are_set_before_torque() -> None:
         states.append(session.outputs.state)
 
     drive(made.session, DriveConfig(dry_run=0.3, duration=0.5), arm=True, on_tick=look)
-    assert {servo.get("profile_velocity") for servo in servos} == {COUNTS}
+    assert {servo.get("profile_velocity") for servo in servos} == {COUNTS, LEGS}
     assert {servo.get("profile_acceleration") for servo in servos} == {0}
     assert torque == [False, False]
     assert states[-1] <= State.DEGRADED
@@ -120,7 +122,7 @@ def test_profiles_follow_the_fastest_of_their_group_and_stay_below_the_velocity_
     made = rig(TwinConfig())
     robot = RobotSpec.model_validate({"yaw": {"fastest": 1.0}, "antennae": {"fastest": 10.0}})
     profiles = type(made.session.actuators.joints)(robot).profiles
-    assert [profiles[i] for i in (1, 5, 6, 17, 18, 19)] == [53, 53, COUNTS, COUNTS, 445, 445]
+    assert [profiles[i] for i in (1, 5, 6, 17, 18, 19)] == [53, 53, LEGS, LEGS, 445, 445]
     require_servos(made.session.actuators.bus, robot)
 
 

@@ -37,7 +37,7 @@ from antennate_lab.compete.config import (
 )
 from antennate_lab.compete.episodes import Draw, EpisodeRow, run_episodes
 from antennate_lab.compete.page import sentence
-from antennate_lab.compete.scenes import label, tunnel_config
+from antennate_lab.compete.scenes import label, labels, tunnel_config
 from antennate_lab.compete.standings import standing
 
 SHORT = "flat+time_limit=0.3"
@@ -541,6 +541,17 @@ def test_the_wheel_of_another_package_competes_by_its_entry_points(tmp_path: Pat
         ("--scenes uturn+ground.height=0.05", "it belongs to the scenes"),
         ("--scenes uturn+variation.x2=1", "variation.x2"),
         (f"--scenes uturn+time_limit={'[' * 3000}", "time_limit"),
+        ("--controllers clsoed+search.patience=4", "did you mean closed?"),
+        ("--controllers closed+search.patence=4", "did you mean patience?"),
+        ("--controllers timed+search.patience=4", "timed does not read search.patience"),
+        ("--controllers closed+search.patience=-1", "'closed+search.patience=-1': search.patience"),
+        ("--controllers closed+gait.frequency=0.5+gait=1", "controllers: expected each parameter"),
+        pytest.param(
+            "--controllers open closed+gait.frequency=1",
+            "'closed+gait.frequency=1': control.gait.frequency: expected at most 0.837 Hz, which "
+            "robot.legs.fastest of 5.26 rad/s allows, found 1",
+            marks=pytest.mark.ci,
+        ),
         ("--check no.csv", "no.csv: expected a readable file"),
         ("--check no.csv --trials 3", "the file of check says it"),
         ("--engine dask", "--engine"),
@@ -757,11 +768,14 @@ def test_a_table_of_several_seeds_is_run_again_in_any_order(tmp_path: Path) -> N
 @pytest.mark.ci
 def test_a_rival_at_1_hz_walks_as_by_the_parameter() -> None:
     file = Path(__file__).parents[3] / "docs" / "science" / "one_hertz.py"
-    (row,) = episodes(f"{file}:geometric", scene="uturn+time_limit=6")
+    scene = "uturn+time_limit=6+robot.legs.fastest=6.29"
+    (row,) = episodes(f"{file}:geometric", scene=scene)
+    (told,) = episodes("geometric+gait.frequency=1", scene=scene)
     settings: dict[str, Any] = {"controllers": ["geometric"], "scene": "uturn", "trials": 1}
     settings |= {"control": {"gait": {"frequency": 1.0}}, "time_limit": 6.0}
+    settings |= {"robot": {"legs": {"fastest": 6.29}}}
     result = antennate.run("tunnel", seed=DEVELOPMENT.start, **settings)
-    assert row.progress_m == result.rows[0].progress_m > 0.5
+    assert row.progress_m == told.progress_m == result.rows[0].progress_m > 0.5
 
 
 @pytest.mark.ci
@@ -1025,7 +1039,7 @@ def test_rows_that_were_not_run_are_not_compared() -> None:
     assert (check.rows, check.same, check.differ) == (1, 1, [])
 
 
-# scenes with other parameters
+# scenes and controllers with other parameters
 
 
 def test_a_scene_takes_parameters_as_the_configuration_does() -> None:
@@ -1038,3 +1052,32 @@ def test_a_scene_takes_parameters_as_the_configuration_does() -> None:
     assert tunnel_config("step_up+ground.height=0.05", "open", 0).ground.height == 0.05
     assert label("uturn+variation.broken=left") == "uturn, broken=left"
     assert tunnel_config("a+b.py:Scene+time_limit=1", "open", 0).scene == "a+b.py:Scene"
+
+
+def test_a_controller_takes_numbers_of_the_control_as_the_configuration_does() -> None:
+    text = "a+b.py:Mine+gait.frequency=0.8+schedule.headings=[0.5, 1]"
+    config = tunnel_config("uturn+time_limit=5", text, 3)
+    assert (config.scene, config.controllers) == ("uturn", ("a+b.py:Mine",))
+    assert config.control.gait.frequency == 0.8
+    assert config.control.schedule.headings == (0.5, 1.0)
+    names = ["geometric", "geometric+gait.frequency=0.8", "x/policy.onnx+gait.frequency=0.5"]
+    assert [*labels(names).values()] == [
+        "geometric",
+        "geometric, frequency=0.8",
+        "x, frequency=0.5",
+    ]
+    found = CompeteConfig(controllers=("./x.py:Mine+gait.frequency=0.5",), scenes=("room",))
+    assert found.controllers == ("x.py:Mine+gait.frequency=0.5",)
+    assert [*found.names_in_files()] == ["x.py:Mine", "room"]  # code that a run depends on
+
+
+@pytest.mark.ci
+def test_a_row_of_a_controller_with_other_numbers_is_that_of_tunnel_with_them() -> None:
+    """The text of the controller stands in its row, whole."""
+    text = "timed+gait.frequency=0.8+timed.walk_time=1"
+    (row,) = episodes(text, scene="uturn+time_limit=4")
+    settings: dict[str, Any] = {"controllers": ["timed"], "scene": "uturn", "trials": 1}
+    settings |= {"time_limit": 4.0, "seed": DEVELOPMENT.start}
+    settings |= {"control": {"gait": {"frequency": 0.8}, "timed": {"walk_time": 1.0}}}
+    (other,) = antennate.run("tunnel", **settings).rows
+    assert (row.controller, row.progress_m) == (text, other.progress_m)

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 from pydantic import Field, model_validator
 
 from antennate.antenna.statics import Profile
-from antennate.control.readers import HARDWARE_ALONE, unread_lift, unread_pace, unused
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import BenchPhysicsParams, PhysicsParams
@@ -177,8 +177,7 @@ class DatasetConfig(Params):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and the step of legs that do not lift."""
-        legs = unread_pace(self.robot) | unread_lift(self.robot, "gait")
-        return unused(self.robot) | legs
+        return unused(self.robot) | unread_lift(self.robot, "gait")
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> DatasetConfig:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, TypeVar, cast
 import numpy as np
 from pydantic import model_validator
 
-from antennate.control.readers import HARDWARE_ALONE, unread_lift, unread_pace, unused
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import (
@@ -142,8 +142,7 @@ class GaitStudyConfig(Params):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and the step of legs that do not lift."""
-        legs = unread_pace(self.robot) | unread_lift(self.robot, "gait")
-        return unused(self.robot) | legs
+        return unused(self.robot) | unread_lift(self.robot, "gait")
 
     @property
     def unknowns(self) -> list[Unknown]:

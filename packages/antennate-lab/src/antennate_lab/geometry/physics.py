@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from antennate.control.readers import HARDWARE_ALONE, unread_lift, unread_pace, unused
+from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.params.scene import PhysicsParams
@@ -85,8 +85,7 @@ class GeometryConfig(Params):
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and the step of legs that do not lift."""
-        legs = unread_pace(self.robot) | unread_lift(self.robot, "gait")
-        return unused(self.robot) | legs
+        return unused(self.robot) | unread_lift(self.robot, "gait")
 
     @property
     def rolls(self) -> bool:

@@ -90,12 +90,6 @@ def unused(robot: RobotSpec) -> dict[str, str]:
     return reasons
 
 
-def unread_pace(robot: RobotSpec) -> dict[str, str]:
-    """The speed of goals of legs where the simulation does not read it, and why."""
-    why = "a simulation holds only legs that roll to it"
-    return {"robot.legs.fastest": why} if robot.legs.kind == "lifting" else {}
-
-
 _POLICY = ("rate", "gait.", "conditioning", "rule.threshold", "rule.hysteresis")
 UNREAD_BY_POLICIES = tuple(p for p in paths_of(ControlParams) if not p.startswith(_POLICY))
 """Parameters of `ControlParams`, dotted, that a policy file does not read. Another rate or gait

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from antennate.control.policy.interface import PolicyInterface
-from antennate.control.readers import HARDWARE_ALONE, UNREAD_BY_POLICIES, unread_pace
+from antennate.control.readers import HARDWARE_ALONE, UNREAD_BY_POLICIES
 from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec, require_antennae
@@ -78,9 +78,7 @@ class EnvConfig(TrialConfig):
         action = self.interface.action
         paths = (*UNREAD_BY_POLICIES, "gait.turn_offset", *([own[action]] if action in own else []))
         why = f"policies with the action {action!r} do not read it"
-        pace = {} if action == "joints" else unread_pace(self.robot)
-        own_robot = {**super().unread_here(), **pace}
-        return {**own_robot, **dict.fromkeys((f"control.{p}" for p in paths), why)}
+        return {**super().unread_here(), **dict.fromkeys((f"control.{p}" for p in paths), why)}
 
     @model_validator(mode="after")
     def _agree(self) -> EnvConfig:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, field_validator, model_validator
 
 from antennate.control.climbing.body import require_pitch
-from antennate.control.readers import HARDWARE_ALONE, unread_pace, unused
+from antennate.control.readers import HARDWARE_ALONE, unused
 from antennate.control.registry import KEPT_BY_CLIMBERS, unread_by_all, unread_limits
 from antennate.errors import ConfigError
 from antennate.experiments.climb.grounds import FLAT, FLAT_TIME, USUAL, Terrain
@@ -197,7 +197,6 @@ class ClimbConfig(Params):
         reasons = {
             **unread_limits(names),
             **unused(self.robot),
-            **unread_pace(self.robot),
             **unread_by_all(names, self.control, self.robot, knows),
         }
         if "locked" in self.conditions:

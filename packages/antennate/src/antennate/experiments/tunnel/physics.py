@@ -17,7 +17,7 @@ from pydantic import field_validator, model_validator
 
 from antennate.control import registry
 from antennate.control.knowledge import KNOWABLE, Kind
-from antennate.control.readers import HARDWARE_ALONE, unread_pace
+from antennate.control.readers import HARDWARE_ALONE
 from antennate.control.readings import (
     KINDS,
     OWN,
@@ -106,12 +106,7 @@ class TunnelConfig(TrialConfig):
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what none of the controllers reads."""
         control = unread_by_all(self.controllers, self.control, self.robot, self.knows)
-        return {
-            **unread_limits(self.controllers),
-            **super().unread_here(),
-            **unread_pace(self.robot),
-            **control,
-        }
+        return {**unread_limits(self.controllers), **super().unread_here(), **control}
 
     @model_validator(mode="after")
     def _agree(self) -> TunnelConfig:
