@@ -110,7 +110,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "cycles": 2,
             "settling_cycles": 0,
             "sweep_points": 2,
-            "gait": {"frequency": 1.0},
+            "gait": {"frequency": 0.8},
             "robot": {
                 "yaw": {"servo": servo},
                 "antenna": {"sensor": sensor},
@@ -139,7 +139,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             "repeats": 1,
             "cycles": 2,
             "settling_cycles": 0,
-            "gait": {"frequency": 1.0, "amplitude": 0.3},
+            "gait": {"frequency": 0.8, "amplitude": 0.3},
             "robot": {
                 "yaw": {"servo": servo, "fastest": 4.0},
                 "pitch": {"kind": pitch},

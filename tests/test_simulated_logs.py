@@ -59,11 +59,11 @@ def test_each_walk_of_the_gait_leaves_a_log(
     """Its phase runs at the frequency of the gait, and backwards in REVERSE."""
     run_at = ["--out", str(tmp_path / "run"), "--workers", "1", "--no-figures"]
     few = ["--sweep-points", "2", "--cycles", "2", "--settling-cycles", "0"]
-    few += ["--gait.frequency", "1"]  # the shortest cycle
+    few += ["--gait.frequency", "0.8"]  # a short cycle
     assert main(["gait", "--log", *few, *run_at]) == 0
     logs = {path.stem: path for path in (tmp_path / "run" / "logs").iterdir()}
     assert set(logs) == {"forward", "turn_l", "turn_r", "reverse", "wave_off", "sweep0", "sweep1"}
-    gait = GaitParams(frequency=1.0)
+    gait = GaitParams(frequency=0.8)
     for name, sense in (("forward", 1), ("reverse", -1)):
         with LogReader(logs[name]) as log:
             ticks = list(log)
@@ -87,7 +87,7 @@ def test_each_walk_of_the_gait_leaves_a_log(
 
 def test_a_walk_is_the_same_with_and_without_a_log(tmp_path: Path) -> None:
     """And a log that a killed run left half is replaced."""
-    gait = GaitParams(frequency=1.0)
+    gait = GaitParams(frequency=0.8)
     coarse = PhysicsParams(timestep=0.004, contact_time=0.008)
     few = {"sweep_points": 2, "cycles": 2, "settling_cycles": 0, "rate": 50.0}
     config = GaitStudyConfig(**few, gait=gait, physics=coarse)

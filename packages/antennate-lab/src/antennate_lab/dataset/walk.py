@@ -74,6 +74,8 @@ def walk_windows(config: DatasetConfig, draw: Draw) -> Windows:
     world = make_world(config.physics, robot, wall)
     world.model.geom("wall").friction[0] = 0.0  # the larger of two counts: that of the antenna
     gait, phase = gait_of(config, draw.factor), float(rng.uniform(0.0, 2.0 * math.pi))
+    if draw.split != "test_speed":
+        robot.require_pace("gait.frequency", gait.frequency)
     _place(config, world, wall, gait, phase, side, rng)
     vary = VariationParams(joint_bias=config.antennae.joint_zero)
     ticks = _walked(config, world, gait, phase, Disturbance(rng, vary, robot, 1.0 / config.rate))

@@ -162,7 +162,6 @@ class GaitStudyConfig(Params):
     @model_validator(mode="after")
     def _agree(self) -> GaitStudyConfig:
         require_whole_steps("rate", self.rate, self.physics.timestep)
-        self.robot.require_pace("gait.frequency", self.gait.frequency)
         if not self.unknown:
             require_default(self, "all is known", *_OF_UNKNOWN)
         if self.optimise != "none":

@@ -49,7 +49,7 @@ class Walks(Done):
 
 
 def check(config: GaitStudyConfig) -> None:
-    """Find draws that make no robot or gait before anything is run."""
+    """Find draws that make no robot or gait, or one too fast, before anything is run."""
     _tasks(config)
 
 
@@ -67,10 +67,13 @@ def _tasks(config: GaitStudyConfig) -> list[_Task]:
     for i in range(config.sweep_points):
         lead = 2.0 * math.pi * i / config.sweep_points
         forward[f"sweep{i}"] = _changed(gait, body_phase=lead)
+    unknown = _unknown(config)
+    for one in (config, *unknown.values()):
+        one.robot.require_pace("gait.frequency", one.gait.frequency)
     return [
         *((config, m.name.lower(), gait, m) for m in MANEUVERS),
         *((config, name, one, Maneuver.FORWARD) for name, one in forward.items()),
-        *((one, name, one.gait, Maneuver.FORWARD) for name, one in _unknown(config).items()),
+        *((one, name, one.gait, Maneuver.FORWARD) for name, one in unknown.items()),
         *_optimum(config),
     ]
 
