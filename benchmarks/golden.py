@@ -51,7 +51,7 @@ POOLED = {
     "--sensing 1 --time-limit 8",
     "compete": "compete --controllers open closed --scenes corner --trials 1 --decision-limit 10",
     "policy": f"tunnel --controllers {ROOT / 'entries' / 'apprentice' / 'policy.onnx'} --trials 3 "
-    "--time-limit 20",
+    "--time-limit 20 --robot.legs.fastest 6.29",
     "readings": f"tunnel {TRIALS} --controllers closed --readings swapped yoked delayed:0.2",
     "knows": f"tunnel {TRIALS} --controllers timed closed --knows side jam",
     "study": f"study {ROOT / 'studies' / 'smoke.toml'}",

@@ -26,7 +26,8 @@ on the twin and behind the supervisor of the real robot.
 uv sync --extra gym --extra onnx
 uv pip install torch  # 6 GB with the libraries for GPUs; pytorch.org says how to leave them out
 uv run --no-sync python examples/imitate.py --out my_policy
-uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx --scene uturn
+uv run --no-sync antennate tunnel --controllers timed closed my_policy/policy.onnx \\
+    --scene uturn --robot.legs.fastest 6.29
 ```
 
 The third line takes some 35 minutes on one core. The search of `geometric` tells a network with a
@@ -36,9 +37,12 @@ beat. The fourth line compares the policy with two of our controllers in ten U-t
 not seen. Such a policy is in a clone:
 
 ```bash
-uv run --extra onnx antennate tunnel --scene uturn \\
+uv run --extra onnx antennate tunnel --scene uturn --robot.legs.fastest 6.29 \\
     --controllers timed entries/apprentice/policy.onnx
 ```
+
+It walks at 1 Hz, on a robot with faster legs than ours: one of these servos keeps a fifth of its
+torque only up to 0.837 Hz ([the pace](science/pace.md)), and a faster gait is refused.
 
 `examples/train_ppo.py` learns from the reward instead, by PPO, in 20 minutes on one core;
 `--minutes 1` is to see it run, and `--workers 8` uses eight cores:
@@ -249,8 +253,9 @@ write_policy("chance.onnx", contract, [layer], np.zeros(inputs), np.ones(inputs)
 their last hundred episodes of training 36 got out with touch and 47 without, in 76 and 69 s of
 100 s on average. That was one training seed, and no test: it says nothing of touch.
 
-**By imitation** (`examples/imitate.py`): the student has its antennae, what it did itself in the
-last two seconds, and a memory, a gated recurrent unit of 128. It learns on its own episodes
+**By imitation** (`examples/imitate.py`), at 1 Hz, of a robot with faster legs than ours, which
+[keeps up to 0.837 Hz](science/pace.md): `robot.legs.fastest` is 6.29 rad/s. The student has its
+antennae, what it did itself in the last two seconds, and a memory, a gated recurrent unit of 128. It learns on its own episodes
 (DAgger; [Ross, Gordon and Bagnell 2011](https://arxiv.org/abs/1011.0686)) what the search of
 `geometric` would do at 1 Hz, also after slips, in which it does something else for 1 to 4 s.
 Meanwhile it also learns to say what the teacher goes by: the turn so far, its side, how many tries,
@@ -282,12 +287,13 @@ uv sync --extra gym --extra onnx && uv pip install torch
 uv run --no-sync python examples/imitate.py --out taught --seed 21  # and 22 to 25
 uv run --no-sync python examples/imitate.py --out blind --seed 21 --readings none
 uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
-    --controllers taught/policy.onnx blind/policy.onnx timed geometric
+    --robot.legs.fastest 6.29 --controllers taught/policy.onnx blind/policy.onnx timed geometric
 uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
     --controllers timed --control.gait.frequency 1 --control.timed.walk-time 3 \\
+    --robot.legs.fastest 6.29 \\
     --control.escape.reverse-time 1.32 --control.escape.turn-time 1.32
 uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
-    --controllers geometric --control.gait.frequency 1
+    --controllers geometric --control.gait.frequency 1 --robot.legs.fastest 6.29
 uv run python docs/science/learned.py  # all tables, of the rows beside it
 ```
 
@@ -321,7 +327,8 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   | | | | `timed` | 48 | 58.1 | +11.6 (-0.6 to +23.8) | 0.40, of 2 | 0.35 | 1 |
 
   ```bash
-  uv run antennate compete --hidden --trials 100 --scenes corner deadend --controllers \\
+  uv run antennate compete --hidden --trials 100 --scenes \\
+      corner+robot.legs.fastest=6.29 deadend+robot.legs.fastest=6.29 --controllers \\
       entries/apprentice/policy.onnx closed geometric docs/science/one_hertz.py:geometric
   uv run antennate compete --seed 1530184314 --trials 100 --scenes corner deadend \\
       --controllers timed
@@ -369,7 +376,8 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   the same seed, in 16 to 47 s; in the tenth it was still inside after 100 s. All ten drives ended
   with exit code 0, none with a fault, with the limits as they are, on two cores that had little
   else to do. All ten logs replay to the same commands, bit for bit. `python
-  docs/science/on_the_twin.py FOLDER entries/apprentice/policy.onnx --dry-run 1` does both, and
+  docs/science/on_the_twin.py FOLDER entries/apprentice/policy.onnx --dry-run 1 --robot.legs.fastest
+  6.29` does both, and
   `docs/science/on_the_twin.csv` has a row a drive. The twin's servos are programs: beside two other
   busy programs nine of ten drives of a former student ended with faults of late answers.
 

@@ -107,7 +107,10 @@ def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) 
     seen = {}
     for readings in ("own", "none"):
         env = imitate.gym.make(
-            "antennate/Tunnel-v1", interface=imitate.INTERFACE, readings=readings
+            "antennate/Tunnel-v1",
+            robot=imitate.ROBOT,
+            interface=imitate.INTERFACE,
+            readings=readings,
         )
         seen[readings], _ = env.reset(seed=5)
         for _ in range(8):
@@ -127,7 +130,7 @@ def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) 
 def test_a_written_student_answers_as_it_did(imitate: Any, tmp_path: Path) -> None:
     """The file and PyTorch choose alike over 200 decisions, and remember the same to 1e-5."""
     pytest.importorskip("onnxruntime")
-    env = imitate.gym.make("antennate/Tunnel-v1", interface=imitate.INTERFACE)
+    env = imitate.gym.make("antennate/Tunnel-v1", robot=imitate.ROBOT, interface=imitate.INTERFACE)
     size, torch = env.observation_space.shape[0], imitate.torch
     torch.manual_seed(0)
     network, rng = imitate.Network(size), np.random.default_rng(0)

@@ -1,4 +1,7 @@
-"""A rival of `entries/apprentice` at its gait frequency: `docs/science/one_hertz.py:geometric`."""
+"""A rival of `entries/apprentice` at its gait frequency: `docs/science/one_hertz.py:geometric`.
+
+A robot that walks so has faster legs than ours: `robot.legs.fastest` of 6.29 rad/s.
+"""
 
 from antennate.control.registry import make_controller
 from antennate.params.control import ControlParams

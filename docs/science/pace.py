@@ -21,6 +21,7 @@ from antennate.experiments.tunnel.lockstep import Apparatus
 from antennate.experiments.tunnel.physics import TrialMonitor, TunnelConfig
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
+from antennate.robots.joints import LegParams
 from antennate.robots.servos import ServoParams, ServosParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World
@@ -64,14 +65,18 @@ class Cell:
 
     @property
     def robot(self) -> RobotSpec:
-        """The robot; the worst servos have 73 % of the torque, and gears take 35 % of the load."""
+        """The robot, with legs as fast as their servos unloaded.
+
+        The worst servos have 73 % of the torque, and gears take 35 % of the load.
+        """
         share = self.volts / RATED
         torque, friction = (0.73 * STALL, 0.35) if self.worst else (STALL, 0.0)
         servo = ServoParams(
             gain_divisor=self.divisor, stall_torque=torque * share, load_friction=friction
         )
         servo = servo.model_copy(update={"no_load_speed": servo.no_load_speed * share})
-        return RobotSpec(servos=ServosParams(xc430_w240=servo))
+        legs = LegParams(fastest=servo.no_load_speed)
+        return RobotSpec(servos=ServosParams(xc430_w240=servo), legs=legs)
 
 
 def cells(part: str) -> list[Cell]:

@@ -1,0 +1,181 @@
+"""Each rule of the board at its own best pace: `python docs/science/paces.py PART FOLDER`.
+
+Parts, one command each; what was stopped goes on with the same command:
+
+- `search`: each rule at each of PACES in the eight scenes of the board, 20 draws of seed 592000.
+- `judge`: each at the pace that the search gave it, 100 fresh draws of seed 592001.
+- `table`: the pace of each rule and how it was chosen, and the board of the judged run.
+
+The pace of a rule, written before the search ran: of the paces whose crossings are within noise of
+the most, that of the least mean time, a failure as the limit; the slower one of equals. A pace is
+within noise if it crosses fewer by no more than one standard error of the difference. A draw counts
+once: its difference is summed over the scenes, and the error is that of the sum over 20 draws.
+
+The judgement, written before, too: of the rules that feel and of the blind ones the one that
+crosses most stands for its kind, the faster one of equals. Touch pays if it crosses at least 15
+points of 100 more, the 95 % interval above 5, and takes at least 25 % less time, the interval below
+-15 %. Intervals are percentiles of 10,000 samples of the draws, each with all its scenes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from antennate.params.control import ControlParams
+from antennate.types import Floats
+from antennate_lab.compete.checking import read_rows
+from antennate_lab.compete.config import SCENES_OF_BOARD, CompeteConfig, plain
+from antennate_lab.compete.episodes import EpisodeRow, restricted
+from antennate_lab.compete.page import apart, markdown, sentence
+from antennate_lab.compete.standings import standing
+
+PACES, USUAL = (0.5, 0.6, 0.7, 0.8), 0.6
+"""Frequencies of the gait that are tried, and the default, for which times were set [Hz]."""
+SEARCH, JUDGED = 592_000, 592_001
+DRAWS, FRESH = 20, 100
+"""Seeds, and draws of each scene."""
+BLIND, FEELS, TOLD = ("open", "timed", "schedule"), ("closed", "geometric"), ("map",)
+RULES = (*BLIND, *FEELS, *TOLD)
+TIMES: Mapping[str, Sequence[str]] = {
+    "timed": ("timed.walk_time", "escape.reverse_time", "escape.turn_time"),
+    "schedule": ("schedule.walk_time", "schedule.reverse_times"),
+    "closed": tuple(
+        f"search.{name}"
+        for name in ("reverse_time", "reverse_most", "turn_time", "lost_turn", "return_time")
+    ),
+    "map": ("escape.reverse_time", "escape.return_time"),
+}
+"""Times by the clock, which keep their gait cycles; `geometric` does so by its model."""
+RATES: Mapping[str, Sequence[str]] = {"schedule": ("schedule.turn_rate",)}
+"""What is taken for so much a second."""
+RESAMPLES = 10_000
+
+
+def at(rule: str, pace: float) -> str:
+    """A rule at a pace, as `compete --controllers` takes it."""
+    parts, own, factor = [f"gait.frequency={pace:g}"], ControlParams(), USUAL / pace
+    scales = ((TIMES, factor), (RATES, 1.0 / factor))
+    for path, scale in ((p, s) for table, s in scales for p in table.get(rule, ())):
+        group, _, name = path.partition(".")
+        values = np.round(scale * np.atleast_1d(getattr(getattr(own, group), name)), 4)
+        text = ", ".join(f"{value:g}" for value in values)
+        single = isinstance(getattr(getattr(own, group), name), float)
+        parts.append(f"{path}={text if single else f'[{text}]'}")
+    return "+".join([rule, *(parts if pace != USUAL else parts[:1])])
+
+
+def run(folder: Path, controllers: Iterable[str], seed: int, draws: int, workers: int) -> None:
+    """Run a competition, or go on with it."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    lists = {"controllers": [*controllers], "scenes": [*SCENES_OF_BOARD]}
+    lines = [f"{name} = {json.dumps(texts)}\n" for name, texts in lists.items()]
+    file = folder.with_suffix(".toml")
+    file.write_text(f"seed = {seed}\ntrials = {draws}\n{''.join(lines)}", encoding="utf-8")
+    command = [sys.executable, "-m", "antennate", "compete", "--config", file, "--out", folder]
+    command += ["--resume", "--workers", str(workers), "--no-figures"]
+    sys.exit(subprocess.run(command, check=False).returncode)
+
+
+def cells(rows: Iterable[EpisodeRow]) -> dict[str, tuple[Floats, Floats]]:
+    """Whether each draw was crossed, and its share of the limit, by controller: (draws, scenes)."""
+    found: dict[str, dict[tuple[int, str], tuple[float, float]]] = {}
+    for row in rows:
+        draw = float(row.outcome == "success"), *restricted([row])
+        found.setdefault(row.controller, {})[row.trial, row.scene] = draw
+    shape = -1, len(SCENES_OF_BOARD), 2
+    return {
+        name: (table[..., 0], table[..., 1])
+        for name, draws in found.items()
+        for table in [np.array([draws[key] for key in sorted(draws)]).reshape(shape)]
+    }
+
+
+def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
+    """The pace of each rule by the definition above: the controller's text by the rule."""
+    best = {}
+    for rule in dict.fromkeys(map(plain, found)):
+        own = {name: values for name, values in found.items() if plain(name) == rule}
+        most = max(own, key=lambda name: (own[name][0].sum(), -own[name][1].mean()))
+        within = []
+        for name, (crossed, share) in own.items():
+            lost = (own[most][0] - crossed).sum(axis=1)
+            if lost.sum() <= np.sqrt(len(lost) * lost.var(ddof=1)):
+                within.append((round(share.mean(), 9), name))
+        best[rule] = min(within)[1]
+    return best
+
+
+def compared(found: Mapping[str, tuple[Floats, Floats]]) -> str:
+    """The best rule that feels beside the best blind one, by the judgement above."""
+    by_rule = {plain(name): values for name, values in found.items()}
+    ours, blind = (
+        max(
+            (rule for rule in rules if rule in by_rule),
+            key=lambda rule: (by_rule[rule][0].sum(), -by_rule[rule][1].mean()),
+        )
+        for rules in (FEELS, BLIND)
+    )
+    rng, draws = np.random.default_rng(59), len(by_rule[ours][0])
+    picks = np.vstack([np.arange(draws), rng.integers(draws, size=(RESAMPLES, draws))])
+    means: dict[str, Any] = {
+        rule: [part.mean(axis=1)[picks].mean(axis=1) for part in by_rule[rule]]
+        for rule in (ours, blind)
+    }
+    more = 100.0 * (means[ours][0] - means[blind][0])
+    less = 100.0 * (means[ours][1] / means[blind][1] - 1.0)
+    ends = [np.percentile(values[1:], [2.5, 97.5]) for values in (more, less)]
+    pays = more[0] >= 15 and ends[0][0] > 5 and less[0] <= -25 and ends[1][1] < -15
+    return (
+        f"`{ours}` less `{blind}`: {more[0]:+.1f} points crossed ({ends[0][0]:+.1f} to "
+        f"{ends[0][1]:+.1f}), {less[0]:+.1f} % time ({ends[1][0]:+.1f} to {ends[1][1]:+.1f}): "
+        f"touch {'pays' if pays else 'is not shown to pay'} by the criterion"
+    )
+
+
+def table(folder: Path) -> None:
+    """Print what was searched, and the board of what was judged."""
+    found = cells(read_rows(folder / "search" / "trials.csv"))
+    best = chosen(found).values()
+    print("| rule | pace [Hz] | crossed | time [% of limit] | chosen |\n|---|---|---|---|---|")
+    for name, (crossed, share) in found.items():
+        pace = name.partition("gait.frequency=")[2].partition("+")[0]
+        count, time = f"{crossed.sum():.0f} of {crossed.size}", f"{100 * share.mean():.1f}"
+        print(f"| `{plain(name)}` | {pace} | {count} | {time} | {'yes' * (name in best)} |")
+    if not (path := folder / "judged" / "trials.csv").exists():
+        return
+    rows = read_rows(path)
+    result = standing(rows, CompeteConfig().tie)
+    print("", sentence(result), apart(result), markdown(result), sep="\n\n")
+    print("", compared(cells(rows)), sep="\n")
+
+
+def main() -> None:
+    """Run one part."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("part", choices=("search", "judge", "table"))
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--draws", type=int, help="of each scene; 2 or more, to see it run")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    given = parser.parse_args()
+    if given.part == "table":
+        table(given.folder)
+    elif given.part == "search":
+        texts = [at(rule, pace) for rule in RULES for pace in PACES]
+        run(given.folder / "search", texts, SEARCH, given.draws or DRAWS, given.workers)
+    else:
+        best = chosen(cells(read_rows(given.folder / "search" / "trials.csv")))
+        run(given.folder / "judged", best.values(), JUDGED, given.draws or FRESH, given.workers)
+
+
+if __name__ == "__main__":
+    main()
