@@ -255,8 +255,9 @@ their last hundred episodes of training 36 got out with touch and 47 without, in
 
 **By imitation** (`examples/imitate.py`), at 1 Hz, of a robot with faster legs than ours, which
 [keeps up to 0.837 Hz](science/pace.md): `robot.legs.fastest` is 6.29 rad/s. The student has its
-antennae, what it did itself in the last two seconds, and a memory, a gated recurrent unit of 128. It learns on its own episodes
-(DAgger; [Ross, Gordon and Bagnell 2011](https://arxiv.org/abs/1011.0686)) what the search of
+antennae, what it did itself in the last two seconds, and a memory, a gated recurrent unit of 128.
+It learns on its own episodes (DAgger;
+[Ross, Gordon and Bagnell 2011](https://arxiv.org/abs/1011.0686)) what the search of
 `geometric` would do at 1 Hz, also after slips, in which it does something else for 1 to 4 s.
 Meanwhile it also learns to say what the teacher goes by: the turn so far, its side, how many tries,
 and three durations. Five times a second it chooses forward, left, right or backwards, at 1 Hz. **It

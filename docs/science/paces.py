@@ -107,7 +107,7 @@ def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
         within = []
         for name, (crossed, share) in own.items():
             lost = (own[most][0] - crossed).sum(axis=1)
-            if lost.sum() <= np.sqrt(len(lost) * lost.var(ddof=1)):
+            if lost.sum() <= np.sqrt(len(lost) * lost.var(ddof=1)) + 1e-9:
                 within.append((round(share.mean(), 9), name))
         best[rule] = min(within)[1]
     return best
