@@ -112,8 +112,7 @@ class CompeteConfig(Params):
             data = read_limited(path, LARGEST_TABLE, ConfigError) if self.check else b""
             lines = from_csv(decoded(path, data, ConfigError)) if data else []
             columns = ("controller", "scene")
-            named = dict.fromkeys(str(line.get(name)) for line in lines for name in columns)
-            yield from map(plain, named)
+            yield from {plain(str(line.get(name))) for line in lines for name in columns}
 
     @field_validator("seed")
     @classmethod

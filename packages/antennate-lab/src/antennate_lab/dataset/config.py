@@ -220,9 +220,7 @@ class DatasetConfig(Params):
                 f"held_out_speeds: expected a range apart from speeds, {low:g} to {high:g}, found "
                 f"{least:g} to {most:g}"
             )
-        self.robot.require_pace(
-            "gait.frequency with the largest of speeds", self.gait.frequency * high
-        )
+        self.robot.require_pace("gait.frequency with speeds", self.gait.frequency * high)
         fastest = self.gait.frequency * max(high, most)
         if fastest > 1.0:
             raise ValueError(

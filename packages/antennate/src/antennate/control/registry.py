@@ -180,11 +180,10 @@ def make_controller(
             f"expected a controller with reset and step, found {name!r} without {lacking[0]}"
         )
     if walks:
-        frequency = control.gait.frequency
-        pace = getattr(controller, "fastest_gait", frequency)
+        pace = getattr(controller, "fastest_gait", control.gait.frequency)
         if not isinstance(pace, Real) or math.isnan(pace):
             raise ConfigError(f"{name!r}: expected fastest_gait in Hz, found {shown(pace)}")
-        own = "control.gait.frequency" if pace == frequency else f"gait of {name}"
+        own = "control.gait.frequency" if pace == control.gait.frequency else f"gait of {name}"
         robot.require_pace(own, float(pace))
     return controller
 

@@ -120,10 +120,7 @@ class LegParams(JointParams):
     kind: Literal["rolling", "lifting"] = number("rolling", "1", "paper: O-legs")
     """Rolling legs turn about the pitch axis without end, lifting legs about the roll axis."""
     fastest: float = number(
-        5.26,
-        "rad/s",
-        "assumed: 0.837 Hz; at 10.8 V a fifth of the torque is left (docs/science/pace.md)",
-        gt=0,
+        5.26, "rad/s", "assumed: it leaves a fifth of torque at 10.8 V (docs/science/pace.md)", gt=0
     )
     """Fastest that goals move; rolling legs walk by no faster gait, in a simulation neither."""
     limit: float = number(

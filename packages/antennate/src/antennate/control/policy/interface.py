@@ -59,11 +59,7 @@ class PolicyInterface(Params):
         return dict.fromkeys(theirs[self.action], f"the action {self.action!r} does not have it")
 
     def fastest_gait(self, frequency: float) -> float:
-        """Fastest gait by which it may walk [Hz]; 0 where its answers move the joints themselves.
-
-        Args:
-            frequency: That of the gait in which it chooses maneuvers [Hz].
-        """
+        """Fastest gait of its answers [Hz]: `frequency` for maneuvers, 0 where they move joints."""
         paces = {"maneuver": frequency, "gait": self.frequency[1], "joints": 0.0}
         return paces[self.action]
 
