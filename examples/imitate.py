@@ -1,8 +1,7 @@
 """Teach a network to escape by touch, by imitation of `geometric`; write it as ONNX.
 
     python examples/imitate.py --out my_policy                   # some 35 minutes on one core
-    antennate tunnel --scene uturn --controllers timed geometric my_policy/policy.onnx --seed 5 \\
-        --robot.legs.fastest 6.29
+    antennate tunnel --controllers timed my_policy/policy.onnx --robot.legs.fastest 6.29
 
 It walks at 1 Hz, on a robot with faster legs than ours, which keeps up to 0.837 Hz.
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
@@ -37,13 +36,8 @@ FREQUENCY = 1.0
 """Gait cycles a second [Hz]."""
 ROBOT = {"legs": {"fastest": 6.29}}
 """Legs that keep up with that: 2 pi of it [rad/s]."""
-INTERFACE = {
-    "action": "gait",
-    "ticks": 20,
-    "history": 10,
-    "memory_time": 30.0,
-    "frequency": (0.2, FREQUENCY),
-}
+INTERFACE = {"action": "gait", "ticks": 20, "history": 10, "memory_time": 30.0}
+INTERFACE["frequency"] = (0.2, FREQUENCY)
 """A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last two."""
 DECISION, WINDOW, PATIENCE = 0.2, 0.8, 3
 """Time of a decision [s]; gait cycles in which readings repeat; decisions of another will."""

@@ -64,9 +64,8 @@ def _control(name: str, numbers: Sequence[str], text: str) -> ControlParams:
         control = from_values(ControlParams, values)
     except ConfigError as error:
         raise ConfigError(f"controllers: {shown(text)}: {error}") from None
-    idle = unread(name, control)
     for part in numbers:
-        if (path := part.partition("=")[0]) in idle:
+        if (path := part.partition("=")[0]) in unread(name, control):
             raise ConfigError(f"controllers: {shown(text)}: {name} does not read {path}")
     return control
 
